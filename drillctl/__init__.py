@@ -1,0 +1,64 @@
+"""Control design against torsional stick-slip of oil-well drillstrings.
+
+A design flows one way: file -> `Design` -> plant -> simulation -> map -> region -> figure.
+
+======================  ==========================================================
+`design`, `catalog`     TOML files in, validated frozen `Design` out; shipped files
+`drillstring`           sections, API pipes, finite-element assembly
+`bit_rock`              friction laws of the bit, set-valued at rest
+`top_drive`             control laws of the top drive
+`weight_on_bit`         laws of the weight on bit
+`linear`                plant and loop as `control.StateSpace`, modes
+`simulation`            reference solver (located events) and batch engine (lanes)
+`studies`               sweeps, regions, audits
+`plots`                 a result in, a figure out
+`store`                 results on disk
+`units`, `errors`       quantities at the edge; exceptions
+======================  ==========================================================
+
+Numbers are SI and radians throughout; angles and speeds of the dynamics are measured in the
+frame that turns at the final set speed, unless a name says otherwise. Positive bit torque
+brakes. Start with `load`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from drillctl.design import Design as Design
+    from drillctl.design import load as load
+    from drillctl.linear import modes as modes
+    from drillctl.simulation import simulate as simulate
+    from drillctl.store import open as open
+    from drillctl.studies import stability_map as stability_map
+    from drillctl.studies import sweep as sweep
+
+_HOME = {
+    "Design": "drillctl.design",
+    "load": "drillctl.design",
+    "modes": "drillctl.linear",
+    "simulate": "drillctl.simulation",
+    "sweep": "drillctl.studies",
+    "stability_map": "drillctl.studies",
+    "open": "drillctl.store",
+    "plots": "drillctl",
+}
+
+__all__ = [*_HOME, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    # Scientific imports cost a second: each comes with the first use of what needs it.
+    if name == "plots":
+        return import_module("drillctl.plots")
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'drillctl' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,19 @@
+"""Bit-rock laws: torque on the bit as a function of its speed and of the weight on it.
+
+A law is a `NamedTuple` of numbers (in the batch engine: of one array per number) with two
+pure functions. They are written once, free of branches on data, and used three times: the
+reference solver calls them with floats, numba compiles them into the kernels, and CasADi
+calls them with symbols; hence the exponential comes in as an argument.
+
+- `static_torque(weight)`: largest torque (N m) of a bit at rest.
+- `torque_and_slope(weight, speed, exp)`: torque (N m) of a bit turning at `speed` (rad/s, not
+  negative) and its derivative (N m s/rad). For a bit turning backwards the torque changes
+  sign. A set-valued law takes, at zero speed, any value between minus and plus the static
+  torque; nothing is ever regularised.
+"""
+
+from drillctl.bit_rock.navarro_lopez_suarez import NavarroLopezSuarez
+from drillctl.bit_rock.protocol import BitRockLaw
+from drillctl.bit_rock.weight_table import WeightTable
+
+__all__ = ["BitRockLaw", "NavarroLopezSuarez", "WeightTable"]

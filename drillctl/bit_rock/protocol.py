@@ -1,0 +1,24 @@
+"""What a bit-rock law must offer to run in both engines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+Exp = Callable[[Any], Any]
+"""An exponential: `math.exp`, a compiled one, or `casadi.exp`."""
+
+
+class BitRockLaw(Protocol):
+    """Torque on the bit against its speed and the weight on it."""
+
+    set_valued: bool
+    """True where the law is a set at zero speed, so that a bit can stand still."""
+
+    def static_torque(self, weight: float) -> float:
+        """Largest torque on a bit at rest (N m) under `weight` (N)."""
+        ...
+
+    def torque_and_slope(self, weight: float, speed: float, exp: Exp) -> tuple[float, float]:
+        """Torque (N m) at `speed` >= 0 (rad/s) under `weight` (N), and its slope (N m s/rad)."""
+        ...

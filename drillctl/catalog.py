@@ -1,0 +1,85 @@
+"""Shipped models and designs by name.
+
+In a wheel they lie inside the package, in a checkout beside it; both are looked at.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from drillctl.errors import InputError, nearest
+
+Shelf = Literal["models", "designs"]
+_PACKAGE = Path(__file__).resolve().parent
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A shipped file.
+
+    Attributes
+    ----------
+    name : str
+        Name by which commands take it.
+    title : str
+        Its own title.
+    path : Path
+        Where it lies.
+    """
+
+    name: str
+    title: str
+    path: Path
+
+
+def _folder(shelf: Shelf) -> Path:
+    inside = _PACKAGE / shelf
+    return inside if inside.is_dir() else _PACKAGE.parent / shelf
+
+
+def names(shelf: Shelf) -> list[str]:
+    """Names of the shipped models or designs, sorted."""
+    return sorted(path.stem for path in _folder(shelf).glob("*.toml"))
+
+
+def entries(shelf: Shelf) -> list[Entry]:
+    """The shipped models or designs with their titles, sorted by name."""
+    found = []
+    for name in names(shelf):
+        path = _folder(shelf) / f"{name}.toml"
+        title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
+        found.append(Entry(name, title, path))
+    return found
+
+
+def find(name_or_path: str, shelves: tuple[Shelf, ...] = ("designs", "models")) -> Path:
+    """Where a design lies, given its name or a path to it.
+
+    Parameters
+    ----------
+    name_or_path : str
+        A shipped name, or a path (anything with a slash or ending in `.toml`).
+    shelves : tuple of {'models', 'designs'}
+        Which shipped files to look among, in this order.
+
+    Raises
+    ------
+    InputError
+        No such file, or no such name; the message lists the nearest.
+    """
+    path = Path(name_or_path).expanduser()
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        if not path.is_file():
+            raise InputError("no such file", name_or_path)
+        return path
+    for shelf in shelves:
+        if name_or_path in names(shelf):
+            return _folder(shelf) / f"{name_or_path}.toml"
+    known = [name for shelf in shelves for name in names(shelf)]
+    raise InputError(
+        f"not a shipped name ({nearest(name_or_path, known)}), nor a path to a .toml file",
+        name_or_path or "design",
+    )

@@ -1,0 +1,17 @@
+"""Design files: TOML text in, a validated frozen `Design` out, and back.
+
+- `tables.py`: every key a design may hold, with its unit and range.
+- `quantities.py`: the field types those tables use.
+- `merging.py`: a design laid over its model; single values set by path.
+- `validation.py`: errors in the user's words.
+- `parts.py`: the physical parts that the tables describe.
+- `design.py`: the `Design` itself.
+- `reading.py`, `writing.py`, `paths.py`: files in, files out, values by dotted path.
+"""
+
+from drillctl.design.design import Design
+from drillctl.design.paths import Parameter, parameter, parameters
+from drillctl.design.reading import load, parse_setting
+from drillctl.design.writing import to_toml
+
+__all__ = ["Design", "Parameter", "load", "parameter", "parameters", "parse_setting", "to_toml"]

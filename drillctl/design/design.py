@@ -1,0 +1,102 @@
+"""A design: one rig, complete and frozen, from which everything else is computed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from drillctl.bit_rock import BitRockLaw
+from drillctl.design import parts
+from drillctl.design.merging import Tree, branch, overlay
+from drillctl.design.tables import DesignTables
+from drillctl.design.validation import validated
+from drillctl.drillstring import Drillstring
+from drillctl.top_drive import TopDriveLaw
+from drillctl.weight_on_bit import WeightLaw
+
+if TYPE_CHECKING:
+    import control
+
+
+@dataclass(frozen=True)
+class Design:
+    """A validated rig with its control and what is to be computed of it.
+
+    Made by `drillctl.load`. Two designs are equal when their tables are.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file it came from.
+    tables : DesignTables
+        Every key of the design file with its value, SI numbers.
+    tree : dict
+        The same as plain TOML data before validation, from which variants are made.
+    origin : str
+        The file, for messages.
+    """
+
+    name: str = field(compare=False)
+    tables: DesignTables
+    tree: Tree = field(compare=False, repr=False)
+    origin: str = field(compare=False, default="")
+
+    def __hash__(self) -> int:
+        return hash(self.tables.model_dump_json())
+
+    def replace(self, values: dict[str, Any]) -> Design:
+        """A new design with some values changed.
+
+        Parameters
+        ----------
+        values : dict
+            Dotted path to value, as it would stand in the file (`"120 rpm"`), or a
+            `units.SI` number. Changing a `law` drops the old law's own numbers.
+
+        Raises
+        ------
+        InputError
+            Unknown path or impossible value.
+        """
+        tree = self.tree
+        for path, value in values.items():
+            tree = overlay(tree, branch(path, value, tree))
+        return Design(self.name, validated(tree, self.origin), tree, self.origin)
+
+    @property
+    def speed(self) -> float:
+        """Final set speed (rad/s)."""
+        return self.tables.operating_point.speed
+
+    @cached_property
+    def string(self) -> Drillstring:
+        """The assembled drillstring."""
+        return parts.drillstring(self.tables)
+
+    @cached_property
+    def bit_rock(self) -> BitRockLaw:
+        """Bit-rock law at the operating weight on bit."""
+        return parts.bit_rock(self.tables)
+
+    @cached_property
+    def top_drive(self) -> TopDriveLaw:
+        """Top-drive law."""
+        return parts.top_drive(self.tables)
+
+    @cached_property
+    def weight_on_bit(self) -> WeightLaw:
+        """Weight-on-bit law."""
+        return parts.weight_on_bit(self.tables)
+
+    def plant(self) -> control.StateSpace:
+        """The string without control, see `drillctl.linear.plant`."""
+        from drillctl.linear import plant
+
+        return plant(self.string)
+
+    def loop(self) -> control.StateSpace:
+        """The string closed with its controller, see `drillctl.linear.closed_loop`."""
+        from drillctl.linear import closed_loop
+
+        return closed_loop(self)

@@ -1,0 +1,176 @@
+"""The physical parts of a rig, built from the tables of its design."""
+
+from __future__ import annotations
+
+import math
+
+from drillctl.bit_rock import BitRockLaw, NavarroLopezSuarez, WeightTable
+from drillctl.design.tables import (
+    ConstantTorqueTable,
+    DesignTables,
+    NavarroLopezSuarezTable,
+    SectionTable,
+)
+from drillctl.drillstring import GRADES, PIPES, Drillstring, Section, assemble, polar_moment
+from drillctl.drillstring.section import torsional_yield
+from drillctl.errors import InputError
+from drillctl.top_drive import PI, ConstantTorque, TopDriveLaw
+from drillctl.weight_on_bit import ConstantWeight, WeightLaw
+
+STEEL_SHEAR_MODULUS = 79.3e9
+"""Shear modulus (Pa) where a design gives none: drill-pipe steel."""
+STEEL_DENSITY = 7850.0
+"""Density (kg/m3) where a design gives none."""
+STEEL_POISSON_RATIO = 0.3
+"""Poisson's ratio where a design gives Young's modulus alone."""
+ELEMENT_LENGTH = 100.0
+"""Longest element (m) where a design does not say how many."""
+
+
+def drillstring(tables: DesignTables) -> Drillstring:
+    """Assemble the string of a design.
+
+    Raises
+    ------
+    InputError
+        A node is left without inertia.
+    """
+    table = tables.drillstring
+    refuse_massless_node(tables)
+    return assemble(
+        tuple(section(s) for s in table.sections),
+        top_inertia=tables.top_drive.inertia,
+        bit_inertia=tables.bha.inertia,
+        top_damping=tables.top_drive.damping,
+        bit_damping=tables.bha.damping,
+        modal_damping=table.modal_damping,
+        mass=table.mass,
+    )
+
+
+def section(table: SectionTable) -> Section:
+    """The physical section that a table describes."""
+    if table.stiffness is not None:
+        return Section(
+            name=table.name,
+            elements=1,
+            stiffness=table.stiffness,
+            end_inertia=table.inertia or 0.0,
+            coupling_damping=table.damping,
+            stiffness_damping=table.stiffness_damping,
+            mass_damping=table.mass_damping,
+        )
+    assert table.length is not None
+    moment, yield_torque = _cross_section(table)
+    density = STEEL_DENSITY if table.density is None else table.density
+    return Section(
+        name=table.name,
+        elements=table.elements or math.ceil(table.length / ELEMENT_LENGTH),
+        stiffness=shear_modulus(table) * moment / table.length,
+        inertia=density * moment * table.length * table.tool_joint_factor,
+        length=table.length,
+        coupling_damping=table.damping,
+        stiffness_damping=table.stiffness_damping,
+        mass_damping=table.mass_damping,
+        drag=table.drag * table.length,
+        yield_torque=yield_torque,
+    )
+
+
+def shear_modulus(table: SectionTable) -> float:
+    """Shear modulus (Pa): given, or E / (2 (1 + nu)), or that of steel."""
+    if table.shear_modulus is not None:
+        return table.shear_modulus
+    if table.youngs_modulus is not None:
+        ratio = STEEL_POISSON_RATIO if table.poisson_ratio is None else table.poisson_ratio
+        return table.youngs_modulus / (2.0 * (1.0 + ratio))
+    return STEEL_SHEAR_MODULUS
+
+
+def _cross_section(table: SectionTable) -> tuple[float, float]:
+    """Polar moment (m^4) and torsional yield (N m), the latter infinite without a grade."""
+    if table.polar_moment is not None:
+        return table.polar_moment, math.inf
+    if table.pipe is not None:
+        outer, inner = PIPES[table.pipe].outer_diameter, PIPES[table.pipe].inner_diameter
+    else:
+        assert table.outer_diameter is not None and table.inner_diameter is not None
+        outer, inner = table.outer_diameter, table.inner_diameter
+    limit = math.inf
+    if table.grade is not None:
+        limit = torsional_yield(outer, inner, GRADES[table.grade])
+    return polar_moment(outer, inner), limit
+
+
+def refuse_massless_node(tables: DesignTables) -> None:
+    """Refuse a node without inertia (`InputError`): its equation of motion would be singular."""
+    above = tables.top_drive.inertia
+    where = "top_drive.inertia"
+    for section_ in map(section, tables.drillstring.sections):
+        if above == 0.0 and section_.inertia == 0.0:
+            raise InputError("0 leaves a node without inertia; give it more than 0", where)
+        above = section_.end_inertia + section_.inertia
+        where = f"drillstring.sections.{section_.name}.inertia"
+    if above + tables.bha.inertia == 0.0:
+        raise InputError("0 leaves the bit without inertia; give it more than 0", "bha.inertia")
+
+
+def bit_rock(tables: DesignTables) -> BitRockLaw:
+    """Bit-rock law at the operating weight on bit.
+
+    Raises
+    ------
+    InputError
+        The weight lies outside the table and `outside_table` is `refuse`, or the factors
+        bring the static torque under the sliding one.
+    """
+    table = tables.bit_rock
+    if not isinstance(table, NavarroLopezSuarezTable):
+        radius = table.bit_radius
+        return NavarroLopezSuarez(
+            a1=radius * table.sliding_coefficient,
+            a2=radius * table.static_coefficient,
+            beta=table.decay / table.reference_speed,
+        )
+    law = _coefficients(table, tables.operating_point.weight_on_bit)
+    law = NavarroLopezSuarez(
+        law.a1 * table.a1_factor, law.a2 * table.a2_factor, law.beta * table.beta_factor
+    )
+    if law.a2 < law.a1:
+        raise InputError(
+            f"the factors give a2 = {law.a2:g}, less than a1 = {law.a1:g}", "bit_rock.a2_factor"
+        )
+    return law
+
+
+def _coefficients(table: NavarroLopezSuarezTable, weight: float) -> NavarroLopezSuarez:
+    if table.table is None:
+        assert table.a1 is not None and table.a2 is not None and table.beta is not None
+        return NavarroLopezSuarez(table.a1, table.a2, table.beta)
+    rows = WeightTable(
+        weight=tuple(row.weight_on_bit for row in table.table),
+        a1=tuple(row.a1 for row in table.table),
+        a2=tuple(row.a2 for row in table.table),
+        beta=tuple(row.beta for row in table.table),
+    )
+    if not rows.covers(weight) and table.outside_table == "refuse":
+        raise InputError(
+            f"{weight / 1e3:g} kN lies outside the friction table "
+            f"({rows.weight[0] / 1e3:g} to {rows.weight[-1] / 1e3:g} kN); "
+            'allowed with bit_rock.outside_table = "extrapolate"',
+            "operating_point.weight_on_bit",
+        )
+    return rows.at(weight)
+
+
+def top_drive(tables: DesignTables) -> TopDriveLaw:
+    """Top-drive law with its numbers."""
+    table = tables.controller
+    if isinstance(table, ConstantTorqueTable):
+        return ConstantTorque(table.torque)
+    return PI(table.kp, table.ki)
+
+
+def weight_on_bit(tables: DesignTables) -> WeightLaw:
+    """Weight-on-bit law with its numbers."""
+    return ConstantWeight(tables.operating_point.weight_on_bit)

@@ -1,0 +1,114 @@
+"""Values of a design by dotted path, with the unit they are held and written in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from drillctl import units
+from drillctl.design.design import Design
+from drillctl.design.tables import Table
+from drillctl.errors import InputError, nearest
+from drillctl.units import Kind
+
+_HIDDEN = ("title", "source", "status", "notes", "schema_version", "map")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A numeric value of a design.
+
+    Attributes
+    ----------
+    path : str
+        Dotted path.
+    kind : Kind or None
+        What it measures; None for factors and counts.
+    value : float or None
+        In SI; None where the design leaves it out.
+    """
+
+    path: str
+    kind: Kind | None
+    value: float | None
+
+    @property
+    def si_unit(self) -> str:
+        """Unit of SI values, empty for factors and counts."""
+        return self.kind.si if self.kind else ""
+
+    def parse(self, value: object) -> float:
+        """Read a value as it would stand in the file, into SI."""
+        if self.kind is not None:
+            return units.parse(value, self.kind)
+        try:
+            return float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            raise InputError(f"{value!r} is not a number") from None
+
+
+def parameter(design: Design, path: str) -> Parameter:
+    """Look a numeric parameter up.
+
+    Raises
+    ------
+    InputError
+        There is no such path, or what stands there is not a number.
+    """
+    known = {p.path: p for p in parameters(design)}
+    if path not in known:
+        raise InputError(f"no numeric parameter {path!r}; {_near_paths(path, known)}", path)
+    return known[path]
+
+
+def _near_paths(path: str, known: dict[str, Parameter]) -> str:
+    """Suggest among the paths of the same table, if there is one, else among all."""
+    table = path.rpartition(".")[0]
+    same = [p for p in known if p.startswith(f"{table}.")] if table else []
+    return nearest(path, same or known)
+
+
+def parameters(design: Design) -> list[Parameter]:
+    """Every numeric parameter that `--set` and sweep axes take, in file order."""
+    found: list[Parameter] = []
+    _collect(design.tables, "", found)
+    return found
+
+
+def _collect(table: Table, prefix: str, found: list[Parameter]) -> None:
+    for key, info in type(table).model_fields.items():
+        if key in _HIDDEN:
+            continue
+        value = getattr(table, key)
+        path = f"{prefix}{key}"
+        if isinstance(value, Table):
+            _collect(value, f"{path}.", found)
+        elif path == "drillstring.sections":
+            for section in value:
+                _collect(section, f"{path}.{section.name}.", found)
+        elif _is_number(info.annotation):
+            found.append(Parameter(path, kind_of(info), value))
+
+
+def _is_number(annotation: Any) -> bool:
+    if annotation in (int, float):
+        return True
+    return any(_is_number(a) for a in get_args(annotation) if a is not annotation)
+
+
+def kind_of(info: Any) -> Kind | None:
+    """The `Kind` kept in a field's annotation, if it has one."""
+    for note in info.metadata:
+        if isinstance(note, Kind):
+            return note
+    return _kind_inside(info.annotation)
+
+
+def _kind_inside(annotation: Any) -> Kind | None:
+    for argument in get_args(annotation):
+        if isinstance(argument, Kind):
+            return argument
+        inner = _kind_inside(argument)
+        if inner is not None:
+            return inner
+    return None

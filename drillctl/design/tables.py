@@ -1,0 +1,374 @@
+"""The tables of a design file, validated and frozen. One class a table, numbers in SI.
+
+Keys that are not listed here are refused. Every rule that ties two keys together stands in
+the class that holds both.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from drillctl import units
+from drillctl.design import quantities as q
+from drillctl.drillstring import GRADES, PIPES
+from drillctl.errors import InputError, nearest
+
+
+class Table(BaseModel):
+    """A table of a design: unknown keys refused, frozen when made."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class OperatingPoint(Table):
+    """Where the rig drills: final set speed and nominal weight on bit."""
+
+    speed: q.PositiveSpeed = 100 * units.RPM
+    weight_on_bit: q.Weight = 120e3
+
+
+class SectionTable(Table):
+    """A section: a pipe by API name, or geometry, or polar moment, or a lumped spring."""
+
+    name: str
+    elements: q.Count | None = None
+    length: q.Length | None = None
+    pipe: str | None = None
+    grade: str | None = None
+    outer_diameter: q.Diameter | None = None
+    inner_diameter: q.Bore | None = None
+    polar_moment: q.PolarMoment | None = None
+    shear_modulus: q.Modulus | None = None
+    youngs_modulus: q.Modulus | None = None
+    poisson_ratio: q.Number | None = None
+    density: q.Density | None = None
+    tool_joint_factor: q.PositiveNumber = 1.0
+    stiffness: q.Stiffness | None = None
+    inertia: q.Inertia | None = None
+    damping: q.Damping = 0.0
+    stiffness_damping: q.TimeOrZero = 0.0
+    mass_damping: q.Rate = 0.0
+    drag: q.Drag = 0.0
+
+    @field_validator("pipe")
+    @classmethod
+    def _known_pipe(cls, value: str | None) -> str | None:
+        if value is not None and value not in PIPES:
+            raise InputError(f"no API pipe {value!r}; {nearest(value, PIPES)}")
+        return value
+
+    @field_validator("grade")
+    @classmethod
+    def _known_grade(cls, value: str | None) -> str | None:
+        if value is not None and value not in GRADES:
+            raise InputError(f"no grade {value!r}; {nearest(value, GRADES)}")
+        return value
+
+    @model_validator(mode="after")
+    def _one_description(self) -> SectionTable:
+        ways = {
+            "pipe": self.pipe,
+            "outer_diameter": self.outer_diameter,
+            "polar_moment": self.polar_moment,
+            "stiffness": self.stiffness,
+        }
+        given = [way for way, value in ways.items() if value is not None]
+        if len(given) != 1:
+            came = " and ".join(given) or "none of them"
+            raise InputError(f"needs exactly one of {', '.join(ways)}; got {came}")
+        if self.stiffness is not None:
+            self._only_lumped_keys()
+        else:
+            self._enough_geometry()
+        return self
+
+    def _only_lumped_keys(self) -> None:
+        distributed = (
+            "length", "grade", "inner_diameter", "shear_modulus", "youngs_modulus",
+            "poisson_ratio", "density", "drag",
+        )  # fmt: skip
+        for key in distributed:
+            if getattr(self, key):
+                raise InputError(f"{key} does not go with stiffness (a lumped spring)")
+        if (self.elements or 1) != 1:
+            raise InputError("elements must be 1 for a lumped spring (stiffness)")
+
+    def _enough_geometry(self) -> None:
+        if self.length is None:
+            raise InputError('length is missing, e.g. length = "3000 m"')
+        if self.inertia is not None:
+            raise InputError("inertia goes with stiffness (a lumped spring) only")
+        if self.pipe is not None and self.inner_diameter is not None:
+            raise InputError("inner_diameter is already given by pipe")
+        if self.outer_diameter is not None:
+            if self.inner_diameter is None:
+                raise InputError('inner_diameter is missing ("0 mm" for a solid bar)')
+            if self.inner_diameter >= self.outer_diameter:
+                raise InputError(
+                    f"inner_diameter {self.inner_diameter * 1e3:g} mm must be less than "
+                    f"outer_diameter {self.outer_diameter * 1e3:g} mm"
+                )
+        if self.grade is not None and self.polar_moment is not None:
+            raise InputError("grade needs pipe or outer_diameter, not polar_moment")
+        if self.shear_modulus is not None and self.youngs_modulus is not None:
+            raise InputError("give shear_modulus or youngs_modulus, not both")
+        if self.poisson_ratio is not None and not -1.0 < self.poisson_ratio < 0.5:
+            raise InputError(f"poisson_ratio {self.poisson_ratio:g} must lie between -1 and 0.5")
+
+
+class DrillstringTable(Table):
+    """The string: its sections from top to bottom."""
+
+    mass: Literal["consistent", "lumped"] = "consistent"
+    modal_damping: q.NonNegativeNumber = 0.0
+    sections: tuple[SectionTable, ...]
+
+    @field_validator("sections")
+    @classmethod
+    def _named_once(cls, sections: tuple[SectionTable, ...]) -> tuple[SectionTable, ...]:
+        if not sections:
+            raise InputError("a drillstring needs at least one section")
+        names = [section.name for section in sections]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"two sections are called {name!r}; names must differ")
+        return sections
+
+
+class TopDriveTable(Table):
+    """The top drive (rotary table) as a body."""
+
+    inertia: q.Inertia
+    damping: q.Damping = 0.0
+
+
+class BhaTable(Table):
+    """The bottom-hole assembly with the bit, as a body."""
+
+    inertia: q.Inertia = 0.0
+    damping: q.Damping = 0.0
+
+
+class FrictionRow(Table):
+    """Friction coefficients at one weight on bit."""
+
+    weight_on_bit: q.Weight
+    a1: q.NonNegativeNumber
+    a2: q.NonNegativeNumber
+    beta: q.NonNegativeNumber
+
+    @model_validator(mode="after")
+    def _falling(self) -> FrictionRow:
+        _refuse_rising(self.a1, self.a2)
+        return self
+
+
+def _refuse_rising(a1: float, a2: float) -> None:
+    if a2 < a1:
+        raise InputError(f"a2 = {a2:g} must not be less than a1 = {a1:g}")
+
+
+class NavarroLopezSuarezTable(Table):
+    """Friction of Navarro-Lopez & Suarez: coefficients, or a table of them over WOB."""
+
+    law: Literal["navarro-lopez-suarez"]
+    a1: q.NonNegativeNumber | None = None
+    a2: q.NonNegativeNumber | None = None
+    beta: q.NonNegativeNumber | None = None
+    table: tuple[FrictionRow, ...] | None = None
+    a1_factor: q.PositiveNumber = 1.0
+    a2_factor: q.PositiveNumber = 1.0
+    beta_factor: q.PositiveNumber = 1.0
+    outside_table: Literal["refuse", "extrapolate"] = "refuse"
+
+    @field_validator("table")
+    @classmethod
+    def _increasing(cls, table: tuple[FrictionRow, ...] | None) -> tuple[FrictionRow, ...] | None:
+        if table is not None:
+            if len(table) < 2:
+                raise InputError("a table needs two rows or more; give a1, a2 and beta instead")
+            weights = [row.weight_on_bit for row in table]
+            if any(b <= a for a, b in zip(weights, weights[1:], strict=False)):
+                raise InputError("weight_on_bit must increase from row to row")
+        return table
+
+    @model_validator(mode="after")
+    def _coefficients_or_table(self) -> NavarroLopezSuarezTable:
+        numbers = {"a1": self.a1, "a2": self.a2, "beta": self.beta}
+        given = [key for key, value in numbers.items() if value is not None]
+        if self.table is not None and given:
+            raise InputError(f"give table, or a1, a2 and beta; got table and {', '.join(given)}")
+        if self.table is None and len(given) < 3:
+            missing = [key for key in numbers if key not in given]
+            raise InputError(f"{', '.join(missing)} missing: give a1, a2 and beta, or a table")
+        if self.table is None:
+            assert self.a1 is not None and self.a2 is not None
+            _refuse_rising(self.a1 * self.a1_factor, self.a2 * self.a2_factor)
+        return self
+
+
+class BitRadiusFrictionTable(Table):
+    """The same law with a bit radius and friction coefficients (Navarro-Lopez & Cortes 2007).
+
+    T = W R_b [mu_c + (mu_s - mu_c) exp(-gamma |w| / v_f)].
+    """
+
+    law: Literal["bit-radius-friction"]
+    bit_radius: q.Diameter
+    static_coefficient: q.NonNegativeNumber
+    sliding_coefficient: q.NonNegativeNumber
+    decay: q.NonNegativeNumber
+    reference_speed: q.PositiveSpeed = 1.0
+
+    @model_validator(mode="after")
+    def _falling(self) -> BitRadiusFrictionTable:
+        if self.static_coefficient < self.sliding_coefficient:
+            raise InputError(
+                f"static_coefficient = {self.static_coefficient:g} must not be less than "
+                f"sliding_coefficient = {self.sliding_coefficient:g}"
+            )
+        return self
+
+
+class PITable(Table):
+    """Proportional-integral speed control."""
+
+    law: Literal["pi"]
+    kp: q.ProportionalGain
+    ki: q.IntegralGain
+
+
+class ConstantTorqueTable(Table):
+    """A drive at constant torque."""
+
+    law: Literal["constant-torque"]
+    torque: q.Torque
+
+
+class ConstantWeightTable(Table):
+    """Weight on bit held at the operating point's value."""
+
+    law: Literal["constant"] = "constant"
+
+
+class StartTable(Table):
+    """State of the string at time zero.
+
+    `rest`: still, untwisted, bit stuck. `turning`: every node at `speed`, untwisted.
+    `wound_up`: bit stuck, twisted to the static torque, top at the set speed.
+    """
+
+    kind: Literal["rest", "turning", "wound_up"] = "turning"
+    speed: q.Speed | None = None
+
+    @model_validator(mode="after")
+    def _speed_when_turning(self) -> StartTable:
+        if self.kind != "turning" and self.speed is not None:
+            raise InputError(f"speed does not go with kind = {self.kind!r}, only with 'turning'")
+        return self
+
+
+class SimulationTable(Table):
+    """How long and how finely to simulate."""
+
+    duration: q.Time = 100.0
+    j1_from: q.TimeOrZero = 0.0
+    step: q.Time | None = None
+    modes: q.Count | None = None
+    accuracy: Literal["fast", "standard", "fine"] = "standard"
+    engine: Literal["reference", "batch"] | None = None
+
+    @model_validator(mode="after")
+    def _window(self) -> SimulationTable:
+        if self.j1_from >= self.duration:
+            raise InputError(
+                f"j1_from {self.j1_from:g} s must be less than duration {self.duration:g} s"
+            )
+        if self.step is not None and self.step > self.duration:
+            raise InputError(f"step {self.step:g} s must not exceed duration {self.duration:g} s")
+        return self
+
+
+class AxisTable(Table):
+    """One axis of a map; `min` and `max` as they would be written at `path`."""
+
+    path: str
+    min: float | str
+    max: float | str
+    points: q.Count
+
+    @field_validator("points")
+    @classmethod
+    def _two_or_more(cls, value: int) -> int:
+        if value < 2:
+            raise InputError(f"an axis needs 2 points or more, got {value}")
+        return value
+
+
+PAPER_AXES = (
+    AxisTable(path="controller.kp", min=0.0, max=1000.0, points=41),
+    AxisTable(path="controller.ki", min=0.0, max=500.0, points=41),
+)
+
+
+class MapTable(Table):
+    """The map over gains or any other parameters."""
+
+    axes: tuple[AxisTable, ...] = PAPER_AXES
+    levels: tuple[q.PositiveNumber, ...] = (20.0, 30.0, 40.0, 50.0)
+    audit_cells: q.CountOrZero = 12
+
+    @field_validator("levels")
+    @classmethod
+    def _sorted_levels(cls, levels: tuple[float, ...]) -> tuple[float, ...]:
+        if not levels:
+            raise InputError("a map needs at least one level")
+        return tuple(sorted(set(levels)))
+
+    @field_validator("axes")
+    @classmethod
+    def _axes(cls, axes: tuple[AxisTable, ...]) -> tuple[AxisTable, ...]:
+        if not axes:
+            raise InputError("a map needs at least one axis")
+        paths = [axis.path for axis in axes]
+        for path in paths:
+            if paths.count(path) > 1:
+                raise InputError(f"two axes run over {path!r}")
+        return axes
+
+
+BitRockTable = Annotated[
+    NavarroLopezSuarezTable | BitRadiusFrictionTable, Field(discriminator="law")
+]
+ControllerTable = Annotated[PITable | ConstantTorqueTable, Field(discriminator="law")]
+
+
+class DesignTables(Table):
+    """A whole design file after it was merged over its model."""
+
+    schema_version: Literal[1] = Field(default=1, alias="schema")
+    title: str = ""
+    source: str = ""
+    status: str = ""
+    notes: str = ""
+    operating_point: OperatingPoint = OperatingPoint()
+    drillstring: DrillstringTable
+    top_drive: TopDriveTable
+    bha: BhaTable = BhaTable()
+    bit_rock: BitRockTable
+    controller: ControllerTable = PITable(law="pi", kp=200.0, ki=100.0)
+    weight_on_bit: ConstantWeightTable = ConstantWeightTable()
+    start: StartTable = StartTable()
+    simulation: SimulationTable = SimulationTable()
+    map: MapTable = MapTable()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_schema(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "schema" in data and data["schema"] != 1:
+            raise InputError(
+                f"schema = {data['schema']!r} is not known; this version reads schema = 1"
+            )
+        return data

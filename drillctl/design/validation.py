@@ -1,0 +1,117 @@
+"""From plain TOML data to validated tables, with errors told in the user's own words."""
+
+from __future__ import annotations
+
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from drillctl.design.merging import Tree
+from drillctl.design.tables import BitRockTable, ControllerTable, DesignTables
+from drillctl.errors import InputError, nearest
+
+_LAWS = {"bit_rock": BitRockTable, "controller": ControllerTable}
+
+
+def validated(tree: Tree, origin: str) -> DesignTables:
+    """Validate plain TOML data.
+
+    Parameters
+    ----------
+    tree : dict
+        The whole design, already merged over its model.
+    origin : str
+        File it came from, for messages.
+
+    Raises
+    ------
+    InputError
+        The first thing wrong: file, key, what came, what is allowed, the nearest valid name.
+    """
+    from drillctl.design import parts
+
+    try:
+        tables = DesignTables.model_validate(tree)
+        parts.refuse_massless_node(tables)
+        parts.bit_rock(tables)
+    except ValidationError as error:
+        raise _told(error.errors()[0], tree, origin) from None
+    except InputError as error:
+        raise error.within(origin) if origin else error from None
+    return tables
+
+
+def _told(problem: Any, tree: Tree, origin: str) -> InputError:
+    """The first pydantic error as one of ours."""
+    path = _path(problem["loc"], tree)
+    where = f"{origin}: {path}" if origin and path else origin or path
+    kind = problem["type"]
+    if kind == "extra_forbidden":
+        *parents, key = problem["loc"]
+        allowed = sorted(_keys_at(tuple(parents)))
+        return InputError(f"unknown key; {nearest(str(key), allowed)}", where)
+    if kind == "missing":
+        return InputError("is missing", where)
+    if kind == "value_error":
+        return InputError(str(problem["ctx"]["error"]), where)
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        laws = sorted(_law_names(str(problem["loc"][0])))
+        came = problem["ctx"].get("tag") if kind == "union_tag_invalid" else None
+        if came is None:
+            return InputError(f"law is missing; allowed: {', '.join(laws)}", where)
+        return InputError(f"no law {came!r}; {nearest(came, laws)}", f"{where}.law")
+    if kind == "literal_error":
+        allowed = problem["ctx"]["expected"].replace(" or ", ", ").replace("'", "").split(", ")
+        return InputError(
+            f"got {problem['input']!r}; {nearest(str(problem['input']), allowed)}", where
+        )
+    return InputError(f"got {problem['input']!r}; {problem['msg']}", where)
+
+
+def _law_names(table: str) -> list[str]:
+    union = get_args(_LAWS[table])[0]
+    return [get_args(c.model_fields["law"].annotation)[0] for c in get_args(union)]
+
+
+def _path(loc: tuple[str | int, ...], tree: Tree) -> str:
+    """Dotted path as a user writes it: sections by name, no union tags."""
+    words: list[str] = []
+    here: Any = tree
+    for step in loc:
+        if isinstance(step, int):
+            here = here[step] if isinstance(here, list) and step < len(here) else None
+            name = here.get("name") if isinstance(here, dict) else None
+            words.append(str(name) if name else str(step + 1))
+        elif isinstance(here, dict) and here.get("law") == step and step not in here:
+            continue
+        else:
+            here = here.get(step) if isinstance(here, dict) else None
+            words.append(step)
+    return ".".join(words)
+
+
+def _keys_at(loc: tuple[str | int, ...]) -> list[str]:
+    """Keys that the table at `loc` may hold."""
+    model: Any = DesignTables
+    for step in loc:
+        if isinstance(step, int):
+            continue
+        if step in model.model_fields:
+            model = model.model_fields[step].annotation
+        model = _table_class(model, step)
+    return [f.alias or key for key, f in model.model_fields.items()]
+
+
+def _table_class(annotation: Any, step: str) -> Any:
+    """The table class inside an annotation: itself, an item of a tuple, or the law `step`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    classes = [a for a in get_args(annotation) if a is not Ellipsis and a is not type(None)]
+    for cls in classes:
+        law = getattr(cls, "model_fields", {}).get("law")
+        if law is not None and step in get_args(law.annotation):
+            return cls
+    if len(classes) == 1:
+        return _table_class(classes[0], step)
+    tuples = [c for c in classes if get_args(c)]
+    return _table_class(tuples[0], step) if tuples else annotation

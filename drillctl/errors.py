@@ -1,0 +1,60 @@
+"""Exceptions. Each derives from the builtin that a caller would expect.
+
+- `InputError`: something the user wrote cannot be used; exit code 2.
+- `SimulationError`: a computation could not be carried out; exit code 1.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class DrillctlError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class InputError(DrillctlError, ValueError):
+    """A design, a path or an option that cannot be used.
+
+    Parameters
+    ----------
+    problem : str
+        What came, and what is allowed.
+    where : str, optional
+        File, key or option the problem stands in, e.g. `rig.toml: bha.inertia`.
+    """
+
+    def __init__(self, problem: str, where: str = "") -> None:
+        self.problem = problem
+        self.where = where
+        super().__init__(f"{where}: {problem}" if where else problem)
+
+    def within(self, place: str) -> InputError:
+        """The same error, told with the file or key around it."""
+        return InputError(self.problem, f"{place}: {self.where}" if self.where else place)
+
+
+class SimulationError(DrillctlError, RuntimeError):
+    """A solver could not finish what was asked of it."""
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """Return a hint that names the valid word closest to `name`, then all of them.
+
+    Parameters
+    ----------
+    name : str
+        The word that was not understood.
+    valid : iterable of str
+        The words that would have been.
+
+    Returns
+    -------
+    str
+        For instance `did you mean 'inertia'? allowed: damping, inertia`.
+    """
+    words = sorted(valid)
+    close = difflib.get_close_matches(name, words, n=1, cutoff=0.5)
+    hint = f"did you mean '{close[0]}'? " if close else ""
+    return f"{hint}allowed: {', '.join(words)}"

@@ -1,0 +1,16 @@
+"""Top-drive laws: torque of the drive from what it sees of the string.
+
+A law is a `NamedTuple` of numbers with two pure functions, in the frame that turns at the
+set speed: `angle` (rad) and `speed` (rad/s) of the top drive are measured in that frame, so
+that both are zero in steady drilling.
+
+- `torque(angle, speed)`: torque (N m) on the top-drive inertia; the reference solver's form.
+- `mean_torque(angle, step)`: mean torque over a step that starts at `angle`, as the pair
+  (offset, slope) of `offset - slope * angle_at_the_end`; the batch engine's form.
+"""
+
+from drillctl.top_drive.constant_torque import ConstantTorque
+from drillctl.top_drive.pi import PI
+from drillctl.top_drive.protocol import TopDriveLaw
+
+__all__ = ["PI", "ConstantTorque", "TopDriveLaw"]

@@ -1,0 +1,44 @@
+"""Proportional-integral speed control of the top drive."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+
+class PI(NamedTuple):
+    r"""Proportional-integral control of the top-drive speed.
+
+    .. math:: T_m = K_p (\Omega - \omega_m) + K_i \int_0^t (\Omega - \omega_m)\, dt
+                  = -K_p \dot\varphi_m - K_i \varphi_m
+
+    Equation 2 of Monteiro & Trindade (2012), with :math:`\varphi_m` the angle in the frame
+    that turns at the set speed :math:`\Omega`.
+
+    Attributes
+    ----------
+    kp : float
+        Proportional gain (N m s/rad).
+    ki : float
+        Integral gain (N m/rad).
+    """
+
+    kp: Any
+    ki: Any
+
+    def torque(self, angle: Any, speed: Any) -> Any:
+        """Torque on the drive (N m) at `angle` (rad) and `speed` (rad/s) in the frame."""
+        return -self.kp * speed - self.ki * angle
+
+    def mean_torque(self, angle: Any, step: Any) -> tuple[Any, Any]:
+        """Offset (N m) and slope (N m/rad) of the mean torque over a step (s) from `angle`.
+
+        The mean speed over a step is the change of angle over its length, exactly, so that
+        the discrete controller can only take from the string what it takes on paper.
+        """
+        proportional = self.kp / step
+        half_integral = 0.5 * self.ki
+        return (proportional - half_integral) * angle, proportional + half_integral
+
+    def gains(self) -> tuple[Any, Any]:
+        """Proportional (N m s/rad) and integral (N m/rad) gain."""
+        return self.kp, self.ki

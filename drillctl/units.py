@@ -1,0 +1,191 @@
+"""Quantities at the edge: text with a unit in, SI numbers out, and back.
+
+Inside the package every number is SI (m, kg, s, N, rad). Text such as `"140 kN"` or
+`"4 1/2 in"` is read here and nowhere else, and written here again, so that what is written
+reads back to the same bits.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from drillctl.errors import InputError
+
+RPM = math.pi / 30.0
+"""One revolution a minute (rad/s)."""
+
+
+class SI(float):
+    """A number that is already in SI units and needs no reading."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a quantity measures.
+
+    Attributes
+    ----------
+    name : str
+        The word used in messages.
+    si : str
+        SI unit in which values are held.
+    examples : tuple of str
+        Units in which a value is written for people, the preferred one first.
+    """
+
+    name: str
+    si: str
+    examples: tuple[str, ...]
+
+
+SPEED = Kind("speed", "rad/s", ("rpm", "rev/min", "rad/s", "deg/s"))
+FORCE = Kind("force", "N", ("kN", "N", "klbf", "tf"))
+TORQUE = Kind("torque", "N*m", ("kN*m", "N*m", "klbf*ft"))
+LENGTH = Kind("length", "m", ("m", "ft"))
+DIAMETER = Kind("length", "m", ("mm", "in", "m"))
+TIME = Kind("time", "s", ("s", "ms", "min"))
+RATE = Kind("rate", "1/s", ("1/s",))
+INERTIA = Kind("inertia", "kg*m^2", ("kg*m^2",))
+DENSITY = Kind("density", "kg/m^3", ("kg/m^3",))
+MODULUS = Kind("modulus", "Pa", ("GPa", "Pa", "psi"))
+POLAR_MOMENT = Kind("polar moment of area", "m^4", ("m^4", "in^4"))
+STIFFNESS = Kind("torsional stiffness", "N*m/rad", ("N*m/rad",))
+DAMPING = Kind("torsional damping", "N*m*s/rad", ("N*m*s/rad",))
+DRAG = Kind("drag per length", "N*s/rad", ("N*s/rad",))
+SLOWNESS = Kind("time per angle", "s/rad", ("s/rad",))
+PROPORTIONAL_GAIN = Kind("gain", "N*m*s/rad", ("N*m*s/rad",))
+INTEGRAL_GAIN = Kind("gain", "N*m/rad", ("N*m/rad",))
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_TEXT = re.compile(
+    r"^\s*(?:(?:(?P<whole>[-+]?\d+)[\s-]+)?(?P<over>\d+)\s*/\s*(?P<under>\d+)"
+    rf"|(?P<number>{_NUMBER}))\s*(?P<unit>.*?)\s*$"
+)
+_POWER = re.compile(r"\b((?:[kcmd]?m)|in|ft|s)([234])\b")
+
+
+@functools.cache
+def registry() -> Any:
+    """The pint registry, made on first use since importing pint is slow."""
+    import pint
+
+    units = pint.UnitRegistry(cache_folder=":auto:")
+    units.define("rev = revolution")
+    units.define("klbf = 1000 * force_pound")
+    units.define("tf = 1000 * kilogram * standard_gravity")
+    return units
+
+
+@functools.lru_cache(maxsize=512)
+def _factor(unit: str, kind: Kind) -> float:
+    """SI value of one `unit`, refused with the reason if it does not measure `kind`."""
+    import pint
+
+    if kind is SPEED and unit not in SPEED.examples:
+        raise InputError(f"a speed is given in {_join(SPEED.examples)}, not in {unit!r}")
+    units = registry()
+    try:
+        measure = units.Quantity(1.0, _POWER.sub(r"\1^\2", unit))
+        return float(measure.to(kind.si).magnitude)
+    except pint.DimensionalityError as error:
+        raise InputError(
+            f"{unit!r} is not a unit of {kind.name}; use {_join(kind.examples)}"
+        ) from error
+    except Exception as error:  # pint raises many types on text that is no unit
+        raise InputError(f"{unit!r} is not a known unit; use {_join(kind.examples)}") from error
+
+
+def _join(words: tuple[str, ...]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
+
+
+def parse(value: object, kind: Kind) -> float:
+    """Read a quantity.
+
+    Parameters
+    ----------
+    value : str or SI or float
+        Text with a unit (`"140 kN"`, `"4 1/2 in"`), or an `SI` number. A bare number is
+        taken for gains alone.
+    kind : Kind
+        What it must measure.
+
+    Returns
+    -------
+    float
+        The value in `kind.si`.
+
+    Raises
+    ------
+    InputError
+        No unit, a wrong or unknown unit, or not a number; the message suggests a form.
+    """
+    if isinstance(value, SI):
+        return float(value)
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise InputError(f'{value!r} is not a {kind.name}; write it like "100 {kind.examples[0]}"')
+    if not isinstance(value, str):
+        return _bare(float(value), kind)
+    found = _TEXT.match(value)
+    if found is None:
+        raise InputError(f'{value!r} is not a {kind.name}; write it like "100 {kind.examples[0]}"')
+    number = _magnitude(found, value)
+    if not found["unit"]:
+        return _bare(number, kind)
+    try:
+        return number * _factor(found["unit"], kind)
+    except InputError as error:
+        raise InputError(f"{value!r}: {error.problem}") from None
+
+
+def _magnitude(found: re.Match[str], value: str) -> float:
+    """The number in front of the unit; `4 1/2` is four and a half."""
+    if found["number"] is not None:
+        return float(found["number"])
+    if int(found["under"]) == 0:
+        raise InputError(f"{value!r} divides by zero")
+    part = int(found["over"]) / int(found["under"])
+    whole = found["whole"]
+    if whole is None:
+        return part
+    return math.copysign(abs(int(whole)) + part, -1.0 if whole.startswith("-") else 1.0)
+
+
+def _bare(number: float, kind: Kind) -> float:
+    if kind.name == "gain":
+        return number
+    raise InputError(f'{number:g} has no unit; did you mean "{number:g} {kind.examples[0]}"?')
+
+
+def write(value: float, kind: Kind) -> str:
+    """Write a quantity so that `parse` gives back the same bits.
+
+    Parameters
+    ----------
+    value : float
+        In `kind.si`.
+    kind : Kind
+        What it measures.
+
+    Returns
+    -------
+    str
+        In the first of the kind's units that is short and exact, else in SI, in full.
+    """
+    for unit in kind.examples:
+        for digits in (6, 10, 15):
+            text = f"{value / _factor(unit, kind):.{digits}g} {unit}"
+            if parse(text, kind) == value:
+                return text
+    return f"{value!r} {kind.si}"
+
+
+def to_unit(value: Any, unit: str) -> Any:
+    """Convert an SI number or array to `unit`; an angle is a plain number of radians."""
+    units = registry()
+    measure = units.Quantity(1.0, unit)
+    return value / float(measure.to_base_units().magnitude)
