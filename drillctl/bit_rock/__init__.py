@@ -6,6 +6,8 @@ reference solver calls them with floats, numba compiles them into the kernels, a
 calls them with symbols; hence the exponential comes in as an argument.
 
 - `static_torque(weight)`: largest torque (N m) of a bit at rest.
+- `kinetic_torque_at_rest(weight)`: torque (N m) of a bit that turns ever slower.
+- `steepest_fall(weight)`: largest falling slope (N m s/rad), which limits the batch step.
 - `torque_and_slope(weight, speed, exp)`: torque (N m) of a bit turning at `speed` (rad/s, not
   negative) and its derivative (N m s/rad). For a bit turning backwards the torque changes
   sign. A set-valued law takes, at zero speed, any value between minus and plus the static

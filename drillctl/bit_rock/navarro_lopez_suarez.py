@@ -38,6 +38,14 @@ class NavarroLopezSuarez(NamedTuple):
         """Largest torque of a bit at rest (N m), `a2 W`."""
         return self.a2 * weight
 
+    def kinetic_torque_at_rest(self, weight: Any) -> Any:
+        """Torque of a bit that just turns (N m): the static torque, this law has no peak."""
+        return self.a2 * weight
+
+    def steepest_fall(self, weight: Any) -> Any:
+        """Largest falling slope (N m s/rad), at zero speed: `beta (a2 - a1) W`."""
+        return self.beta * (self.a2 - self.a1) * weight
+
     def torque_and_slope(self, weight: Any, speed: Any, exp: Exp) -> tuple[Any, Any]:
         """Torque (N m) and slope (N m s/rad) at `speed` >= 0 (rad/s) under `weight` (N)."""
         falling = (self.a2 - self.a1) * weight * exp(-self.beta * speed)

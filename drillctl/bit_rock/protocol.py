@@ -19,6 +19,14 @@ class BitRockLaw(Protocol):
         """Largest torque on a bit at rest (N m) under `weight` (N)."""
         ...
 
+    def kinetic_torque_at_rest(self, weight: float) -> float:
+        """Torque (N m) in the limit of a bit that turns ever slower under `weight` (N)."""
+        ...
+
+    def steepest_fall(self, weight: float) -> float:
+        """Largest value of minus the slope at any speed (N m s/rad) under `weight` (N)."""
+        ...
+
     def torque_and_slope(self, weight: float, speed: float, exp: Exp) -> tuple[float, float]:
         """Torque (N m) at `speed` >= 0 (rad/s) under `weight` (N), and its slope (N m s/rad)."""
         ...

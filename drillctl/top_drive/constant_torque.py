@@ -20,8 +20,8 @@ class ConstantTorque(NamedTuple):
         """Torque on the drive (N m); the same at any `angle` (rad) and `speed` (rad/s)."""
         return self.level
 
-    def mean_torque(self, angle: Any, step: Any) -> tuple[Any, Any]:
-        """Offset (N m) and slope (N m/rad) of the mean torque over a step (s)."""
+    def mean_torque(self, angle: Any, rate: Any) -> tuple[Any, Any]:
+        """Offset (N m) and slope (N m/rad) of the mean torque over a step; `rate` = 1 / step (1/s)."""
         return self.level, 0.0
 
     def gains(self) -> tuple[Any, Any]:

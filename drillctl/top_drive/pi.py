@@ -29,13 +29,13 @@ class PI(NamedTuple):
         """Torque on the drive (N m) at `angle` (rad) and `speed` (rad/s) in the frame."""
         return -self.kp * speed - self.ki * angle
 
-    def mean_torque(self, angle: Any, step: Any) -> tuple[Any, Any]:
-        """Offset (N m) and slope (N m/rad) of the mean torque over a step (s) from `angle`.
+    def mean_torque(self, angle: Any, rate: Any) -> tuple[Any, Any]:
+        """Offset (N m) and slope (N m/rad) of the mean torque over a step from `angle`; `rate` = 1 / step (1/s).
 
         The mean speed over a step is the change of angle over its length, exactly, so that
         the discrete controller can only take from the string what it takes on paper.
         """
-        proportional = self.kp / step
+        proportional = self.kp * rate
         half_integral = 0.5 * self.ki
         return (proportional - half_integral) * angle, proportional + half_integral
 

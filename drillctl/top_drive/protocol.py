@@ -12,8 +12,8 @@ class TopDriveLaw(Protocol):
         """Torque on the drive (N m) at `angle` (rad) and `speed` (rad/s)."""
         ...
 
-    def mean_torque(self, angle: float, step: float) -> tuple[float, float]:
-        """Offset (N m) and slope (N m/rad) of the mean torque over a step (s) from `angle`."""
+    def mean_torque(self, angle: float, rate: float) -> tuple[float, float]:
+        """Offset (N m) and slope (N m/rad) of the mean torque over a step from `angle`; `rate` = 1 / step (1/s)."""
         ...
 
     def gains(self) -> tuple[float, float]:

@@ -1,0 +1,256 @@
+"""The string as a state-space system, alone and with its top-drive controller.
+
+The states are the twists of the elements and the speeds of the nodes. The angle of the string
+as a whole is left out: no torque depends on it, and as a state it would be an undamped
+integrator in every norm and margin.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from drillctl.drillstring import Drillstring
+
+if TYPE_CHECKING:
+    import control
+
+    from drillctl.design import Design
+
+Array = NDArray[np.float64]
+
+INPUTS = ("top_torque", "bit_torque")
+"""Inputs of the plant (N m); positive bit torque brakes."""
+OUTPUTS = ("top_speed", "bit_speed", "pipe_torque", "twist")
+"""Outputs of the plant (rad/s, rad/s, N m, rad)."""
+LOOP_OUTPUTS = (*OUTPUTS, "top_torque")
+"""Outputs of a loop: those of the plant and the torque of the drive (N m)."""
+
+
+class StateMatrices(NamedTuple):
+    """x' = A x + B u, y = C x + D u.
+
+    Attributes
+    ----------
+    a : ndarray, shape (states, states)
+        State matrix; entries in the units of their states and inputs, SI.
+    b : ndarray, shape (states, inputs)
+        Input matrix.
+    c : ndarray, shape (outputs, states)
+        Output matrix.
+    d : ndarray, shape (outputs, inputs)
+        Feedthrough.
+    """
+
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+
+
+def plant_matrices(string: Drillstring) -> StateMatrices:
+    """State matrices of the string without control.
+
+    With B the signed incidence of nodes and elements (1 above, -1 below) and k the element
+    stiffnesses, the stiffness matrix is B k B^T, so that M u'' + C u' + K u = F reads
+    `twist' = B^T speed`, `M speed' = F - B k twist - C speed`.
+
+    Parameters
+    ----------
+    string : Drillstring
+        The assembled string.
+
+    Returns
+    -------
+    StateMatrices
+        States: twists (rad, angle above minus angle below), then node speeds (rad/s). Inputs
+        and outputs as in `INPUTS` and `OUTPUTS`.
+    """
+    nodes, elements = string.nodes, string.nodes - 1
+    incidence = np.eye(nodes, elements) - np.eye(nodes, elements, k=-1)
+    forces = np.zeros((nodes, 2))
+    forces[0, 0] = 1.0
+    forces[-1, 1] = -1.0
+    torques = np.hstack([-incidence * string.element_stiffness, -string.damping.toarray(), forces])
+    accelerations = scipy.linalg.solve(string.mass.toarray(), torques, assume_a="pos")
+
+    a = np.zeros((elements + nodes, elements + nodes))
+    a[:elements, elements:] = incidence.T
+    a[elements:] = accelerations[:, :-2]
+    b = np.zeros((elements + nodes, 2))
+    b[elements:] = accelerations[:, -2:]
+    return StateMatrices(a, b, _plant_outputs(string), np.zeros((len(OUTPUTS), 2)))
+
+
+def _plant_outputs(string: Drillstring) -> Array:
+    elements = string.nodes - 1
+    c = np.zeros((len(OUTPUTS), elements + string.nodes))
+    c[0, elements] = 1.0
+    c[1, -1] = 1.0
+    c[2, 0] = string.element_stiffness[0]
+    c[2, elements] = string.element_damping[0]
+    c[2, elements + 1] = -string.element_damping[0]
+    c[3, :elements] = 1.0
+    return c
+
+
+def open_loop_matrices(string: Drillstring, kp: float, ki: float) -> StateMatrices:
+    """State matrices from speed error through controller and string, the loop left open.
+
+    Parameters
+    ----------
+    string : Drillstring
+        The assembled string.
+    kp, ki : float
+        Gains of the drive (N m s/rad, N m/rad).
+
+    Returns
+    -------
+    StateMatrices
+        Inputs: speed error (rad/s) and bit torque (N m). Outputs as in `LOOP_OUTPUTS`. The
+        integral of the error (rad) is the last state where `ki` is not zero; without integral
+        action nothing depends on it, and it is left out.
+    """
+    a, b, c, d = plant_matrices(string)
+    from_error = np.column_stack([kp * b[:, 0], b[:, 1]])
+    c = np.vstack([c, np.zeros(len(a))])
+    d = np.vstack([d, [kp, 0.0]])
+    if ki == 0.0:
+        return StateMatrices(a, from_error, c, d)
+    states = len(a)
+    a = np.pad(a, (0, 1))
+    a[:states, -1] = ki * b[:, 0]
+    c = np.pad(c, ((0, 0), (0, 1)))
+    c[-1, -1] = ki
+    return StateMatrices(a, np.vstack([from_error, [1.0, 0.0]]), c, d)
+
+
+def closed_loop_matrices(string: Drillstring, kp: float, ki: float) -> StateMatrices:
+    """State matrices of the string closed with speed control of the top drive.
+
+    Parameters
+    ----------
+    string : Drillstring
+        The assembled string.
+    kp, ki : float
+        Gains of the drive (N m s/rad, N m/rad).
+
+    Returns
+    -------
+    StateMatrices
+        States and outputs of `open_loop_matrices`. Inputs: set speed (rad/s) and bit torque
+        (N m). The slope of the bit-rock law is not in it; for a torque that falls by D
+        (N m s/rad) add `-D b[:, 1:] @ c[1:2]` to `a`.
+    """
+    a, b, c, d = open_loop_matrices(string, kp, ki)
+    top_speed = c[0]
+    error = b[:, 0]
+    return StateMatrices(a - np.outer(error, top_speed), b, c - np.outer(d[:, 0], top_speed), d)
+
+
+def plant(string: Drillstring) -> control.StateSpace:
+    """The string without control, as a system with named signals.
+
+    Parameters
+    ----------
+    string : Drillstring
+        The assembled string.
+
+    Returns
+    -------
+    control.StateSpace
+        `drillstring`. Inputs `top_torque`, `bit_torque` (N m; positive bit torque brakes).
+        Outputs `top_speed`, `bit_speed` (rad/s), `pipe_torque` (N m, carried by stiffness and
+        damper of the first element, positive when the top leads), `twist` (rad, top minus
+        bit). States `twist_1`... (rad) and `speed_0`... (rad/s).
+    """
+    return _named(
+        plant_matrices(string), "drillstring", INPUTS, OUTPUTS, _string_states(string.nodes)
+    )
+
+
+def open_loop(design: Design) -> control.StateSpace:
+    """The loop cut at the speed error: controller and string in series.
+
+    Parameters
+    ----------
+    design : Design
+        The rig; its top-drive law gives the gains.
+
+    Returns
+    -------
+    control.StateSpace
+        `open_loop`. Inputs `speed_error` (rad/s) and `bit_torque` (N m), outputs those of the
+        plant and `top_torque` (N m). From `speed_error` to `top_speed` it is the loop transfer
+        under negative feedback. States of the plant and, with integral action, `integral`
+        (rad, of the speed error).
+    """
+    kp, ki = design.top_drive.gains()
+    inputs = ("speed_error", "bit_torque")
+    return _named(
+        open_loop_matrices(design.string, kp, ki),
+        "open_loop",
+        inputs,
+        LOOP_OUTPUTS,
+        _loop_states(design.string.nodes, ki),
+    )
+
+
+def closed_loop(design: Design) -> control.StateSpace:
+    """The string closed with its top-drive law, the bit torque left as an input.
+
+    The torque is kp (set_speed - top_speed) + ki integral, Eq. 2 of Monteiro & Trindade
+    (2012). Speeds are absolute; under a constant-torque law, whose level is left out, every
+    signal is the change from steady drilling and `set_speed` acts on nothing.
+
+    Parameters
+    ----------
+    design : Design
+        The rig; its top-drive law gives the gains.
+
+    Returns
+    -------
+    control.StateSpace
+        `closed_loop`. Inputs `set_speed` (rad/s) and `bit_torque` (N m), outputs those of the
+        plant and `top_torque` (N m). States of the plant and, with integral action, `integral`
+        (rad, of the speed error).
+    """
+    kp, ki = design.top_drive.gains()
+    inputs = ("set_speed", "bit_torque")
+    return _named(
+        closed_loop_matrices(design.string, kp, ki),
+        "closed_loop",
+        inputs,
+        LOOP_OUTPUTS,
+        _loop_states(design.string.nodes, ki),
+    )
+
+
+def _string_states(nodes: int) -> list[str]:
+    twists = [f"twist_{i}" for i in range(1, nodes)]
+    return [*twists, *(f"speed_{i}" for i in range(nodes))]
+
+
+def _loop_states(nodes: int, ki: float) -> list[str]:
+    return [*_string_states(nodes), *(["integral"] if ki != 0.0 else [])]
+
+
+def _named(
+    matrices: StateMatrices,
+    name: str,
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    states: list[str],
+) -> control.StateSpace:
+    import control
+
+    return control.StateSpace(
+        *matrices,
+        name=name,
+        inputs=list(inputs),
+        outputs=list(outputs),
+        states=states,
+    )

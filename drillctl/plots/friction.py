@@ -1,0 +1,92 @@
+"""Bit torque against bit speed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from drillctl.bit_rock import BitRockLaw
+from drillctl.design import Design
+from drillctl.plots import style
+from drillctl.units import RPM, SI
+
+BACKWARD = -20.0
+"""Slowest speed drawn (rpm): enough to show that the torque changes sign."""
+FORWARD = 250.0
+"""Highest speed drawn (rpm), unless the rig is set to turn faster."""
+WEIGHT = "operating_point.weight_on_bit"
+
+Array = NDArray[np.float64]
+
+
+def friction_curves(design: Design, ax: Axes | None = None) -> Figure:
+    """Draw the torque on the bit against its speed, for each weight on bit of the table.
+
+    Parameters
+    ----------
+    design : Design
+        The rig.
+    ax : Axes, optional
+        Axes to draw on.
+
+    Returns
+    -------
+    Figure
+        One curve for each row of the friction table, and for the operating weight on bit if
+        it is not a row. At rest the torque takes any value on the vertical segment. A dot
+        marks the operating point.
+    """
+    figure, ax = style.axes_or_new(ax)
+    weight = design.tables.operating_point.weight_on_bit
+    last = max(FORWARD, 1.2 * design.speed / RPM)
+    for number, each in enumerate(_weights(design)):
+        law = design.replace({WEIGHT: SI(each)}).bit_rock
+        ax.plot(
+            *_curve(law, each, last),
+            color=style.COLOURS[number % len(style.COLOURS)],
+            linestyle="-" if each == weight else "--",
+            linewidth=style.LINE,
+            label=f"{each / 1e3:.4g} kN",
+        )
+    torque, _ = design.bit_rock.torque_and_slope(weight, design.speed, math.exp)
+    ax.plot(
+        design.speed / RPM,
+        torque / 1e3,
+        "o",
+        color=style.BLACK,
+        zorder=5,
+        label=f"operating point: {weight / 1e3:.4g} kN, {design.speed / RPM:.4g} rpm",
+    )
+    style.dress(ax, "bit speed (rpm)", "bit torque (kN m)", "Bit-rock friction")
+    for line in (ax.axhline, ax.axvline):
+        line(0.0, color="#888888", linewidth=0.8, zorder=1)
+    ax.set_xlim(BACKWARD, last)
+    ax.legend(fontsize=style.SMALL, frameon=False, loc="lower right")
+    return figure
+
+
+def _weights(design: Design) -> list[float]:
+    """Weights on bit (N) to draw, heaviest first, as the curves lie in the picture."""
+    rows = getattr(design.tables.bit_rock, "table", None) or ()
+    weights = {row.weight_on_bit for row in rows}
+    return sorted(weights | {design.tables.operating_point.weight_on_bit}, reverse=True)
+
+
+def _curve(law: BitRockLaw, weight: float, last: float) -> tuple[Array, Array]:
+    """Speed (rpm) and torque (kN m) from `BACKWARD` to `last` (rpm), through rest."""
+    forward = np.linspace(0.0, last, 400)
+    backward = np.linspace(-BACKWARD, 0.0, 100)
+    ahead = _torques(law, weight, forward * RPM)
+    behind = _torques(law, weight, backward * RPM)
+    static = law.static_torque(weight)
+    speed = np.concatenate([-backward, [0.0, 0.0], forward])
+    torque = np.concatenate([-behind, [-static, static], ahead])
+    return speed, torque / 1e3
+
+
+def _torques(law: BitRockLaw, weight: float, speeds: Array) -> Array:
+    return np.array([law.torque_and_slope(weight, speed, math.exp)[0] for speed in speeds])

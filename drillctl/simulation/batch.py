@@ -1,0 +1,234 @@
+"""The batch engine: thousands of lanes at a fixed step, set-valued friction, no events.
+
+`run_batch` prepares the string once, feeds blocks of lanes to the compiled kernels and turns
+what they measured into arrays by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design.tables import SimulationTable
+from drillctl.simulation import measures as m
+from drillctl.simulation.lanes import Lanes
+from drillctl.simulation.propagator import StringStep, string_step
+from drillctl.simulation.scheme import Scheme, bit_inertia, choose_scheme
+from drillctl.simulation.start import start
+
+Array = NDArray[np.float64]
+
+CHUNK = 4096
+"""Lanes given to the kernels at a time: half a second's work, so that progress and an
+interruption are felt."""
+
+FLOATS = (
+    "j1", "j1_rate", "stuck_time", "sticks", "stick_slip_index", "mean_bit_speed",
+    "min_bit_speed", "peak_bit_speed", "peak_pipe_torque", "peak_top_torque", "settling_time",
+    "settling_time_wide", "mean_weight_on_bit", "rop_proxy", "work_at_bit", "work_per_turn",
+    "time_outside_table",
+)  # fmt: skip
+"""Measures that a batch returns, those of `Measures`; NaN where that one has None."""
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """What was measured of a number of lanes.
+
+    Attributes
+    ----------
+    measures : dict of ndarray, shape (lanes,)
+        By the names of `FLOATS`; NaN where a measure is undefined.
+    status : ndarray of int8, shape (lanes,)
+        Index into `measures.STATUSES`.
+    """
+
+    measures: dict[str, Array]
+    status: NDArray[np.int8]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A string and a scheme, ready for any number of lanes.
+
+    Attributes
+    ----------
+    stepper : StringStep
+        The string's exact step.
+    scheme : Scheme
+        Step and modes.
+    table : SimulationTable
+        Duration and J1 window.
+    """
+
+    stepper: StringStep
+    scheme: Scheme
+    table: SimulationTable
+
+
+def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
+    """Choose step and modes and prepare the string.
+
+    Raises
+    ------
+    InputError
+        A given step is too long for the friction law.
+    """
+    inertia = bit_inertia(lanes.string)
+    scheme = choose_scheme(lanes.string, table, lanes.steepest_fall, inertia)
+    return Prepared(string_step(lanes.string, scheme.step, scheme.modes), scheme, table)
+
+
+def run_batch(lanes: Lanes, prepared: Prepared) -> Batch:
+    """Simulate every lane.
+
+    Parameters
+    ----------
+    lanes : Lanes
+        On the string that was prepared.
+    prepared : Prepared
+        From `prepare`.
+
+    Returns
+    -------
+    Batch
+        The same bits for any order of lanes and any number of threads.
+    """
+    raw = [_run(part, prepared, 0)[0] for part in _chunks(lanes)]
+    return _measured(np.concatenate(raw, axis=1), lanes, prepared)
+
+
+def trace(lanes: Lanes, prepared: Prepared, interval: float) -> tuple[Array, dict[str, Array]]:
+    """Signals of every lane at equal intervals.
+
+    Parameters
+    ----------
+    lanes : Lanes
+        On the string that was prepared.
+    prepared : Prepared
+        From `prepare`.
+    interval : float
+        Sampling interval (s); rounded to a whole number of steps.
+
+    Returns
+    -------
+    time : ndarray, shape (samples,)
+        Sampling times (s).
+    signals : dict of ndarray, shape (samples, lanes)
+        By the names of `kernels.advance.TRACED`.
+    """
+    from drillctl.simulation.kernels.advance import TRACED
+
+    every = max(1, round(interval / prepared.scheme.step))
+    parts = [_run(part, prepared, every)[1] for part in _chunks(lanes)]
+    traces = np.concatenate(parts, axis=1)
+    time = np.arange(len(traces)) * every * prepared.scheme.step
+    return time, {name: traces[:, :, i] for i, name in enumerate(TRACED)}
+
+
+def _chunks(lanes: Lanes) -> Iterator[Lanes]:
+    for first in range(0, len(lanes), CHUNK):
+        yield lanes[first : first + CHUNK]
+
+
+def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
+    """Raw measures, shape (MEASURES, lanes), and traces, shape (samples, lanes, signals)."""
+    from drillctl.simulation.kernels.advance import TRACED, Clock, run
+    from drillctl.simulation.kernels.rows import MEASURES, WIDTH
+
+    count = len(lanes)
+    # Every block is full: the last one is filled up with copies of the last lane.
+    padded = lanes[np.minimum(np.arange(-(-count // WIDTH) * WIDTH), count - 1)]
+    static = padded.friction.static_torque(padded.weight.weight(0.0))
+    angle, speed = start(
+        padded.string, padded.start, padded.set_speed, padded.turning_speed, static
+    )
+    state = prepared.stepper.state(angle, speed, padded.set_speed)
+    scheme, table = prepared.scheme, prepared.table
+    samples = scheme.steps // every + 1 if every else 0
+    measures = np.empty((MEASURES, len(padded)))
+    traces = np.empty((samples, len(padded), len(TRACED)))
+    window = min(m.WINDOW, table.duration)
+    ticks = Clock(scheme.step, scheme.steps, table.j1_from, table.duration - window, every)
+    speeds = np.stack([padded.set_speed, speed[-1] + padded.set_speed])
+    run(
+        prepared.stepper.string, padded.friction, padded.drive, padded.weight,
+        speeds, np.ascontiguousarray(state), ticks, measures, traces,
+    )  # fmt: skip
+    return measures[:, :count], traces[:, :count]
+
+
+def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
+    """Measures by name, and a status, from the kernel's rows."""
+    from drillctl.simulation.kernels import rows as r
+
+    def row(name: int) -> Array:
+        return raw[(name - r.FIRST_MEASURE) // r.WIDTH]
+
+    table = prepared.table
+    duration = table.duration
+    window = min(m.WINDOW, duration)
+    with np.errstate(all="ignore"):  # undefined measures become NaN and are told as such
+        j1 = row(r.J1) / lanes.set_speed
+        late_mean = row(r.LATE_ANGLE) / window
+        index = (row(r.LATE_HIGH) - row(r.LATE_LOW)) / (2.0 * late_mean)
+        turned = np.abs(row(r.BIT_ANGLE)) / (2.0 * np.pi)
+        nominal = lanes.nominal_weight * lanes.set_speed * duration
+        values = {
+            "j1": j1,
+            "j1_rate": j1 / (duration - table.j1_from),
+            "stuck_time": row(r.STUCK_TIME),
+            "sticks": row(r.STICKS),
+            "stick_slip_index": _where((row(r.LATE_HIGH) > 0.0) & (late_mean > 0.0), index),
+            "mean_bit_speed": row(r.BIT_ANGLE) / duration,
+            "min_bit_speed": row(r.LOW),
+            "peak_bit_speed": row(r.HIGH),
+            "peak_pipe_torque": row(r.PEAK_PIPE),
+            "peak_top_torque": row(r.PEAK_TOP),
+            "settling_time": _settled(row(r.OUTSIDE_NARROW), duration),
+            "settling_time_wide": _settled(row(r.OUTSIDE_WIDE), duration),
+            "mean_weight_on_bit": row(r.WEIGHT_SUM) / duration,
+            "rop_proxy": row(r.ROP_SUM) / nominal,
+            "work_at_bit": row(r.WORK),
+            "work_per_turn": _where(turned > 1e-3, row(r.WORK) / turned),
+            "time_outside_table": np.zeros(len(lanes)),
+        }
+    finite = np.isfinite(raw).all(axis=0)
+    status = _statuses(finite, row(r.LATE_STUCK), window, values["settling_time_wide"])
+    for name in FLOATS:  # a lane that failed has no measures at all
+        values[name] = _where(finite, values[name])
+    return Batch(values, status)
+
+
+def _where(condition: NDArray[np.bool_], values: Array) -> Array:
+    return np.where(condition, values, np.nan)
+
+
+def _settled(last_outside: Array, duration: float) -> Array:
+    return _where(last_outside <= duration - min(m.SETTLED_FOR, duration), last_outside)
+
+
+def _statuses(
+    finite: NDArray[np.bool_], late_stuck: Array, window: float, settled: Array
+) -> NDArray[np.int8]:
+    """The rules of `measures.status_of`, for all lanes."""
+    code = {name: np.int8(i) for i, name in enumerate(m.STATUSES)}
+    status = np.where(np.isnan(settled), code["not_settled"], code["ok"])
+    status = np.where(late_stuck > 0.0, code["sticking"], status)
+    status = np.where(late_stuck >= window * (1.0 - 1e-9), code["stalled"], status)
+    return np.where(finite, status, code["failed"]).astype(np.int8)
+
+
+def measures_of(batch: Batch, lane: int) -> m.Measures:
+    """The measures of one lane; None where undefined."""
+    values: dict[str, Any] = {}
+    for name in FLOATS:
+        value = float(batch.measures[name][lane])
+        values[name] = None if np.isnan(value) else value
+    if values["sticks"] is not None:
+        values["sticks"] = int(values["sticks"])
+    return m.Measures(**values)

@@ -1,0 +1,11 @@
+"""Compiled loops of the batch engine; nothing here knows of designs, units or files.
+
+- `exponential.py`: an exponential that the compiler can run on many lanes at once.
+- `laws.py`: lets the laws of `bit_rock`, `top_drive` and `weight_on_bit` be called by type.
+- `rows.py`: what each row of a block's working array holds.
+- `string_step.py`: one exact step of the string, for a block of lanes.
+- `lane_step.py`: the scalar inclusion at the bit, and the measures, for a block of lanes.
+- `advance.py`: the loop over steps and blocks.
+
+Importing this package imports numba; compiled code is kept on disk.
+"""

@@ -1,0 +1,201 @@
+"""The loop over blocks of lanes and over steps."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+
+from drillctl.simulation.kernels import rows as r
+from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined
+from drillctl.simulation.kernels.lane_step import (
+    conclude,
+    decide,
+    eliminate,
+    solve_inclusion,
+    time_changes,
+)
+from drillctl.simulation.kernels.laws import at_lane, load_block, torque_and_slope, weight_at
+from drillctl.simulation.kernels.measure_step import (
+    begin_measures,
+    measure,
+    measure_crossings,
+    measure_pipe,
+    measure_window,
+)
+from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.string_step import complete_and_propagate, look
+
+TRACED = ("top_speed", "bit_speed", "top_angle", "bit_angle", "pipe_torque", "bit_torque", "stuck")
+"""Signals of a trace, in the order in which they leave the kernel."""
+
+
+class Clock(NamedTuple):
+    """Time of a run.
+
+    Attributes
+    ----------
+    step : float
+        Length of a step (s).
+    steps : int
+        Number of steps.
+    j1_from, window_from : float
+        Where the J1 window and the window at the end of the run begin (s).
+    every : int
+        Steps from one sample of a trace to the next; 0 for no traces.
+    """
+
+    step: float
+    steps: int
+    j1_from: float
+    window_from: float
+    every: int
+
+
+@inlined
+def _begin(friction: Any, weight: Any, work: Any) -> None:
+    """State of the laws at time zero."""
+    for lane in range(WIDTH):
+        speed = work[r.BIT_SPEED + lane]
+        load = weight_at(at_lane(weight, work, r.WEIGHT, lane), speed)
+        law = at_lane(friction, work, r.FRICTION, lane)
+        torque, _ = torque_and_slope(law, load, abs(speed))
+        direction = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
+        work[r.DIRECTION + lane] = direction
+        work[r.KINETIC + lane] = direction * torque
+        work[r.HOLDING + lane] = -1.0
+        work[r.ANGLE + lane] = 0.0
+        work[r.TOP_TORQUE + lane] = 0.0
+        work[r.BIT_TORQUE + lane] = 0.0
+
+
+@compiled
+def _look_around(string: Any, state: Any, work: Any, looks: Any) -> None:
+    for lane in range(WIDTH):
+        looks[0, lane], looks[1, lane] = look(string, state, work, lane)
+
+
+@compiled
+def _sample(string: Any, work: Any, looks: Any, traces: Any, sample: int, first: int) -> None:
+    """Store one sample of every lane; `looks` holds what was seen before the pass."""
+    for lane in range(WIDTH):
+        set_speed = work[r.SET_SPEED + lane]
+        stuck = work[r.DIRECTION + lane] == 0.0
+        held = work[r.BIT_TORQUE + lane]
+        row = traces[sample, first + lane]
+        row[0] = looks[0, lane] + set_speed
+        row[1] = work[r.BIT_SPEED + lane]
+        row[2] = work[r.ANGLE + lane]
+        row[3] = looks[1, lane] - string.twist_offset * set_speed
+        row[4] = work[r.PIPE + lane] + work[r.PIPE_OFFSET + lane]
+        row[5] = held if stuck else work[r.KINETIC + lane]
+        row[6] = 1.0 if stuck else 0.0
+
+
+@inlined
+def _share_after(begin: float, step: float, moment: float) -> float:
+    """Share of a step that lies after a moment."""
+    return min(1.0, max(0.0, (begin + step - moment) / step))
+
+
+@compiled
+def advance_block(
+    string: Any, friction: Any, drive: Any, weight: Any,
+    speed: Any, start: Any, clock: Any, measures: Any, traces: Any, first: int,
+) -> None:  # fmt: skip
+    """Advance the lanes from `first` on, one block, from time zero to the end."""
+    work = np.zeros(r.ROWS * WIDTH)
+    state = np.zeros(2 * start.shape[0] * WIDTH)
+    looks = np.zeros((2, WIDTH))
+    load_block(friction, work, r.FRICTION, first)
+    load_block(drive, work, r.DRIVE, first)
+    load_block(weight, work, r.WEIGHT, first)
+    for lane in range(WIDTH):
+        set_speed = speed[0, first + lane]
+        work[r.SET_SPEED + lane] = set_speed
+        work[r.BIT_SPEED + lane] = speed[1, first + lane]
+        work[r.DRAG + lane] = string.drag * set_speed
+        work[r.PIPE_OFFSET + lane] = string.pipe_offset * set_speed
+        for i in range(start.shape[0]):
+            state[i * WIDTH + lane] = start[i, first + lane]
+    _begin(friction, weight, work)
+    begin_measures(work)
+    rate = 1.0 / clock.step
+    for n in range(clock.steps + 1):
+        sampled = clock.every > 0 and n % clock.every == 0
+        if sampled:
+            _look_around(string, state, work, looks)
+        complete_and_propagate(string, state, work)
+        measure_pipe(work)
+        if sampled:
+            _sample(string, work, looks, traces, n // clock.every, first)
+        if n == clock.steps:
+            break
+        begin = n * clock.step
+        eliminate(string, drive, weight, friction, work, rate)
+        solve_inclusion(friction, work)
+        # What takes divisions and happens rarely is done when some lane needs it; it
+        # leaves the other lanes as they are.
+        if decide(friction, work) > 0:
+            time_changes(friction, work)
+        conclude(string, work)
+        in_j1 = _share_after(begin, clock.step, clock.j1_from)
+        in_window = _share_after(begin, clock.step, clock.window_from)
+        if measure(work, begin, clock.step, in_j1, in_window) > 0:
+            measure_crossings(work, begin, clock.step, in_j1)
+        if in_window > 0.0:
+            measure_window(work)
+    for measured in range(r.MEASURES):
+        for lane in range(WIDTH):
+            value = work[r.FIRST_MEASURE + measured * WIDTH + lane]
+            measures[measured, first + lane] = value
+
+
+def _compile() -> Any:
+    # A constant of the compiled code, so that numba's disk cache, which looks at the date of
+    # one file only, notices a change in any law or kernel.
+    fingerprint = _fingerprint()
+
+    @njit(parallel=True, cache=True, **OPTIONS)
+    def run(
+        string: Any, friction: Any, drive: Any, weight: Any,
+        speed: Any, start: Any, clock: Any, measures: Any, traces: Any,
+    ) -> str:  # fmt: skip
+        for block in prange(speed.shape[1] // WIDTH):
+            advance_block(
+                string, friction, drive, weight,
+                speed, start, clock, measures, traces, block * WIDTH,
+            )  # fmt: skip
+        return fingerprint
+
+    return run
+
+
+def _fingerprint() -> str:
+    """Hash of the width and of every source that is compiled into the kernels."""
+    package = Path(__file__).resolve().parents[2]
+    folders = ("simulation/kernels", "bit_rock", "top_drive", "weight_on_bit")
+    digest = hashlib.sha256(str(WIDTH).encode())
+    for folder in folders:
+        for path in sorted((package / folder).glob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+run = _compile()
+"""Advance lanes from time zero to the end: `run(string, friction, drive, weight, speed, start,
+clock, measures, traces)`.
+
+- `string`: `BlockString` or `DenseString`.
+- `friction`, `drive`, `weight`: laws with an array, shape (lanes,), for each number.
+- `speed`, shape (2, lanes): set speed and bit speed at time zero (rad/s).
+- `start`, shape (states, lanes): the string at time zero.
+- `clock`: `Clock`.
+- `measures`, shape (MEASURES, lanes): written; the rows from `rows.FIRST_MEASURE` on.
+- `traces`, shape (samples, lanes, len(TRACED)): written if `clock.every` > 0.
+
+`lanes` must be a multiple of `WIDTH`. Returns the fingerprint of the sources.
+"""

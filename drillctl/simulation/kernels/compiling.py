@@ -1,0 +1,17 @@
+"""How everything in this package is compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+
+# Fused multiply-adds are allowed and nothing else: `fastmath=True` would delete NaN tests.
+# Division follows IEEE: a test for zero before each would keep loops over lanes scalar.
+OPTIONS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy"}
+
+inlined = numba.njit(forceinline=True, **OPTIONS)
+"""Decorator for what is part of the step of a lane."""
+
+compiled = numba.njit(**OPTIONS)
+"""Decorator for what is called once per block and step."""

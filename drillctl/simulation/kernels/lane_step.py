@@ -1,0 +1,172 @@
+"""The step of the laws, lane by lane: everything that is not the string.
+
+With the mean top torque of the step affine in the top angle at its end, T_top = offset -
+slope angle+, both control and string can be eliminated. The bit speed at the end of the step
+is then free - gain T_bit, and what is left is one scalar inclusion:
+
+- A stuck bit stays while the torque that holds it, free / gain, is within the static one.
+- A turning bit feels the mean of the torque before and after, so that its speed u >= 0 in its
+  own direction solves u + (gain/2) T(u) = right. With (gain/2) (-T') < 1/4 the left side rises
+  and Newton's method converges to the only root.
+- It sticks only if there is no root of its own sign and the static torque can hold it; else it
+  turns the other way.
+
+Every lane takes its own decisions by selects, never by branches, and its Newton iteration
+freezes when that lane has converged: no lane's bits depend on its neighbours.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from drillctl.simulation.kernels import rows as r
+from drillctl.simulation.kernels.compiling import inlined
+from drillctl.simulation.kernels.laws import (
+    at_lane,
+    kinetic_torque_at_rest,
+    mean_torque,
+    static_torque,
+    torque_and_slope,
+    weight_at,
+)
+from drillctl.simulation.kernels.rows import WIDTH
+
+NEWTON_STEP = 1e-6
+"""A lane has converged when Newton moves it less than this (rad/s, relative over 1 rad/s):
+the error left is the square of that times gain/2 times the law's curvature, below rounding."""
+NEWTON_LIMIT = 30
+
+
+@inlined
+def eliminate(string: Any, drive: Any, weight: Any, friction: Any, work: Any, rate: float) -> None:
+    """Reduce string and control to free and gain, and set the inclusion up; `rate` is 1 / step."""
+    for lane in range(WIDTH):
+        drag = work[r.DRAG + lane]
+        offset, slope = mean_torque(at_lane(drive, work, r.DRIVE, lane), work[r.ANGLE + lane], rate)
+        shrink = 1.0 / (1.0 + slope * string.angle_by_top)
+        alone = (offset - slope * (work[r.TOP_FREE + lane] - string.angle_by_top * drag)) * shrink
+        share = slope * string.angle_by_bit * shrink
+        free = (
+            work[r.SET_SPEED + lane]
+            + work[r.BIT_FREE + lane]
+            + string.speed_by_top * (alone - drag)
+        )
+        gain = string.speed_by_bit - string.speed_by_top * share
+        work[r.OFFSET + lane] = alone
+        work[r.SHARE + lane] = share
+        work[r.FREE + lane] = free
+        work[r.GAIN + lane] = gain
+
+        load = weight_at(at_lane(weight, work, r.WEIGHT, lane), work[r.BIT_SPEED + lane])
+        law = at_lane(friction, work, r.FRICTION, lane)
+        kinetic = kinetic_torque_at_rest(law, load)
+        direction = work[r.DIRECTION + lane]
+        forward = 1.0 if free > 0.0 else -1.0
+        own = direction * (free - 0.5 * gain * work[r.KINETIC + lane]) > 0.5 * gain * kinetic
+        # A stuck bit, and one that is turned round, starts from the torque at rest.
+        sign = direction if own else forward
+        previous = sign * work[r.KINETIC + lane] if own else kinetic
+        right = sign * free - 0.5 * gain * previous
+        guess = right - 0.5 * gain * previous
+        work[r.LOAD + lane] = load
+        work[r.SIGN + lane] = sign
+        work[r.OWN + lane] = 1.0 if own else 0.0
+        work[r.RIGHT + lane] = right
+        work[r.SPEED + lane] = guess if guess > 0.0 else 0.0
+        work[r.OPEN + lane] = 1.0
+
+
+@inlined
+def solve_inclusion(friction: Any, work: Any) -> None:
+    """Newton's method on u + (gain/2) T(u) = right, u >= 0, in every lane that is open."""
+    for _ in range(NEWTON_LIMIT):
+        still_open = 0  # an integer: the compiler may not reorder a sum of doubles
+        for lane in range(WIDTH):
+            law = at_lane(friction, work, r.FRICTION, lane)
+            u = work[r.SPEED + lane]
+            half = 0.5 * work[r.GAIN + lane]
+            torque, slope = torque_and_slope(law, work[r.LOAD + lane], u)
+            move = (work[r.RIGHT + lane] - u - half * torque) / (1.0 + half * slope)
+            new = u + move
+            new = new if new > 0.0 else 0.0
+            is_open = work[r.OPEN + lane] > 0.0
+            far = abs(new - u) > NEWTON_STEP * (1.0 + u)
+            work[r.SPEED + lane] = new if is_open else u
+            work[r.OPEN + lane] = 1.0 if is_open and far else 0.0
+            still_open += 1 if is_open and far else 0
+        if still_open == 0:
+            break
+
+
+@inlined
+def decide(friction: Any, work: Any) -> int:
+    """Stick or slip, and the bit torque of the step; returns how many lanes change phase."""
+    changes = 0
+    for lane in range(WIDTH):
+        law = at_lane(friction, work, r.FRICTION, lane)
+        static = static_torque(law, work[r.LOAD + lane])
+        free, per_gain = work[r.FREE + lane], 1.0 / work[r.GAIN + lane]
+        holding = abs(free) * per_gain
+        sticks = holding <= static and not work[r.OWN + lane] > 0.0
+        was_stuck = work[r.DIRECTION + lane] == 0.0
+        speed = 0.0 if sticks else work[r.SIGN + lane] * work[r.SPEED + lane]
+        # The slip torque at the new speed follows from the equation that u solves.
+        slip = 2.0 * (work[r.RIGHT + lane] - work[r.SPEED + lane]) * per_gain
+        work[r.NEW_SPEED + lane] = speed
+        work[r.NEW_HOLDING + lane] = holding
+        work[r.NEW_DIRECTION + lane] = 0.0 if sticks else work[r.SIGN + lane]
+        work[r.NEW_KINETIC + lane] = 0.0 if sticks else work[r.SIGN + lane] * slip
+        work[r.BIT_TORQUE + lane] = (free - speed) * per_gain
+        work[r.STUCK_SHARE + lane] = 1.0 if sticks else 0.0
+        changes += 1 if sticks != was_stuck else 0
+    return changes
+
+
+@inlined
+def time_changes(friction: Any, work: Any) -> None:
+    """Share of the step spent stuck in lanes that come to rest or break loose, to second order.
+
+    A bit that comes to rest is followed in a straight line through zero speed. One that breaks
+    loose does so where the line through the holding torques of this step and the last, each in
+    the middle of its step, meets the static one; that may be in the step before, whose time
+    is then taken back.
+    """
+    for lane in range(WIDTH):
+        law = at_lane(friction, work, r.FRICTION, lane)
+        load = work[r.LOAD + lane]
+        half = 0.5 * work[r.GAIN + lane]
+        direction = work[r.DIRECTION + lane]
+        before = abs(work[r.BIT_SPEED + lane])
+        past_zero = direction * (work[r.FREE + lane] - half * work[r.KINETIC + lane])
+        past_zero -= half * kinetic_torque_at_rest(law, load)
+        coming = past_zero / (past_zero - before)
+        holding, last = work[r.NEW_HOLDING + lane], work[r.HOLDING + lane]
+        leaving = 0.5 + (static_torque(law, load) - holding) / (holding - last)
+        leaving = leaving if last >= 0.0 else 0.0
+        sticks = work[r.NEW_DIRECTION + lane] == 0.0
+        was_stuck = direction == 0.0
+        share = work[r.STUCK_SHARE + lane]
+        share = coming if sticks and not was_stuck else share
+        work[r.STUCK_SHARE + lane] = leaving if was_stuck and not sticks else share
+        work[r.STICKS + lane] += 1.0 if sticks and not was_stuck else 0.0
+
+
+@inlined
+def conclude(string: Any, work: Any) -> None:
+    """Top torque of the step, and the state at its end."""
+    for lane in range(WIDTH):
+        bit_torque = work[r.BIT_TORQUE + lane]
+        top_torque = work[r.OFFSET + lane] + work[r.SHARE + lane] * bit_torque
+        net_torque = top_torque - work[r.DRAG + lane]
+        work[r.TOP_TORQUE + lane] = net_torque
+        work[r.ANGLE + lane] = (
+            work[r.TOP_FREE + lane]
+            + string.angle_by_top * net_torque
+            - string.angle_by_bit * bit_torque
+        )
+        stayed = work[r.DIRECTION + lane] == 0.0 and work[r.NEW_DIRECTION + lane] == 0.0
+        work[r.HOLDING + lane] = work[r.NEW_HOLDING + lane] if stayed else -1.0
+        work[r.DIRECTION + lane] = work[r.NEW_DIRECTION + lane]
+        work[r.KINETIC + lane] = work[r.NEW_KINETIC + lane]
+        work[r.SPEED_BEFORE + lane] = work[r.BIT_SPEED + lane]
+        work[r.BIT_SPEED + lane] = work[r.NEW_SPEED + lane]

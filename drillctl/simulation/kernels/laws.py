@@ -1,0 +1,114 @@
+"""Laws called by type: the Python of each law, compiled where it is used.
+
+A law is a `NamedTuple` of arrays, one number a lane. Its methods are looked up by its type
+when a kernel is compiled, so that each combination of laws gets a kernel of its own, kept on
+disk under the types' names.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import types
+from numba.extending import overload
+
+from drillctl.simulation.kernels.compiling import inlined
+from drillctl.simulation.kernels.exponential import exp
+from drillctl.simulation.kernels.rows import WIDTH
+
+
+def at_lane(law: Any, work: Any, row: int, lane: int) -> Any:
+    """The law of one lane, its parameters read from `work[row + lane]` on."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(at_lane)
+def _at_lane(law, work, row, lane):
+    if not isinstance(law, types.BaseNamedTuple):
+        return None
+    # numba builds a named tuple only from written-out arguments, hence the text.
+    arguments = ", ".join(f"work[row + {k * WIDTH} + lane]" for k in range(len(law.fields)))
+    scope: dict[str, Any] = {"Law": law.instance_class}
+    exec(f"def read(law, work, row, lane):\n    return Law({arguments})", scope)
+    return scope["read"]
+
+
+def load_block(law: Any, work: Any, row: int, first: int) -> None:
+    """Copy the parameters of the lanes from `first` on into `work[row:]`."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(load_block)
+def _load_block(law, work, row, first):
+    if not isinstance(law, types.BaseNamedTuple):
+        return None
+    lines = [
+        f"        work[row + {k * WIDTH} + lane] = law[{k}][first + lane]"
+        for k in range(len(law.fields))
+    ]
+    text = "\n".join(
+        ["def load(law, work, row, first):", f"    for lane in range({WIDTH}):", *lines]
+    )
+    scope: dict[str, Any] = {}
+    exec(text, scope)
+    return scope["load"]
+
+
+def _method(law: Any, name: str) -> Any:
+    """A method of a law's class, compiled."""
+    return inlined(getattr(law.instance_class, name))
+
+
+def static_torque(law: Any, weight: float) -> float:
+    """`law.static_torque(weight)`."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(static_torque)
+def _static_torque(law, weight):
+    method = _method(law, "static_torque")
+    return lambda law, weight: method(law, weight)
+
+
+def kinetic_torque_at_rest(law: Any, weight: float) -> float:
+    """`law.kinetic_torque_at_rest(weight)`."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(kinetic_torque_at_rest)
+def _kinetic_torque_at_rest(law, weight):
+    method = _method(law, "kinetic_torque_at_rest")
+    return lambda law, weight: method(law, weight)
+
+
+def torque_and_slope(law: Any, weight: float, speed: float) -> tuple[float, float]:
+    """`law.torque_and_slope(weight, speed, exp)` with the compiled exponential."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(torque_and_slope)
+def _torque_and_slope(law, weight, speed):
+    method = _method(law, "torque_and_slope")
+    return lambda law, weight, speed: method(law, weight, speed, exp)
+
+
+def mean_torque(law: Any, angle: float, step: float) -> tuple[float, float]:
+    """`law.mean_torque(angle, step)`."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(mean_torque)
+def _mean_torque(law, angle, step):
+    method = _method(law, "mean_torque")
+    return lambda law, angle, step: method(law, angle, step)
+
+
+def weight_at(law: Any, bit_speed: float) -> float:
+    """`law.weight(bit_speed)`."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(weight_at)
+def _weight_at(law, bit_speed):
+    method = _method(law, "weight")
+    return lambda law, bit_speed: method(law, bit_speed)

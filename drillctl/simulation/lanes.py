@@ -1,0 +1,116 @@
+"""What a lane of the batch engine is: the numbers of one rig on a shared string."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.drillstring import Drillstring
+from drillctl.simulation.start import Kind
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Lanes:
+    """Any number of rigs that share a string, the types of their laws and the kind of start.
+
+    Attributes
+    ----------
+    string : Drillstring
+        Shared by all lanes.
+    friction, drive, weight : NamedTuple
+        Laws with an array, shape (lanes,), for each of their numbers.
+    set_speed : ndarray, shape (lanes,)
+        Final set speed (rad/s).
+    turning_speed : ndarray, shape (lanes,)
+        Speed of all nodes at time zero of a start that turns (rad/s).
+    nominal_weight : ndarray, shape (lanes,)
+        Nominal weight on bit (N).
+    start : {'rest', 'turning', 'wound_up'}
+        Kind of start.
+    """
+
+    string: Drillstring
+    friction: Any
+    drive: Any
+    weight: Any
+    set_speed: Array
+    turning_speed: Array
+    nominal_weight: Array
+    start: Kind
+
+    def __len__(self) -> int:
+        return len(self.set_speed)
+
+    def __getitem__(self, chosen: slice | NDArray[np.int64]) -> Lanes:
+        """Some of the lanes."""
+        return Lanes(
+            self.string,
+            *(type(law)(*(v[chosen] for v in law)) for law in self.laws),
+            self.set_speed[chosen],
+            self.turning_speed[chosen],
+            self.nominal_weight[chosen],
+            self.start,
+        )
+
+    @property
+    def laws(self) -> tuple[Any, Any, Any]:
+        """Friction, drive and weight."""
+        return self.friction, self.drive, self.weight
+
+    @cached_property
+    def steepest_fall(self) -> float:
+        """Steepest falling slope of the friction in any lane (N m s/rad)."""
+        return float(np.max(self.friction.steepest_fall(self.weight.weight(0.0))))
+
+
+def lane_numbers(design: Design) -> dict[str, float]:
+    """Every number of a design that may differ from lane to lane, by name."""
+    laws = {"friction": design.bit_rock, "drive": design.top_drive, "weight": design.weight_on_bit}
+    numbers = {
+        f"{part}.{field}": float(value)
+        for part, law in laws.items()
+        for field, value in law._asdict().items()  # type: ignore[attr-defined]
+    }
+    turning = design.tables.start.speed
+    numbers["set_speed"] = design.speed
+    numbers["turning_speed"] = design.speed if turning is None else turning
+    numbers["nominal_weight"] = design.tables.operating_point.weight_on_bit
+    return numbers
+
+
+def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
+    """Lanes on the string of `design`, with the types of its laws.
+
+    Parameters
+    ----------
+    design : Design
+        Gives string, laws' types and start.
+    numbers : dict of ndarray, shape (lanes,)
+        By the names of `lane_numbers`.
+    """
+
+    def law(part: str, like: Any) -> Any:
+        return type(like)(*(np.ascontiguousarray(numbers[f"{part}.{f}"]) for f in like._fields))
+
+    return Lanes(
+        string=design.string,
+        friction=law("friction", design.bit_rock),
+        drive=law("drive", design.top_drive),
+        weight=law("weight", design.weight_on_bit),
+        set_speed=numbers["set_speed"],
+        turning_speed=numbers["turning_speed"],
+        nominal_weight=numbers["nominal_weight"],
+        start=design.tables.start.kind,
+    )
+
+
+def single_lane(design: Design) -> Lanes:
+    """One lane: the design as it stands."""
+    return lanes_of(design, {k: np.array([v]) for k, v in lane_numbers(design).items()})

@@ -1,0 +1,259 @@
+"""The exact step of a string: from M, C and K to the matrices the kernels multiply with.
+
+Undamped, Rayleigh-damped and modally damped strings fall into 2 x 2 blocks, one a mode. Any
+other viscous damping couples the modes: the first-order matrix is brought to real
+block-diagonal form, one block a conjugate pair or two real poles. Where that basis is badly
+conditioned, or a block cannot be read off the two signals that the laws need, the step is a
+dense matrix instead. Off-diagonal damping is never dropped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from drillctl.drillstring import Drillstring
+from drillctl.simulation.kernels.string_step import BlockString, DenseString
+
+Array = NDArray[np.float64]
+
+WORST_CONDITION = 1e6
+"""Largest condition number of a basis that is used for blocks; beyond, the step is dense."""
+WEAKEST_SIGNAL = 1e-9
+"""Smallest share of the largest modal amplitude at either end that a block is read off from."""
+
+
+@dataclass(frozen=True, eq=False)
+class StringStep:
+    """A string ready to be stepped.
+
+    Attributes
+    ----------
+    string : BlockString or DenseString
+        What the kernels take.
+    angle_to_state, speed_to_state : ndarray, shape (states, nodes)
+        State per nodal angle (1/rad) and per nodal speed (s/rad), both in the frame.
+    rest : ndarray, shape (nodes,)
+        Angles that damping to ground causes, per set speed (s): they are taken off before.
+    modes : int
+        Undamped modes carried, the rigid body included.
+    step : float
+        Length of the step (s).
+    """
+
+    string: BlockString | DenseString
+    angle_to_state: Array
+    speed_to_state: Array
+    rest: Array
+    modes: int
+    step: float
+
+    def state(self, angle: Array, speed: Array, set_speed: Array) -> Array:
+        """State of lanes, shape (states, lanes), from nodal angles and speeds, (nodes, lanes).
+
+        `set_speed`, shape (lanes,), in rad/s.
+        """
+        return (
+            self.angle_to_state @ (angle - np.outer(self.rest, set_speed))
+            + self.speed_to_state @ speed
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Modal:
+    """z' = A z + B [T_top, T_bit] of the modes carried, z = [modal angles, modal speeds].
+
+    Rows of `signals` read top angle, bit speed, pipe torque, top speed and bit angle off z.
+    """
+
+    a: Array
+    b: Array
+    signals: Array
+    classical: bool
+    free_rigid_body: bool
+
+
+def string_step(string: Drillstring, step: float, modes: int) -> StringStep:
+    """Prepare a string for steps of a given length.
+
+    Parameters
+    ----------
+    string : Drillstring
+        Any viscous damping.
+    step : float
+        Length of a step (s).
+    modes : int
+        Number of lowest undamped modes to carry; at most the number of nodes.
+
+    Returns
+    -------
+    StringStep
+        The same bits for the same input: one BLAS thread is used throughout.
+    """
+    modes = min(modes, string.nodes)
+    with threadpool_limits(limits=1, user_api="blas"):
+        frequency, shapes = string.undamped_modes
+        frequency, shapes = frequency[:modes], shapes[:, :modes]
+        modal = _modal(string, frequency, shapes)
+        rest = _rest(string)
+        to_modal = shapes.T @ string.mass.toarray()
+        stepped = _blocks(modal, step) or _dense(modal, step)
+    constants = {
+        "drag": float(string.ground_damping.sum()),
+        "pipe_offset": float(string.element_stiffness[0] * (rest[0] - rest[1])),
+        "twist_offset": float(rest[0] - rest[-1]),
+    }
+    fields, basis = stepped
+    kernel_string = (
+        BlockString(**fields, **constants)
+        if fields["free"].shape[1] == 4 and "top_angle" not in fields
+        else DenseString(**fields, **constants)
+    )
+    return StringStep(
+        string=kernel_string,
+        angle_to_state=basis[:, :modes] @ to_modal,
+        speed_to_state=basis[:, modes:] @ to_modal,
+        rest=rest,
+        modes=modes,
+        step=step,
+    )
+
+
+def _modal(string: Drillstring, frequency: Array, shapes: Array) -> _Modal:
+    n = len(frequency)
+    damping = shapes.T @ (string.damping @ shapes)
+    if string.classical:
+        damping = np.diag(np.diag(damping))
+    free = not string.ground_damping.any()
+    if free:
+        damping[0] = damping[:, 0] = 0.0
+    a = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(frequency**2), -damping]])
+    b = np.zeros((2 * n, 2))
+    b[n:, 0] = shapes[0]
+    b[n:, 1] = -shapes[-1]
+    zero = np.zeros(n)
+    first = shapes[0] - shapes[1]
+    signals = np.array([
+        [*shapes[0], *zero],
+        [*zero, *shapes[-1]],
+        [*(string.element_stiffness[0] * first), *(string.element_damping[0] * first)],
+        [*zero, *shapes[0]],
+        [*shapes[-1], *zero],
+    ])  # fmt: skip
+    return _Modal(a, b, signals, string.classical, free)
+
+
+def _rest(string: Drillstring) -> Array:
+    """Angles per set speed with which the string carries its drag to ground; top at zero.
+
+    K rest = -g + e_top sum(g): in the coordinates u - rest Omega the whole drag acts at the
+    top, where the drive's torque acts too.
+    """
+    carried_below = string.ground_damping.sum() - np.cumsum(string.ground_damping)[:-1]
+    return np.concatenate([[0.0], -np.cumsum(carried_below / string.element_stiffness)])
+
+
+def _held(a: Array, b: Array, step: float) -> tuple[Array, Array]:
+    """Discrete A and B of z' = A z + B u with u held over a step; stacks of matrices too."""
+    states, inputs = b.shape[-2:]
+    augmented = np.zeros((*a.shape[:-2], states + inputs, states + inputs))
+    augmented[..., :states, :states] = a * step
+    augmented[..., :states, states:] = b * step
+    propagated = scipy.linalg.expm(augmented)
+    return propagated[..., :states, :states], propagated[..., :states, states:]
+
+
+def _blocks(modal: _Modal, step: float) -> tuple[dict[str, Array], Array] | None:
+    """Fields of a `BlockString` and the matrix from modal to block states; None if unfit."""
+    found = _block_basis(modal)
+    if found is None:
+        return None
+    basis, inverse = found
+    count = len(basis) // 2
+    pairs = range(count)
+    a = inverse @ modal.a @ basis
+    b = inverse @ modal.b
+    signals = modal.signals @ basis
+    a = np.array([a[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] for i in pairs])
+    b = b.reshape(count, 2, 2)
+    rows = signals.reshape(5, count, 2)
+    # The block's states become its own contributions to top angle and bit speed.
+    reading = np.stack([rows[0], rows[1]], axis=1)
+    scale = np.abs(reading).max(axis=2)
+    if scale.min(axis=0).min() == 0.0 or (scale < WEAKEST_SIGNAL * scale.max(axis=0)).any():
+        return None
+    if np.linalg.cond(reading / scale[:, :, None]).max() > WORST_CONDITION:
+        return None
+    unread = np.linalg.inv(reading)
+    free, push = _held(a, b, step)
+    free, push = reading @ free @ unread, reading @ push
+    others = np.einsum("sbi,bij->sbj", rows[2:], unread)
+    fields = {
+        "free": free.reshape(count, 4),
+        "push": push.reshape(count, 4),
+        "pipe": others[0].copy(),
+        "top_speed": others[1].copy(),
+        "bit_angle": others[2].copy(),
+        "angle_by_top": float(push[:, 0, 0].sum()),
+        "angle_by_bit": float(-push[:, 0, 1].sum()),
+        "speed_by_top": float(push[:, 1, 0].sum()),
+        "speed_by_bit": float(-push[:, 1, 1].sum()),
+    }
+    to_block = np.einsum("bij,bjk->bik", reading, inverse.reshape(count, 2, -1))
+    return fields, to_block.reshape(2 * count, -1)  # type: ignore[return-value]
+
+
+def _block_basis(modal: _Modal) -> tuple[Array, Array] | None:
+    """Basis of the modal states, by columns, in which A is 2 x 2 block-diagonal; its inverse."""
+    states = len(modal.a)
+    n = states // 2
+    if modal.classical:
+        order = np.arange(states).reshape(2, n).T.ravel()
+        basis = np.eye(states)[:, order]
+        return basis, basis.T
+    kept = np.arange(states)
+    if modal.free_rigid_body:  # a double zero pole, a block of its own
+        kept = np.setdiff1d(kept, [0, n])
+    poles, vectors = np.linalg.eig(modal.a[np.ix_(kept, kept)])
+    columns = np.zeros((states, len(kept)))
+    columns[kept] = _real_columns(poles, vectors)
+    if modal.free_rigid_body:
+        columns = np.hstack([np.eye(states)[:, [0, n]], columns])
+    if np.linalg.cond(columns) > WORST_CONDITION:
+        return None
+    return columns, np.linalg.inv(columns)
+
+
+def _real_columns(poles: Array, vectors: Array) -> Array:
+    """Real and imaginary part of each conjugate pair, then the real poles two by two."""
+    pairs = np.flatnonzero(poles.imag > 0.0)
+    real = np.flatnonzero(poles.imag == 0.0)
+    real = real[np.argsort(-np.abs(poles[real]))]
+    columns = [part for i in pairs for part in (vectors[:, i].real, vectors[:, i].imag)]
+    columns += [vectors[:, i].real for i in real]
+    return np.array(columns).T
+
+
+def _dense(modal: _Modal, step: float) -> tuple[dict[str, Array], Array]:
+    """Fields of a `DenseString`, whose states are the modal ones."""
+    free, push = _held(modal.a, modal.b, step)
+    s = modal.signals
+    by = s[:2] @ push
+    fields = {
+        "free": free,
+        "push": push,
+        "top_angle": s[0].copy(),
+        "bit_speed": s[1].copy(),
+        "pipe": s[2].copy(),
+        "top_speed": s[3].copy(),
+        "bit_angle": s[4].copy(),
+        "angle_by_top": float(by[0, 0]),
+        "angle_by_bit": float(-by[0, 1]),
+        "speed_by_top": float(by[1, 0]),
+        "speed_by_bit": float(-by[1, 1]),
+    }
+    return fields, np.eye(len(modal.a))  # type: ignore[return-value]

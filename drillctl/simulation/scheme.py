@@ -1,0 +1,114 @@
+"""Which step and how many modes the batch engine uses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from drillctl.design.tables import SimulationTable
+from drillctl.drillstring import Drillstring
+from drillctl.errors import InputError
+
+STEEPEST = 0.5
+"""Largest product of bit mobility over a step and falling slope: beyond it the inclusion at
+the bit could have more than one root."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What a named accuracy stands for.
+
+    Attributes
+    ----------
+    step : float
+        Longest step (s).
+    steps_per_period : float
+        Fewest steps in a period of the first elastic mode, for short strings.
+    phase : float
+        Modes that turn more than this (rad) in a step are left out: a step cannot follow them.
+    """
+
+    step: float
+    steps_per_period: float
+    phase: float
+
+
+ACCURACIES = {
+    "fast": Accuracy(step=0.04, steps_per_period=60, phase=1.6),
+    "standard": Accuracy(step=0.02, steps_per_period=120, phase=1.1),
+    "fine": Accuracy(step=0.005, steps_per_period=480, phase=1.1),
+}
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Step, number of steps and number of modes of a run.
+
+    Attributes
+    ----------
+    step : float
+        Length of a step (s); `steps` of them are exactly the duration.
+    steps : int
+        Number of steps.
+    modes : int
+        Lowest undamped modes carried, the rigid body included.
+    """
+
+    step: float
+    steps: int
+    modes: int
+
+
+def choose_scheme(
+    string: Drillstring, table: SimulationTable, steepest_fall: float, bit_inertia: float
+) -> Scheme:
+    """Step and modes from the accuracy asked for, unless they are given.
+
+    Parameters
+    ----------
+    string : Drillstring
+        Its frequencies bound the step and choose the modes.
+    table : SimulationTable
+        Duration, accuracy; step and modes if given.
+    steepest_fall : float
+        Steepest falling slope of the friction in any lane (N m s/rad).
+    bit_inertia : float
+        Inertia that the bit alone sets in motion in a short step (kg m2).
+
+    Raises
+    ------
+    InputError
+        A given step is too long for the steepness of the friction law.
+    """
+    accuracy = ACCURACIES[table.accuracy]
+    frequency, _ = string.undamped_modes
+    # Mobility over a step is about step / inertia: the bit has no time to move the string.
+    longest = STEEPEST * bit_inertia / steepest_fall if steepest_fall > 0.0 else math.inf
+    if table.step is None:
+        elastic = 2.0 * math.pi / frequency[1]
+        step = min(accuracy.step, elastic / accuracy.steps_per_period, longest)
+    elif table.step > longest:
+        raise InputError(
+            f"{table.step:g} s is too long for this friction law: its torque falls by "
+            f"{steepest_fall:.4g} N m s/rad, which allows {longest:.3g} s at most",
+            "simulation.step",
+        )
+    else:
+        step = table.step
+    steps = max(1, math.ceil(table.duration / step * (1.0 - 1e-12)))
+    step = table.duration / steps
+    modes = table.modes
+    if modes is None:
+        modes = int((frequency * step <= accuracy.phase).sum())
+    return Scheme(step, steps, min(max(modes, 2), string.nodes))
+
+
+def bit_inertia(string: Drillstring) -> float:
+    """Inertia (kg m2) that resists a sudden torque at the bit: 1 / (M^-1) at the last node."""
+    import numpy as np
+    import scipy.sparse.linalg
+
+    unit = np.zeros(string.nodes)
+    unit[-1] = 1.0
+    response = scipy.sparse.linalg.spsolve(string.mass.tocsc(), unit)
+    return float(1.0 / np.atleast_1d(response)[-1])

@@ -1,0 +1,276 @@
+"""Signals and measures of a run of the reference solver."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.simulation import measures as m
+from drillctl.simulation.phases import stick_phase
+from drillctl.simulation.reference import EnergyAudit, Event, Motion, Piece
+
+if TYPE_CHECKING:
+    import xarray
+
+Array = NDArray[np.float64]
+
+SIGNALS = {
+    "top_speed": ("rad/s", "speed of the top drive"),
+    "bit_speed": ("rad/s", "speed of the bit"),
+    "twist": ("rad", "top angle minus bit angle"),
+    "top_angle": ("rad", "angle of the top drive in the frame that turns at the set speed"),
+    "bit_angle": ("rad", "angle of the bit in the frame that turns at the set speed"),
+    "top_torque": ("N*m", "torque of the drive"),
+    "pipe_torque": ("N*m", "torque in the uppermost element"),
+    "bit_torque": ("N*m", "torque on the bit, positive when it brakes"),
+    "weight_on_bit": ("N", "weight on bit"),
+    "stuck": ("", "1 while the bit is at rest"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """One run: its signals, events, measures and energy balance.
+
+    Attributes
+    ----------
+    design : Design
+        What was simulated.
+    time : ndarray, shape (samples,)
+        Sampling times (s).
+    signals : dict of ndarray, shape (samples,)
+        By the names of `SIGNALS`.
+    events : tuple of Event
+        Sticks and breaks loose; empty for the batch engine, which does not locate them.
+    measures : Measures
+        Over the whole run.
+    status : str
+        One of `measures.STATUSES`.
+    engine : str
+        `reference` or `batch`.
+    step : float or None
+        Fixed step (s) of the batch engine.
+    modes : int or None
+        Number of modes the batch engine carried.
+    energy : EnergyAudit or None
+        Energy balance of the reference solver.
+    """
+
+    design: Design
+    time: Array
+    signals: dict[str, Array]
+    events: tuple[Event, ...]
+    measures: m.Measures
+    status: str
+    engine: str
+    step: float | None
+    modes: int | None
+    energy: EnergyAudit | None
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """The signals as a labelled dataset over `time`."""
+        import xarray
+
+        variables = {
+            name: ("time", values, {"units": SIGNALS[name][0], "long_name": SIGNALS[name][1]})
+            for name, values in self.signals.items()
+        }
+        time = ("time", self.time, {"units": "s"})
+        return xarray.Dataset(variables, {"time": time})
+
+    def summary(self) -> dict[str, Any]:
+        """Measures, status, engine, step and modes; SI units, None where undefined."""
+        return {
+            "measures": self.measures.as_dict(),
+            "status": self.status,
+            "engine": self.engine,
+            "step": self.step,
+            "modes": self.modes,
+        }
+
+
+def sample(motion: Motion, interval: float = 0.01) -> Simulation:
+    """Signals at equal intervals and the measures of a run.
+
+    Parameters
+    ----------
+    motion : Motion
+        As the reference solver left it.
+    interval : float
+        Sampling interval (s).
+
+    Returns
+    -------
+    Simulation
+        J1, stuck time and bit speed extremes come from located events, not from samples.
+    """
+    design = motion.design
+    duration = design.tables.simulation.duration
+    time = np.arange(0.0, duration + 0.5 * interval, interval)
+    state, direction = _states(motion.pieces, time)
+    signals = _signals(design, state, direction)
+    measured = _measures(motion, time, signals)
+    status = m.status_of(
+        all(bool(np.isfinite(values).all()) for values in signals.values()),
+        _stuck_between(motion, duration - min(m.WINDOW, duration), duration),
+        min(m.WINDOW, duration),
+        measured.settling_time_wide,
+    )
+    return Simulation(
+        design, time, signals, motion.events, measured, status, "reference", None, None,
+        motion.energy,
+    )  # fmt: skip
+
+
+def _states(pieces: tuple[Piece, ...], time: Array) -> tuple[Array, Array]:
+    """State, shape (states, samples), and direction of slip, shape (samples,), at each time."""
+    ends = np.array([piece.end for piece in pieces])
+    which = np.minimum(np.searchsorted(ends, time), len(pieces) - 1)
+    columns, directions = [], []
+    for index, piece in enumerate(pieces):
+        chosen = np.minimum(time[which == index], piece.end)
+        if chosen.size:
+            columns.append(piece.solution(chosen))
+            directions.append(np.full(chosen.size, float(piece.direction)))
+    return np.concatenate(columns, axis=1), np.concatenate(directions)
+
+
+def _signals(design: Design, state: Array, direction: Array) -> dict[str, Array]:
+    nodes = design.string.nodes
+    angle, speed = state[:nodes], state[nodes : 2 * nodes]
+    bit_speed = np.where(direction == 0.0, 0.0, speed[-1] + design.speed)
+    top_torque = np.asarray(design.top_drive.torque(angle[0], speed[0])) + 0.0 * angle[0]
+    weight = np.broadcast_to(design.weight_on_bit.weight(bit_speed), bit_speed.shape)
+    friction, _ = design.bit_rock.torque_and_slope(weight, np.abs(bit_speed), np.exp)  # type: ignore[call-overload]
+    _, reaction = stick_phase(design.string, design.speed)
+    holding = reaction.motion @ state[: 2 * nodes] + reaction.load + reaction.top * top_torque
+    stiffness, damping = design.string.element_stiffness[0], design.string.element_damping[0]
+    return {
+        "top_speed": speed[0] + design.speed,
+        "bit_speed": bit_speed,
+        "twist": angle[0] - angle[-1],
+        "top_angle": angle[0],
+        "bit_angle": angle[-1],
+        "top_torque": top_torque,
+        "pipe_torque": stiffness * (angle[0] - angle[1]) + damping * (speed[0] - speed[1]),
+        "bit_torque": np.where(direction == 0.0, holding, direction * friction),
+        "weight_on_bit": np.array(weight),
+        "stuck": (direction == 0.0).astype(float),
+    }
+
+
+def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measures:
+    design = motion.design
+    duration = design.tables.simulation.duration
+    since = design.tables.simulation.j1_from
+    bit = signals["bit_speed"]
+    low, high = _extremes(motion, 0.0, bit)
+    window = min(m.WINDOW, duration)
+    late = time >= duration - window
+    late_low, late_high = _extremes(motion, duration - window, bit[late])
+    mean = design.speed + _bit_angle_change(motion, 0.0, duration) / duration
+    late_mean = design.speed + _bit_angle_change(motion, duration - window, duration) / window
+    j1 = _deviation(motion, since, duration) / design.speed
+    weight = float(signals["weight_on_bit"].mean())
+    return m.Measures(
+        j1=j1,
+        j1_rate=j1 / (duration - since),
+        stuck_time=_stuck_between(motion, 0.0, duration),
+        sticks=_sticks(motion),
+        stick_slip_index=m.ssi(late_low, late_high, late_mean),
+        mean_bit_speed=mean,
+        min_bit_speed=low,
+        peak_bit_speed=high,
+        peak_pipe_torque=float(np.abs(signals["pipe_torque"]).max()),
+        peak_top_torque=float(np.abs(signals["top_torque"]).max()),
+        settling_time=_settling(design, time, bit, m.NARROW_BAND),
+        settling_time_wide=_settling(design, time, bit, m.WIDE_BAND),
+        mean_weight_on_bit=weight,
+        rop_proxy=_rop_proxy(design, time, signals),
+        work_at_bit=motion.energy.bit,
+        work_per_turn=m.per_turn(motion.energy.bit, mean, duration),
+        time_outside_table=0.0,
+    )
+
+
+def _rop_proxy(design: Design, time: Array, signals: dict[str, Array]) -> float:
+    nominal = design.tables.operating_point.weight_on_bit * design.speed
+    if nominal == 0.0:
+        return math.nan
+    power = signals["weight_on_bit"] * np.abs(signals["bit_speed"])
+    return float(np.trapezoid(power, time) / (time[-1] * nominal))
+
+
+def _settling(design: Design, time: Array, bit: Array, band: float) -> float | None:
+    """Settling time by linear interpolation between samples (s)."""
+    excess = np.abs(bit - design.speed) - band * design.speed
+    outside = np.flatnonzero(excess > 0.0)
+    if outside.size == 0:
+        return 0.0
+    last = outside[-1]
+    if last + 1 >= len(time):
+        return None
+    share = excess[last] / (excess[last] - excess[last + 1])
+    moment = float(time[last] + share * (time[last + 1] - time[last]))
+    return m.settled(moment, float(time[-1]))
+
+
+def _bit_angle(piece: Piece, time: Array | float) -> Array:
+    state = piece.solution(time)
+    return np.asarray(state[(state.shape[0] - 3) // 2 - 1])
+
+
+def _bit_angle_change(motion: Motion, begin: float, end: float) -> float:
+    """Angle of the bit in the frame between two times (rad)."""
+    first = next(p for p in motion.pieces if p.end >= begin)
+    return float(_bit_angle(motion.pieces[-1], end) - _bit_angle(first, begin))
+
+
+def _deviation(motion: Motion, begin: float, end: float) -> float:
+    """Integral of abs(bit speed - set speed) (rad).
+
+    Between two crossings of the set speed the deviation keeps its sign, and its integral is
+    the change of the bit's angle in the turning frame: exact, with no kink to integrate over.
+    """
+    total = 0.0
+    for piece in motion.pieces:
+        low, high = max(piece.begin, begin), min(piece.end, end)
+        if high <= low:
+            continue
+        inside = piece.crossings[(piece.crossings > low) & (piece.crossings < high)]
+        knots = np.concatenate([[low], inside, [high]])
+        total += float(np.abs(np.diff(_bit_angle(piece, knots))).sum())
+    return total
+
+
+def _sticks(motion: Motion) -> int:
+    """Times the bit came to rest; a start at rest counts, even if it breaks loose at once."""
+    first = motion.pieces[0]
+    begins_at_rest = motion.design.tables.start.kind != "turning" and first.direction != 0
+    return begins_at_rest + sum(piece.direction == 0 for piece in motion.pieces)
+
+
+def _stuck_between(motion: Motion, begin: float, end: float) -> float:
+    return sum(
+        max(0.0, min(piece.end, end) - max(piece.begin, begin))
+        for piece in motion.pieces
+        if piece.direction == 0
+    )
+
+
+def _extremes(motion: Motion, since: float, samples: Array) -> tuple[float, float]:
+    """Smallest and largest bit speed from `since` on (rad/s), at located extremes."""
+    values = [float(samples.min()), float(samples.max())]
+    for piece in motion.pieces:
+        moments = piece.extremes[piece.extremes >= since]
+        if piece.direction != 0 and moments.size:
+            state = piece.solution(moments)
+            speed = state[state.shape[0] - 4] + motion.design.speed
+            values += [float(speed.min()), float(speed.max())]
+    return min(values), max(values)
