@@ -5,12 +5,13 @@ In a wheel they lie inside the package, in a checkout beside it; both are looked
 
 from __future__ import annotations
 
+import difflib
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from drillctl.errors import InputError, nearest
+from drillctl.errors import InputError, nearest, shown
 
 Shelf = Literal["models", "designs"]
 _PACKAGE = Path(__file__).resolve().parent
@@ -70,11 +71,8 @@ def find(name_or_path: str, shelves: tuple[Shelf, ...] = ("designs", "models")) 
     InputError
         No such file, or no such name; the message lists the nearest.
     """
-    path = Path(name_or_path).expanduser()
-    if path.suffix == ".toml" or len(path.parts) > 1:
-        if not path.is_file():
-            raise InputError("no such file", name_or_path)
-        return path
+    if name_or_path.endswith(".toml") or "/" in name_or_path or "\\" in name_or_path:
+        return _file(name_or_path)
     for shelf in shelves:
         if name_or_path in names(shelf):
             return _folder(shelf) / f"{name_or_path}.toml"
@@ -83,3 +81,18 @@ def find(name_or_path: str, shelves: tuple[Shelf, ...] = ("designs", "models")) 
         f"not a shipped name ({nearest(name_or_path, known)}), nor a path to a .toml file",
         name_or_path or "design",
     )
+
+
+def _file(text: str) -> Path:
+    """The file at a path, or the reason why there is none."""
+    try:
+        path = Path(text).expanduser()
+        if path.is_file():
+            return path
+        beside = [p.stem for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+    except (OSError, RuntimeError, ValueError) as error:  # unreadable, ~nobody, null byte
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"cannot be read: {reason}", shown(text)) from None
+    close = difflib.get_close_matches(path.stem, beside, n=1)
+    hint = f"; did you mean '{close[0]}.toml'?" if close else ""
+    raise InputError(f"no such file{hint}", text)

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 
 class DrillctlError(Exception):
@@ -39,6 +39,26 @@ class SimulationError(DrillctlError, RuntimeError):
     """A solver could not finish what was asked of it."""
 
 
+def shown(value: object) -> str:
+    """Return what the user wrote, as short text on one line for a message.
+
+    Parameters
+    ----------
+    value : object
+        Anything a TOML file can hold.
+    """
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, (list, tuple)):
+        return "a list"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and abs(value) >= 10**18:
+        return "an enormous number"
+    text = f"{float(value)!r}" if isinstance(value, float) else repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """Return a hint that names the valid word closest to `name`, then all of them.
 
@@ -57,4 +77,4 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     words = sorted(valid)
     close = difflib.get_close_matches(name, words, n=1, cutoff=0.5)
     hint = f"did you mean '{close[0]}'? " if close else ""
-    return f"{hint}allowed: {', '.join(words)}"
+    return f"{hint}allowed: {', '.join(words) or 'none'}"

@@ -11,9 +11,9 @@ import functools
 import math
 import re
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
-from drillctl.errors import InputError
+from drillctl.errors import InputError, shown
 
 RPM = math.pi / 30.0
 """One revolution a minute (rad/s)."""
@@ -127,38 +127,54 @@ def parse(value: object, kind: Kind) -> float:
     if isinstance(value, SI):
         return float(value)
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise InputError(f'{value!r} is not a {kind.name}; write it like "100 {kind.examples[0]}"')
+        raise _no_quantity(value, kind)
     if not isinstance(value, str):
-        return _bare(float(value), kind)
+        return _bare(value, kind)
     found = _TEXT.match(value)
     if found is None:
-        raise InputError(f'{value!r} is not a {kind.name}; write it like "100 {kind.examples[0]}"')
+        raise _no_quantity(value, kind)
     number = _magnitude(found, value)
     if not found["unit"]:
         return _bare(number, kind)
     try:
         return number * _factor(found["unit"], kind)
     except InputError as error:
-        raise InputError(f"{value!r}: {error.problem}") from None
+        raise InputError(f"{shown(value)}: {error.problem}") from None
+
+
+def _no_quantity(value: object, kind: Kind) -> InputError:
+    return InputError(
+        f'{shown(value)} is not a {kind.name}; write it like "100 {kind.examples[0]}"'
+    )
 
 
 def _magnitude(found: re.Match[str], value: str) -> float:
     """The number in front of the unit; `4 1/2` is four and a half."""
     if found["number"] is not None:
         return float(found["number"])
-    if int(found["under"]) == 0:
-        raise InputError(f"{value!r} divides by zero")
-    part = int(found["over"]) / int(found["under"])
+    # Not int(): Python refuses whole numbers of thousands of digits with an error of its own.
+    under = float(found["under"])
+    if under == 0.0:
+        raise InputError(f"{shown(value)} divides by zero")
+    part = float(found["over"]) / under
     whole = found["whole"]
     if whole is None:
         return part
-    return math.copysign(abs(int(whole)) + part, -1.0 if whole.startswith("-") else 1.0)
+    return math.copysign(abs(float(whole)) + part, -1.0 if whole.startswith("-") else 1.0)
 
 
 def _bare(number: float, kind: Kind) -> float:
+    """A number without unit: a gain, or refused with the suggestion."""
+    try:
+        value = float(number)
+    except OverflowError:
+        raise _no_quantity(number, kind) from None
     if kind.name == "gain":
-        return number
-    raise InputError(f'{number:g} has no unit; did you mean "{number:g} {kind.examples[0]}"?')
+        return value
+    if not math.isfinite(value):
+        raise _no_quantity(value, kind)
+    short = f"{value:.15g}"
+    raise InputError(f'{short} has no unit; did you mean "{short} {kind.examples[0]}"?')
 
 
 def write(value: float, kind: Kind) -> str:
@@ -167,7 +183,7 @@ def write(value: float, kind: Kind) -> str:
     Parameters
     ----------
     value : float
-        In `kind.si`.
+        In `kind.si`, finite.
     kind : Kind
         What it measures.
 
@@ -176,16 +192,61 @@ def write(value: float, kind: Kind) -> str:
     str
         In the first of the kind's units that is short and exact, else in SI, in full.
     """
+    value = float(value)
     for unit in kind.examples:
+        magnitude = value / _factor(unit, kind)
+        if not math.isfinite(magnitude):  # overflow: this unit is too small for it
+            continue
         for digits in (6, 10, 15):
-            text = f"{value / _factor(unit, kind):.{digits}g} {unit}"
+            text = f"{magnitude:.{digits}g} {unit}"
             if parse(text, kind) == value:
                 return text
     return f"{value!r} {kind.si}"
 
 
-def to_unit(value: Any, unit: str) -> Any:
-    """Convert an SI number or array to `unit`; an angle is a plain number of radians."""
-    units = registry()
-    measure = units.Quantity(1.0, unit)
-    return value / float(measure.to_base_units().magnitude)
+System = Literal["si", "field"]
+"""Units people read: rpm, kN, kN m, m; or rpm, klbf, klbf ft, ft."""
+
+_DISPLAY: dict[str, dict[str, tuple[str, str]]] = {
+    "si": {
+        "rad/s": ("rpm", "rpm"),
+        "N": ("kN", "kN"),
+        "N*m": ("kN*m", "kN m"),
+        "N*m*s/rad": ("N*m*s/rad", "N m s"),
+        "N*m/rad": ("N*m/rad", "N m"),
+        "kg*m^2": ("kg*m^2", "kg m²"),
+    },
+    "field": {
+        "rad/s": ("rpm", "rpm"),
+        "N": ("klbf", "klbf"),
+        "N*m": ("klbf*ft", "klbf ft"),
+        "m": ("ft", "ft"),
+        "N*m*s/rad": ("N*m*s/rad", "N m s"),
+        "N*m/rad": ("N*m/rad", "N m"),
+        "kg*m^2": ("kg*m^2", "kg m²"),
+    },
+}
+
+
+def displayed(value: Any, si_unit: str, system: System = "si") -> tuple[Any, str]:
+    """A value in the unit that people read, and that unit's name.
+
+    Parameters
+    ----------
+    value : float or ndarray
+        In `si_unit`.
+    si_unit : str
+        SI unit; one that has no usual other form is kept.
+    system : {'si', 'field'}
+        Whose units.
+
+    Returns
+    -------
+    value, name : float or ndarray, and str
+        Converted, and the unit as it is printed.
+    """
+    unit, name = _DISPLAY[system].get(si_unit, (si_unit, si_unit))
+    if unit == si_unit:
+        return value, name
+    factor = float(registry().Quantity(1.0, unit).to(si_unit).magnitude)
+    return value / factor, name

@@ -12,21 +12,23 @@ Exp = Callable[[Any], Any]
 class BitRockLaw(Protocol):
     """Torque on the bit against its speed and the weight on it."""
 
-    set_valued: bool
-    """True where the law is a set at zero speed, so that a bit can stand still."""
+    @property
+    def set_valued(self) -> bool:
+        """True where the law is a set at zero speed, so that a bit can stand still."""
+        ...
 
-    def static_torque(self, weight: float) -> float:
+    def static_torque(self, weight: Any) -> Any:
         """Largest torque on a bit at rest (N m) under `weight` (N)."""
         ...
 
-    def kinetic_torque_at_rest(self, weight: float) -> float:
+    def kinetic_torque_at_rest(self, weight: Any) -> Any:
         """Torque (N m) in the limit of a bit that turns ever slower under `weight` (N)."""
         ...
 
-    def steepest_fall(self, weight: float) -> float:
+    def steepest_fall(self, weight: Any) -> Any:
         """Largest value of minus the slope at any speed (N m s/rad) under `weight` (N)."""
         ...
 
-    def torque_and_slope(self, weight: float, speed: float, exp: Exp) -> tuple[float, float]:
+    def torque_and_slope(self, weight: Any, speed: Any, exp: Exp) -> tuple[Any, Any]:
         """Torque (N m) at `speed` >= 0 (rad/s) under `weight` (N), and its slope (N m s/rad)."""
         ...

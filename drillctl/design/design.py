@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl.bit_rock import BitRockLaw
 from drillctl.design import parts
-from drillctl.design.merging import Tree, branch, overlay
+from drillctl.design.merging import Tree, with_values
 from drillctl.design.tables import DesignTables
 from drillctl.design.validation import validated
 from drillctl.drillstring import Drillstring
+from drillctl.errors import InputError
 from drillctl.top_drive import TopDriveLaw
 from drillctl.weight_on_bit import WeightLaw
 
@@ -59,9 +60,10 @@ class Design:
         InputError
             Unknown path or impossible value.
         """
-        tree = self.tree
-        for path, value in values.items():
-            tree = overlay(tree, branch(path, value, tree))
+        try:
+            tree = with_values(self.tree, values)
+        except InputError as error:
+            raise (error.within(self.origin) if self.origin else error) from None
         return Design(self.name, validated(tree, self.origin), tree, self.origin)
 
     @property

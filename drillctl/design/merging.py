@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from drillctl.errors import InputError, nearest
+from drillctl.design.tables import DesignTables, refuse_same_names
+from drillctl.errors import InputError, nearest, shown
 
 Tree = dict[str, Any]
 
-# A table of coefficients and single coefficients say the same thing twice: whichever the
-# upper layer gives replaces the other.
-_ALTERNATIVES = {
-    "bit_rock": (("table",), ("a1", "a2", "beta")),
+# Keys that say the same thing in different ways: whichever way the upper layer takes
+# replaces the others.
+_ALTERNATIVES: dict[str, tuple[tuple[tuple[str, ...], ...], ...]] = {
+    "bit_rock": ((("table",), ("a1", "a2", "beta")),),
     "drillstring.sections": (
-        ("pipe",),
-        ("outer_diameter", "inner_diameter"),
-        ("polar_moment",),
-        ("stiffness",),
+        (("pipe",), ("outer_diameter", "inner_diameter"), ("polar_moment",), ("stiffness",)),
+        (("shear_modulus",), ("youngs_modulus", "poisson_ratio")),
     ),
 }
 
@@ -39,20 +38,25 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
     -------
     dict
         A new tree.
+
+    Raises
+    ------
+    InputError
+        Two sections of one layer bear the same name.
     """
-    if _changed(base, top, "law") or (path == "start" and _changed(base, top, "kind")):
+    if _changed(base, top, "law") or (path == "start" and _changed(base, top, "kind", "turning")):
         return dict(top)
     merged = dict(base)
-    for alternative in _ALTERNATIVES.get(path, ()):
-        if any(key in top for key in alternative):
-            for other in _ALTERNATIVES[path]:
-                if other != alternative:
-                    merged = {k: v for k, v in merged.items() if k not in other or k in top}
+    for ways in _ALTERNATIVES.get(path, ()):
+        taken = [way for way in ways if any(key in top for key in way)]
+        if taken:
+            left = {key for way in ways if way not in taken for key in way}
+            merged = {key: value for key, value in merged.items() if key not in left}
     for key, value in top.items():
         place = f"{path}.{key}" if path else key
         below = merged.get(key)
         if place == "drillstring.sections" and isinstance(value, list):
-            merged[key] = _overlay_sections(below or [], value)
+            merged[key] = _overlay_sections(below, value)
         elif isinstance(value, Mapping) and isinstance(below, Mapping):
             merged[key] = overlay(dict(below), value, place)
         else:
@@ -60,17 +64,53 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
     return merged
 
 
-def _changed(base: Mapping[str, Any], top: Mapping[str, Any], key: str) -> bool:
-    return key in top and key in base and top[key] != base[key]
+def _changed(
+    base: Mapping[str, Any], top: Mapping[str, Any], key: str, default: str | None = None
+) -> bool:
+    below = base.get(key, default)
+    return key in top and below is not None and top[key] != below
 
 
-def _overlay_sections(base: list[Tree], top: list[Tree]) -> list[Tree]:
-    merged = {section.get("name"): section for section in base}
+def _overlay_sections(base: object, top: list[Any]) -> list[Any]:
+    if not isinstance(base, list) or not (_named(base) and _named(top)):
+        return top  # not sections at all: left for the validation to tell
+    for layer in (base, top):
+        refuse_same_names([section["name"] for section in layer], "drillstring.sections")
+    merged = {section["name"]: section for section in base}
     for section in top:
-        name = section.get("name") if isinstance(section, Mapping) else None
+        name = section["name"]
         below = merged.get(name)
         merged[name] = section if below is None else overlay(below, section, "drillstring.sections")
     return list(merged.values())
+
+
+def _named(sections: list[Any]) -> bool:
+    return all(isinstance(s, Mapping) and isinstance(s.get("name"), str) for s in sections)
+
+
+def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
+    """A new tree with single values set by dotted path, in whatever order they are given.
+
+    Parameters
+    ----------
+    tree : dict
+        The design so far, merged over its model.
+    values : dict
+        Dotted path to value, as it would stand in the file.
+
+    Raises
+    ------
+    InputError
+        No such section.
+    """
+    # A law or a kind drops the numbers of the old one, so it goes before the new one's.
+    for path in sorted(values, key=lambda path: not path.endswith((".law", ".kind"))):
+        if "controller" not in tree and path.startswith("controller."):
+            # The default controller is what a gain alone is a change of.
+            controller = DesignTables.model_fields["controller"].default
+            tree = {**tree, "controller": controller.model_dump()}
+        tree = overlay(tree, branch(path, values[path], tree))
+    return tree
 
 
 def branch(path: str, value: object, tree: Tree) -> Tree:
@@ -88,24 +128,38 @@ def branch(path: str, value: object, tree: Tree) -> Tree:
     Raises
     ------
     InputError
-        No such section.
+        No such section, or a new name for one.
     """
     keys = path.split(".")
     if keys[:2] == ["drillstring", "sections"] and len(keys) > 2:
-        names = [s.get("name", "") for s in tree.get("drillstring", {}).get("sections", [])]
+        names = _section_names(tree)
         # A section's name may itself hold a dot: the longest name that fits is meant.
         rest = ".".join(keys[2:])
-        fitting = [n for n in names if rest.startswith(f"{n}.")]
+        fitting = [n for n in names if f"{rest}.".startswith(f"{n}.")]
         if not fitting:
             raise InputError(f"no section {keys[2]!r}; {nearest(keys[2], names)}", path)
         name = max(fitting, key=len)
-        entry = _nest(rest[len(name) + 1 :].split("."), value) | {"name": name}
-        return {"drillstring": {"sections": [entry]}}
+        if rest == name:
+            entry = value
+        else:
+            entry = _nest(rest[len(name) + 1 :].split("."), value)
+        if not isinstance(entry, Mapping):
+            raise InputError(f"got {shown(value)}; a section is a table", path)
+        if entry.get("name", name) != name:
+            raise InputError("a section cannot be renamed: its name is its address", path)
+        return {"drillstring": {"sections": [{**entry, "name": name}]}}
     return _nest(keys, value)
 
 
+def _section_names(tree: Tree) -> list[str]:
+    string = tree.get("drillstring")
+    sections = string.get("sections") if isinstance(string, Mapping) else None
+    return [s["name"] for s in sections] if isinstance(sections, list) and _named(sections) else []
+
+
 def _nest(keys: list[str], value: object) -> Tree:
-    for key in reversed(keys):
-        value = {key: value}
-    assert isinstance(value, dict)
-    return value
+    *parents, last = keys
+    tree: Tree = {last: value}
+    for key in reversed(parents):
+        tree = {key: tree}
+    return tree

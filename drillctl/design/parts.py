@@ -25,6 +25,8 @@ STEEL_POISSON_RATIO = 0.3
 """Poisson's ratio where a design gives Young's modulus alone."""
 ELEMENT_LENGTH = 100.0
 """Longest element (m) where a design does not say how many."""
+MOST_ELEMENTS = 10_000
+"""Elements of a whole string: some metres each; beyond, matrices outgrow the memory."""
 
 
 def drillstring(tables: DesignTables) -> Drillstring:
@@ -33,10 +35,10 @@ def drillstring(tables: DesignTables) -> Drillstring:
     Raises
     ------
     InputError
-        A node is left without inertia.
+        A node is left without inertia, or another reason of `refuse_impossible_string`.
     """
     table = tables.drillstring
-    refuse_massless_node(tables)
+    refuse_impossible_string(tables)
     return assemble(
         tuple(section(s) for s in table.sections),
         top_inertia=tables.top_drive.inertia,
@@ -94,12 +96,37 @@ def _cross_section(table: SectionTable) -> tuple[float, float]:
     if table.pipe is not None:
         outer, inner = PIPES[table.pipe].outer_diameter, PIPES[table.pipe].inner_diameter
     else:
-        assert table.outer_diameter is not None and table.inner_diameter is not None
+        assert table.outer_diameter is not None
+        assert table.inner_diameter is not None
         outer, inner = table.outer_diameter, table.inner_diameter
     limit = math.inf
     if table.grade is not None:
         limit = torsional_yield(outer, inner, GRADES[table.grade])
     return polar_moment(outer, inner), limit
+
+
+def refuse_impossible_string(tables: DesignTables) -> None:
+    """Refuse (`InputError`) a string that cannot be computed.
+
+    A node without inertia (its equation of motion would be singular), a section so extreme
+    that its stiffness or inertia is no number, or more elements than fit.
+    """
+    for table in tables.drillstring.sections:
+        where = f"drillstring.sections.{table.name}"
+        try:
+            made = section(table)
+        except OverflowError:
+            raise InputError("its dimensions are too large to compute with", where) from None
+        for name, value in (("stiffness", made.stiffness), ("inertia", made.inertia)):
+            least = math.inf if table.stiffness is None or name == "stiffness" else -1.0
+            if not math.isfinite(value) or (value == 0.0 and least > 0.0):
+                raise InputError(f"its dimensions give a {name} of {value:g}", where)
+    count = sum(section(table).elements for table in tables.drillstring.sections)
+    if count > MOST_ELEMENTS:
+        raise InputError(
+            f"{count} elements in all; allowed are {MOST_ELEMENTS}", "drillstring.sections"
+        )
+    refuse_massless_node(tables)
 
 
 def refuse_massless_node(tables: DesignTables) -> None:
@@ -121,17 +148,19 @@ def bit_rock(tables: DesignTables) -> BitRockLaw:
     Raises
     ------
     InputError
-        The weight lies outside the table and `outside_table` is `refuse`, or the factors
-        bring the static torque under the sliding one.
+        The weight lies outside the table and `outside_table` is `refuse`, or factors or
+        extrapolation give coefficients that no friction has.
     """
     table = tables.bit_rock
     if not isinstance(table, NavarroLopezSuarezTable):
         radius = table.bit_radius
-        return NavarroLopezSuarez(
+        law = NavarroLopezSuarez(
             a1=radius * table.sliding_coefficient,
             a2=radius * table.static_coefficient,
             beta=table.decay / table.reference_speed,
         )
+        _refuse_impossible_friction(law, tables)
+        return law
     law = _coefficients(table, tables.operating_point.weight_on_bit)
     law = NavarroLopezSuarez(
         law.a1 * table.a1_factor, law.a2 * table.a2_factor, law.beta * table.beta_factor
@@ -140,12 +169,22 @@ def bit_rock(tables: DesignTables) -> BitRockLaw:
         raise InputError(
             f"the factors give a2 = {law.a2:g}, less than a1 = {law.a1:g}", "bit_rock.a2_factor"
         )
+    _refuse_impossible_friction(law, tables)
     return law
+
+
+def _refuse_impossible_friction(law: NavarroLopezSuarez, tables: DesignTables) -> None:
+    """Refuse coefficients that overflow, or turn negative far outside a table."""
+    weight = tables.operating_point.weight_on_bit
+    for name, value in (*law._asdict().items(), ("static torque", law.static_torque(weight))):
+        if not 0.0 <= value < math.inf:
+            raise InputError(
+                f"its numbers give {name} = {value:g} at {weight / 1e3:g} kN", "bit_rock"
+            )
 
 
 def _coefficients(table: NavarroLopezSuarezTable, weight: float) -> NavarroLopezSuarez:
     if table.table is None:
-        assert table.a1 is not None and table.a2 is not None and table.beta is not None
         return NavarroLopezSuarez(table.a1, table.a2, table.beta)
     rows = WeightTable(
         weight=tuple(row.weight_on_bit for row in table.table),

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, get_args
 
 from drillctl import units
 from drillctl.design.design import Design
+from drillctl.design.quantities import number
 from drillctl.design.tables import Table
-from drillctl.errors import InputError, nearest
+from drillctl.errors import InputError, nearest, shown
 from drillctl.units import Kind
 
 _HIDDEN = ("title", "source", "status", "notes", "schema_version", "map")
@@ -38,13 +40,24 @@ class Parameter:
         return self.kind.si if self.kind else ""
 
     def parse(self, value: object) -> float:
-        """Read a value as it would stand in the file, into SI."""
+        """Read a value as it would stand in the file, into SI.
+
+        Raises
+        ------
+        InputError
+            Not a finite number, or not of this kind.
+        """
         if self.kind is not None:
-            return units.parse(value, self.kind)
-        try:
-            return float(value)  # type: ignore[arg-type]
-        except (TypeError, ValueError):
-            raise InputError(f"{value!r} is not a number") from None
+            found = units.parse(value, self.kind)
+            if not math.isfinite(found):
+                raise InputError(f"{shown(value)} is not a finite {self.kind.name}")
+            return found
+        if isinstance(value, str):
+            try:
+                value = float(value)
+            except ValueError:
+                raise InputError(f"{shown(value)} is not a number") from None
+        return number(value)
 
 
 def parameter(design: Design, path: str) -> Parameter:

@@ -4,84 +4,106 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import AfterValidator, BeforeValidator
+from pydantic import BeforeValidator
 
 from drillctl import units
-from drillctl.errors import InputError
+from drillctl.errors import InputError, shown
 from drillctl.units import Kind
 
+Check = Callable[[float, object], None]
+"""Refuses a number (SI) out of its range, telling what was written."""
 
-def _reader(kind: Kind) -> Callable[[object], float]:
+LARGEST_COUNT = 10**9
+"""Of anything that is counted: what is larger is a slip of the pen."""
+
+
+def _any(found: float, written: object) -> None:
+    pass
+
+
+def _positive(found: float, written: object) -> None:
+    if not found > 0:
+        raise InputError(f"{shown(written)} is not allowed: it must be greater than 0")
+
+
+def _not_negative(found: float, written: object) -> None:
+    if not found >= 0:
+        raise InputError(f"{shown(written)} is not allowed: it must be 0 or more")
+
+
+def _read(kind: Kind, check: Check = _any) -> BeforeValidator:
     def read(value: object) -> float:
-        number = units.parse(value, kind)
-        if not math.isfinite(number):
-            raise InputError(f"{value!r} is not a finite {kind.name}")
-        return number
+        found = units.parse(value, kind)
+        if not math.isfinite(found):
+            raise InputError(f"{shown(value)} is not a finite {kind.name}")
+        check(found, value)
+        return found + 0.0  # never -0.0: equal designs have equal hashes
 
-    return read
-
-
-def _positive(value: float) -> float:
-    if not value > 0:
-        raise InputError(f"{value:g} is not allowed: it must be greater than 0")
-    return value
+    return BeforeValidator(read)
 
 
-def _not_negative(value: float) -> float:
-    if not value >= 0:
-        raise InputError(f"{value:g} is not allowed: it must be 0 or more")
-    return value
-
-
-def _number(value: object) -> float:
+def number(value: object) -> float:
+    """Read a number without unit; refused (`InputError`) unless it is finite."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f"{value!r} is not a number; write it without quotes or unit")
-    if not math.isfinite(value):
-        raise InputError(f"{value!r} is not a finite number")
-    return float(value)
+        raise InputError(f"{shown(value)} is not a number; write it without quotes or unit")
+    try:
+        found = float(value)
+    except OverflowError:
+        found = math.inf
+    if not math.isfinite(found):
+        raise InputError(f"{shown(value)} is not a finite number")
+    return found + 0.0
 
 
-def _whole(value: object) -> int:
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise InputError(f"{value!r} is not a whole number")
-    return value
+def _number(check: Check = _any) -> BeforeValidator:
+    def read(value: object) -> float:
+        found = number(value)
+        check(found, value)
+        return found
+
+    return BeforeValidator(read)
 
 
-def _quantity(kind: Kind, allowed: Callable[[float], float] | None = None) -> Any:
-    """Annotated float that is read from text with a unit; `kind` is kept for writing it out."""
-    checks = [BeforeValidator(_reader(kind))]
-    if allowed is not None:
-        checks.append(AfterValidator(allowed))  # type: ignore[arg-type]
-    return Annotated[float, kind, *checks]
+def _count(check: Check) -> BeforeValidator:
+    def read(value: object) -> int:
+        if isinstance(value, float) and value.is_integer():
+            value = int(value)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise InputError(f"{shown(value)} is not a whole number")
+        if value > LARGEST_COUNT:
+            raise InputError(f"{shown(value)} is not allowed: at most {LARGEST_COUNT}")
+        check(value, value)
+        return value
+
+    return BeforeValidator(read)
 
 
-Number = Annotated[float, BeforeValidator(_number)]
-PositiveNumber = Annotated[float, BeforeValidator(_number), AfterValidator(_positive)]
-NonNegativeNumber = Annotated[float, BeforeValidator(_number), AfterValidator(_not_negative)]
-Count = Annotated[int, BeforeValidator(_whole), AfterValidator(_positive)]
-CountOrZero = Annotated[int, BeforeValidator(_whole), AfterValidator(_not_negative)]
+# A float with the `Kind` it is read and written by, and the range it must lie in.
+Number = Annotated[float, _number()]
+PositiveNumber = Annotated[float, _number(_positive)]
+NonNegativeNumber = Annotated[float, _number(_not_negative)]
+Count = Annotated[int, _count(_positive)]
+CountOrZero = Annotated[int, _count(_not_negative)]
 
-Speed = _quantity(units.SPEED)
-PositiveSpeed = _quantity(units.SPEED, _positive)
-Weight = _quantity(units.FORCE, _not_negative)
-Torque = _quantity(units.TORQUE)
-Length = _quantity(units.LENGTH, _positive)
-Diameter = _quantity(units.DIAMETER, _positive)
-Bore = _quantity(units.DIAMETER, _not_negative)
-Time = _quantity(units.TIME, _positive)
-TimeOrZero = _quantity(units.TIME, _not_negative)
-Rate = _quantity(units.RATE, _not_negative)
-Inertia = _quantity(units.INERTIA, _not_negative)
-Density = _quantity(units.DENSITY, _positive)
-Modulus = _quantity(units.MODULUS, _positive)
-PolarMoment = _quantity(units.POLAR_MOMENT, _positive)
-Stiffness = _quantity(units.STIFFNESS, _positive)
-Damping = _quantity(units.DAMPING, _not_negative)
-Drag = _quantity(units.DRAG, _not_negative)
-Slowness = _quantity(units.SLOWNESS, _not_negative)
-ProportionalGain = _quantity(units.PROPORTIONAL_GAIN)
-IntegralGain = _quantity(units.INTEGRAL_GAIN)
+Speed = Annotated[float, units.SPEED, _read(units.SPEED)]
+PositiveSpeed = Annotated[float, units.SPEED, _read(units.SPEED, _positive)]
+Weight = Annotated[float, units.FORCE, _read(units.FORCE, _not_negative)]
+Torque = Annotated[float, units.TORQUE, _read(units.TORQUE)]
+Length = Annotated[float, units.LENGTH, _read(units.LENGTH, _positive)]
+Diameter = Annotated[float, units.DIAMETER, _read(units.DIAMETER, _positive)]
+Bore = Annotated[float, units.DIAMETER, _read(units.DIAMETER, _not_negative)]
+Time = Annotated[float, units.TIME, _read(units.TIME, _positive)]
+TimeOrZero = Annotated[float, units.TIME, _read(units.TIME, _not_negative)]
+Rate = Annotated[float, units.RATE, _read(units.RATE, _not_negative)]
+Inertia = Annotated[float, units.INERTIA, _read(units.INERTIA, _not_negative)]
+Density = Annotated[float, units.DENSITY, _read(units.DENSITY, _positive)]
+Modulus = Annotated[float, units.MODULUS, _read(units.MODULUS, _positive)]
+PolarMoment = Annotated[float, units.POLAR_MOMENT, _read(units.POLAR_MOMENT, _positive)]
+Stiffness = Annotated[float, units.STIFFNESS, _read(units.STIFFNESS, _positive)]
+Damping = Annotated[float, units.DAMPING, _read(units.DAMPING, _not_negative)]
+Drag = Annotated[float, units.DRAG, _read(units.DRAG, _not_negative)]
+Slowness = Annotated[float, units.SLOWNESS, _read(units.SLOWNESS, _not_negative)]
+ProportionalGain = Annotated[float, units.PROPORTIONAL_GAIN, _read(units.PROPORTIONAL_GAIN)]
+IntegralGain = Annotated[float, units.INTEGRAL_GAIN, _read(units.INTEGRAL_GAIN)]

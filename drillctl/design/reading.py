@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from drillctl import catalog
 from drillctl.design.design import Design
-from drillctl.design.merging import Tree, branch, overlay
+from drillctl.design.merging import Tree, overlay, with_values
 from drillctl.design.validation import validated
-from drillctl.errors import InputError
+from drillctl.errors import InputError, shown
 
 
 def load(name_or_path: str | Path, **values: Any) -> Design:
@@ -35,11 +36,10 @@ def load(name_or_path: str | Path, **values: Any) -> Design:
     """
     path = catalog.find(str(name_or_path))
     tree = _merged(path, seen=())
-    for key, value in values.items():
-        try:
-            tree = overlay(tree, branch(key, value, tree))
-        except InputError as error:
-            raise error.within(str(path)) from None
+    try:
+        tree = with_values(tree, values)
+    except InputError as error:
+        raise error.within(str(path)) from None
     return Design(path.stem, validated(tree, str(path)), tree, str(path))
 
 
@@ -50,31 +50,41 @@ def _merged(path: Path, seen: tuple[Path, ...]) -> Tree:
     if model is None:
         return tree
     if not isinstance(model, str):
-        raise InputError(f"got {model!r}; a model is a name or a path in quotes", f"{path}: model")
+        raise InputError(
+            f"got {shown(model)}; a model is a name or a path in quotes", f"{path}: model"
+        )
     try:
         below = _model_path(model, path)
     except InputError as error:
-        raise InputError(f"{model!r}: {error.problem}", f"{path}: model") from None
+        raise InputError(f"{shown(model)}: {error.problem}", f"{path}: model") from None
     if below in (*seen, path.resolve()):
         raise InputError(f"{model!r} leads back to this file", f"{path}: model")
-    return overlay(_merged(below, (*seen, path.resolve())), tree)
+    base = _merged(below, (*seen, path.resolve()))
+    try:
+        return overlay(base, tree)
+    except InputError as error:
+        raise error.within(str(path)) from None
 
 
 def _model_path(model: str, design: Path) -> Path:
     """A model given as a path is looked for beside the design first."""
     beside = design.parent / model
-    if beside.suffix == ".toml" and beside.is_file():
-        return beside.resolve()
+    with suppress(OSError):  # a name no file can have; `find` tells it
+        if beside.suffix == ".toml" and beside.is_file():
+            return beside.resolve()
     return catalog.find(model, ("models", "designs")).resolve()
 
 
 def _read(path: Path) -> Tree:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"broken TOML: {error}", str(path)) from None
+        # utf-8-sig: some editors put a byte-order mark in front.
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(f"not UTF-8 text: {error}", str(path)) from None
+    except RecursionError:
+        raise InputError("broken TOML: nested too deeply", str(path)) from None
+    except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
+        raise InputError(f"broken TOML: {error}", str(path)) from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", str(path)) from None
 
@@ -92,5 +102,32 @@ def parse_setting(text: str) -> tuple[str, Any]:
         raise InputError(f"{text!r} is not of the form dotted.path=VALUE", "--set")
     try:
         return path.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return path.strip(), value.strip()
+
+
+def parse_axis(text: str) -> Tree:
+    """Read `path=min:max:points` of the command line into an axis table.
+
+    Raises
+    ------
+    InputError
+        Another form, or points that are not a whole number.
+    """
+    path, equals, ends = text.partition("=")
+    parts = ends.split(":")
+    if not equals or len(parts) != 3:
+        raise InputError(f"{text!r} is not of the form path=min:max:points", "--axis")
+    try:
+        points = int(parts[2])
+    except ValueError:
+        raise InputError(f"{shown(parts[2])} is not a number of points", f"--axis {path}") from None
+    low, high = (_number_or_text(part.strip()) for part in parts[:2])
+    return {"path": path.strip(), "min": low, "max": high, "points": points}
+
+
+def _number_or_text(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text

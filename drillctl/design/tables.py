@@ -6,6 +6,7 @@ the class that holds both.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -13,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from drillctl import units
 from drillctl.design import quantities as q
 from drillctl.drillstring import GRADES, PIPES
-from drillctl.errors import InputError, nearest
+from drillctl.errors import InputError, nearest, shown
 
 
 class Table(BaseModel):
@@ -87,11 +88,13 @@ class SectionTable(Table):
     def _only_lumped_keys(self) -> None:
         distributed = (
             "length", "grade", "inner_diameter", "shear_modulus", "youngs_modulus",
-            "poisson_ratio", "density", "drag",
+            "poisson_ratio", "density",
         )  # fmt: skip
-        for key in distributed:
-            if getattr(self, key):
-                raise InputError(f"{key} does not go with stiffness (a lumped spring)")
+        given = [key for key in distributed if getattr(self, key) is not None]
+        given += ["drag"] if self.drag else []
+        given += ["tool_joint_factor"] if self.tool_joint_factor != 1.0 else []
+        for key in given:
+            raise InputError(f"{key} does not go with stiffness (a lumped spring)")
         if (self.elements or 1) != 1:
             raise InputError("elements must be 1 for a lumped spring (stiffness)")
 
@@ -100,8 +103,8 @@ class SectionTable(Table):
             raise InputError('length is missing, e.g. length = "3000 m"')
         if self.inertia is not None:
             raise InputError("inertia goes with stiffness (a lumped spring) only")
-        if self.pipe is not None and self.inner_diameter is not None:
-            raise InputError("inner_diameter is already given by pipe")
+        if self.outer_diameter is None and self.inner_diameter is not None:
+            raise InputError("inner_diameter goes with outer_diameter only")
         if self.outer_diameter is not None:
             if self.inner_diameter is None:
                 raise InputError('inner_diameter is missing ("0 mm" for a solid bar)')
@@ -114,8 +117,17 @@ class SectionTable(Table):
             raise InputError("grade needs pipe or outer_diameter, not polar_moment")
         if self.shear_modulus is not None and self.youngs_modulus is not None:
             raise InputError("give shear_modulus or youngs_modulus, not both")
+        if self.poisson_ratio is not None and self.youngs_modulus is None:
+            raise InputError("poisson_ratio goes with youngs_modulus only")
         if self.poisson_ratio is not None and not -1.0 < self.poisson_ratio < 0.5:
             raise InputError(f"poisson_ratio {self.poisson_ratio:g} must lie between -1 and 0.5")
+
+
+def refuse_same_names(names: list[str], where: str = "") -> None:
+    """Refuse (`InputError`) two sections of one name: the name is the section's address."""
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"two sections are called {name!r}; names must differ", where)
 
 
 class DrillstringTable(Table):
@@ -130,10 +142,7 @@ class DrillstringTable(Table):
     def _named_once(cls, sections: tuple[SectionTable, ...]) -> tuple[SectionTable, ...]:
         if not sections:
             raise InputError("a drillstring needs at least one section")
-        names = [section.name for section in sections]
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(f"two sections are called {name!r}; names must differ")
+        refuse_same_names([section.name for section in sections])
         return sections
 
 
@@ -190,7 +199,7 @@ class NavarroLopezSuarezTable(Table):
             if len(table) < 2:
                 raise InputError("a table needs two rows or more; give a1, a2 and beta instead")
             weights = [row.weight_on_bit for row in table]
-            if any(b <= a for a, b in zip(weights, weights[1:], strict=False)):
+            if any(b <= a for a, b in pairwise(weights)):
                 raise InputError("weight_on_bit must increase from row to row")
         return table
 
@@ -204,7 +213,8 @@ class NavarroLopezSuarezTable(Table):
             missing = [key for key in numbers if key not in given]
             raise InputError(f"{', '.join(missing)} missing: give a1, a2 and beta, or a table")
         if self.table is None:
-            assert self.a1 is not None and self.a2 is not None
+            assert self.a1 is not None
+            assert self.a2 is not None
             _refuse_rising(self.a1 * self.a1_factor, self.a2 * self.a2_factor)
         return self
 
@@ -299,6 +309,11 @@ class AxisTable(Table):
     max: float | str
     points: q.Count
 
+    @field_validator("min", "max", mode="before")
+    @classmethod
+    def _number_or_quantity(cls, value: object) -> object:
+        return value if isinstance(value, str) else q.number(value)
+
     @field_validator("points")
     @classmethod
     def _two_or_more(cls, value: int) -> int:
@@ -367,8 +382,10 @@ class DesignTables(Table):
     @model_validator(mode="before")
     @classmethod
     def _has_schema(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "schema" in data and data["schema"] != 1:
-            raise InputError(
-                f"schema = {data['schema']!r} is not known; this version reads schema = 1"
-            )
+        if isinstance(data, dict) and "schema" in data:
+            came = data["schema"]
+            if came != 1 or not isinstance(came, int) or isinstance(came, bool):
+                raise InputError(
+                    f"schema = {shown(came)} is not known; this version reads schema = 1"
+                )
         return data

@@ -8,9 +8,17 @@ from pydantic import BaseModel, ValidationError
 
 from drillctl.design.merging import Tree
 from drillctl.design.tables import BitRockTable, ControllerTable, DesignTables
-from drillctl.errors import InputError, nearest
+from drillctl.errors import InputError, nearest, shown
 
 _LAWS = {"bit_rock": BitRockTable, "controller": ControllerTable}
+
+_TYPES = {
+    "tuple_type": "it must be a list",
+    "model_type": "it must be a table",
+    "model_attributes_type": "it must be a table",
+    "string_type": "it must be text in quotes",
+}
+"""What is due, by pydantic's name of the error."""
 
 
 def validated(tree: Tree, origin: str) -> DesignTables:
@@ -32,7 +40,7 @@ def validated(tree: Tree, origin: str) -> DesignTables:
 
     try:
         tables = DesignTables.model_validate(tree)
-        parts.refuse_massless_node(tables)
+        parts.refuse_impossible_string(tables)
         parts.bit_rock(tables)
     except ValidationError as error:
         raise _told(error.errors()[0], tree, origin) from None
@@ -56,16 +64,19 @@ def _told(problem: Any, tree: Tree, origin: str) -> InputError:
         return InputError(str(problem["ctx"]["error"]), where)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         laws = sorted(_law_names(str(problem["loc"][0])))
-        came = problem["ctx"].get("tag") if kind == "union_tag_invalid" else None
-        if came is None:
+        if kind == "union_tag_not_found":
             return InputError(f"law is missing; allowed: {', '.join(laws)}", where)
-        return InputError(f"no law {came!r}; {nearest(came, laws)}", f"{where}.law")
+        came = problem["input"]["law"]
+        return InputError(f"no law {shown(came)}; {nearest(str(came), laws)}", f"{where}.law")
     if kind == "literal_error":
         allowed = problem["ctx"]["expected"].replace(" or ", ", ").replace("'", "").split(", ")
         return InputError(
-            f"got {problem['input']!r}; {nearest(str(problem['input']), allowed)}", where
+            f"got {shown(problem['input'])}; {nearest(str(problem['input']), allowed)}", where
         )
-    return InputError(f"got {problem['input']!r}; {problem['msg']}", where)
+    due = _TYPES.get(kind, problem["msg"])
+    if where.endswith("drillstring.sections") and kind == "tuple_type":
+        due = "it must be a list of tables, each under [[drillstring.sections]]"
+    return InputError(f"got {shown(problem['input'])}; {due}", where)
 
 
 def _law_names(table: str) -> list[str]:
@@ -81,13 +92,18 @@ def _path(loc: tuple[str | int, ...], tree: Tree) -> str:
         if isinstance(step, int):
             here = here[step] if isinstance(here, list) and step < len(here) else None
             name = here.get("name") if isinstance(here, dict) else None
-            words.append(str(name) if name else str(step + 1))
+            words.append(_printed(name) if name and isinstance(name, str) else str(step + 1))
         elif isinstance(here, dict) and here.get("law") == step and step not in here:
             continue
         else:
             here = here.get(step) if isinstance(here, dict) else None
-            words.append(step)
+            words.append(_printed(step))
     return ".".join(words)
+
+
+def _printed(key: str) -> str:
+    """A key as it stands in a one-line message."""
+    return key if key.isprintable() else repr(key)
 
 
 def _keys_at(loc: tuple[str | int, ...]) -> list[str]:
@@ -96,8 +112,9 @@ def _keys_at(loc: tuple[str | int, ...]) -> list[str]:
     for step in loc:
         if isinstance(step, int):
             continue
-        if step in model.model_fields:
-            model = model.model_fields[step].annotation
+        fields = getattr(model, "model_fields", {})
+        if step in fields:
+            model = fields[step].annotation
         model = _table_class(model, step)
     return [f.alias or key for key, f in model.model_fields.items()]
 

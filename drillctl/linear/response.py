@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError, nearest
-from drillctl.linear.plant import INPUTS, OUTPUTS
+from drillctl.linear.state_space import INPUTS, OUTPUTS
 
 if TYPE_CHECKING:
     import xarray

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from drillctl.linear.modes import Mode, Modes
+from drillctl.linear.modal import Mode, Modes
 from drillctl.plots import style
 
 SHOWN = 4

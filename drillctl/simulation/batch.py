@@ -61,13 +61,14 @@ class Prepared:
         The string's exact step.
     scheme : Scheme
         Step and modes.
-    table : SimulationTable
-        Duration and J1 window.
+    duration, j1_from : float
+        Length of the run, and where the J1 window begins (s).
     """
 
     stepper: StringStep
     scheme: Scheme
-    table: SimulationTable
+    duration: float
+    j1_from: float
 
 
 def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
@@ -80,7 +81,8 @@ def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
     """
     inertia = bit_inertia(lanes.string)
     scheme = choose_scheme(lanes.string, table, lanes.steepest_fall, inertia)
-    return Prepared(string_step(lanes.string, scheme.step, scheme.modes), scheme, table)
+    stepper = string_step(lanes.string, scheme.step, scheme.modes)
+    return Prepared(stepper, scheme, table.duration, table.j1_from)
 
 
 def run_batch(lanes: Lanes, prepared: Prepared) -> Batch:
@@ -100,6 +102,12 @@ def run_batch(lanes: Lanes, prepared: Prepared) -> Batch:
     """
     raw = [_run(part, prepared, 0)[0] for part in _chunks(lanes)]
     return _measured(np.concatenate(raw, axis=1), lanes, prepared)
+
+
+def warm_up(lanes: Lanes, prepared: Prepared) -> None:
+    """Compile the kernel for these laws, or load it from disk, by a run of a single step."""
+    one = Scheme(prepared.scheme.step, 1, prepared.scheme.modes)
+    _run(lanes[:1], Prepared(prepared.stepper, one, one.step, 0.0), 0)
 
 
 def trace(lanes: Lanes, prepared: Prepared, interval: float) -> tuple[Array, dict[str, Array]]:
@@ -126,7 +134,7 @@ def trace(lanes: Lanes, prepared: Prepared, interval: float) -> tuple[Array, dic
     every = max(1, round(interval / prepared.scheme.step))
     parts = [_run(part, prepared, every)[1] for part in _chunks(lanes)]
     traces = np.concatenate(parts, axis=1)
-    time = np.arange(len(traces)) * every * prepared.scheme.step
+    time = np.arange(len(traces), dtype=float) * every * prepared.scheme.step
     return time, {name: traces[:, :, i] for i, name in enumerate(TRACED)}
 
 
@@ -148,12 +156,12 @@ def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
         padded.string, padded.start, padded.set_speed, padded.turning_speed, static
     )
     state = prepared.stepper.state(angle, speed, padded.set_speed)
-    scheme, table = prepared.scheme, prepared.table
+    scheme, duration = prepared.scheme, prepared.duration
     samples = scheme.steps // every + 1 if every else 0
     measures = np.empty((MEASURES, len(padded)))
     traces = np.empty((samples, len(padded), len(TRACED)))
-    window = min(m.WINDOW, table.duration)
-    ticks = Clock(scheme.step, scheme.steps, table.j1_from, table.duration - window, every)
+    window = min(m.WINDOW, duration)
+    ticks = Clock(scheme.step, scheme.steps, prepared.j1_from, duration - window, every)
     speeds = np.stack([padded.set_speed, speed[-1] + padded.set_speed])
     run(
         prepared.stepper.string, padded.friction, padded.drive, padded.weight,
@@ -169,8 +177,7 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
     def row(name: int) -> Array:
         return raw[(name - r.FIRST_MEASURE) // r.WIDTH]
 
-    table = prepared.table
-    duration = table.duration
+    duration = prepared.duration
     window = min(m.WINDOW, duration)
     with np.errstate(all="ignore"):  # undefined measures become NaN and are told as such
         j1 = row(r.J1) / lanes.set_speed
@@ -180,7 +187,7 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
         nominal = lanes.nominal_weight * lanes.set_speed * duration
         values = {
             "j1": j1,
-            "j1_rate": j1 / (duration - table.j1_from),
+            "j1_rate": j1 / (duration - prepared.j1_from),
             "stuck_time": row(r.STUCK_TIME),
             "sticks": row(r.STICKS),
             "stick_slip_index": _where((row(r.LATE_HIGH) > 0.0) & (late_mean > 0.0), index),
@@ -197,7 +204,7 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
             "work_per_turn": _where(turned > 1e-3, row(r.WORK) / turned),
             "time_outside_table": np.zeros(len(lanes)),
         }
-    finite = np.isfinite(raw).all(axis=0)
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(raw).all(axis=0))
     status = _statuses(finite, row(r.LATE_STUCK), window, values["settling_time_wide"])
     for name in FLOATS:  # a lane that failed has no measures at all
         values[name] = _where(finite, values[name])

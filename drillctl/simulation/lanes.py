@@ -50,19 +50,20 @@ class Lanes:
 
     def __getitem__(self, chosen: slice | NDArray[np.int64]) -> Lanes:
         """Some of the lanes."""
-        return Lanes(
-            self.string,
-            *(type(law)(*(v[chosen] for v in law)) for law in self.laws),
-            self.set_speed[chosen],
-            self.turning_speed[chosen],
-            self.nominal_weight[chosen],
-            self.start,
-        )
 
-    @property
-    def laws(self) -> tuple[Any, Any, Any]:
-        """Friction, drive and weight."""
-        return self.friction, self.drive, self.weight
+        def some(law: Any) -> Any:
+            return type(law)(*(numbers[chosen] for numbers in law))
+
+        return Lanes(
+            string=self.string,
+            friction=some(self.friction),
+            drive=some(self.drive),
+            weight=some(self.weight),
+            set_speed=self.set_speed[chosen],
+            turning_speed=self.turning_speed[chosen],
+            nominal_weight=self.nominal_weight[chosen],
+            start=self.start,
+        )
 
     @cached_property
     def steepest_fall(self) -> float:

@@ -10,6 +10,7 @@ dense matrix instead. Off-diagonal damping is never dropped.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -167,7 +168,7 @@ def _held(a: Array, b: Array, step: float) -> tuple[Array, Array]:
     return propagated[..., :states, :states], propagated[..., :states, states:]
 
 
-def _blocks(modal: _Modal, step: float) -> tuple[dict[str, Array], Array] | None:
+def _blocks(modal: _Modal, step: float) -> tuple[dict[str, Any], Array] | None:
     """Fields of a `BlockString` and the matrix from modal to block states; None if unfit."""
     found = _block_basis(modal)
     if found is None:
@@ -204,7 +205,7 @@ def _blocks(modal: _Modal, step: float) -> tuple[dict[str, Array], Array] | None
         "speed_by_bit": float(-push[:, 1, 1].sum()),
     }
     to_block = np.einsum("bij,bjk->bik", reading, inverse.reshape(count, 2, -1))
-    return fields, to_block.reshape(2 * count, -1)  # type: ignore[return-value]
+    return fields, to_block.reshape(2 * count, -1)
 
 
 def _block_basis(modal: _Modal) -> tuple[Array, Array] | None:
@@ -225,7 +226,7 @@ def _block_basis(modal: _Modal) -> tuple[Array, Array] | None:
         columns = np.hstack([np.eye(states)[:, [0, n]], columns])
     if np.linalg.cond(columns) > WORST_CONDITION:
         return None
-    return columns, np.linalg.inv(columns)
+    return columns, np.asarray(np.linalg.inv(columns), dtype=float)
 
 
 def _real_columns(poles: Array, vectors: Array) -> Array:
@@ -238,7 +239,7 @@ def _real_columns(poles: Array, vectors: Array) -> Array:
     return np.array(columns).T
 
 
-def _dense(modal: _Modal, step: float) -> tuple[dict[str, Array], Array]:
+def _dense(modal: _Modal, step: float) -> tuple[dict[str, Any], Array]:
     """Fields of a `DenseString`, whose states are the modal ones."""
     free, push = _held(modal.a, modal.b, step)
     s = modal.signals
@@ -256,4 +257,4 @@ def _dense(modal: _Modal, step: float) -> tuple[dict[str, Array], Array]:
         "speed_by_top": float(by[1, 0]),
         "speed_by_bit": float(-by[1, 1]),
     }
-    return fields, np.eye(len(modal.a))  # type: ignore[return-value]
+    return fields, np.eye(len(modal.a))

@@ -73,6 +73,12 @@ class Simulation:
     energy: EnergyAudit | None
 
     @property
+    def share_of_yield(self) -> float | None:
+        """Peak pipe torque over the torsional yield of the uppermost pipe; None if unknown."""
+        limit = self.design.string.yield_torque
+        return self.measures.peak_pipe_torque / limit if math.isfinite(limit) else None
+
+    @property
     def data(self) -> xarray.Dataset:
         """The signals as a labelled dataset over `time`."""
         import xarray
@@ -147,7 +153,7 @@ def _signals(design: Design, state: Array, direction: Array) -> dict[str, Array]
     bit_speed = np.where(direction == 0.0, 0.0, speed[-1] + design.speed)
     top_torque = np.asarray(design.top_drive.torque(angle[0], speed[0])) + 0.0 * angle[0]
     weight = np.broadcast_to(design.weight_on_bit.weight(bit_speed), bit_speed.shape)
-    friction, _ = design.bit_rock.torque_and_slope(weight, np.abs(bit_speed), np.exp)  # type: ignore[call-overload]
+    friction, _ = design.bit_rock.torque_and_slope(weight, np.abs(bit_speed), np.exp)
     _, reaction = stick_phase(design.string, design.speed)
     holding = reaction.motion @ state[: 2 * nodes] + reaction.load + reaction.top * top_torque
     stiffness, damping = design.string.element_stiffness[0], design.string.element_damping[0]
@@ -176,7 +182,7 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
     late_low, late_high = _extremes(motion, duration - window, bit[late])
     mean = design.speed + _bit_angle_change(motion, 0.0, duration) / duration
     late_mean = design.speed + _bit_angle_change(motion, duration - window, duration) / window
-    j1 = _deviation(motion, since, duration) / design.speed
+    j1 = deviation(motion, since, duration) / design.speed
     weight = float(signals["weight_on_bit"].mean())
     return m.Measures(
         j1=j1,
@@ -232,7 +238,7 @@ def _bit_angle_change(motion: Motion, begin: float, end: float) -> float:
     return float(_bit_angle(motion.pieces[-1], end) - _bit_angle(first, begin))
 
 
-def _deviation(motion: Motion, begin: float, end: float) -> float:
+def deviation(motion: Motion, begin: float, end: float) -> float:
     """Integral of abs(bit speed - set speed) (rad).
 
     Between two crossings of the set speed the deviation keeps its sign, and its integral is

@@ -6,7 +6,8 @@ that both are zero in steady drilling.
 
 - `torque(angle, speed)`: torque (N m) on the top-drive inertia; the reference solver's form.
 - `mean_torque(angle, rate)`: mean torque over a step of length 1 / `rate` that starts at
-  `angle`, as the pair (offset, slope) of `offset - slope * angle_at_the_end`; the batch engine's form.
+  `angle`, as the pair (offset, slope) of `offset - slope * angle_at_the_end`; the batch
+  engine's form.
 """
 
 from drillctl.top_drive.constant_torque import ConstantTorque

@@ -21,7 +21,7 @@ class ConstantTorque(NamedTuple):
         return self.level
 
     def mean_torque(self, angle: Any, rate: Any) -> tuple[Any, Any]:
-        """Offset (N m) and slope (N m/rad) of the mean torque over a step; `rate` = 1 / step (1/s)."""
+        """Offset (N m) and slope (N m/rad) of the mean torque over a step of 1 / `rate` (s)."""
         return self.level, 0.0
 
     def gains(self) -> tuple[Any, Any]:

@@ -30,7 +30,7 @@ class PI(NamedTuple):
         return -self.kp * speed - self.ki * angle
 
     def mean_torque(self, angle: Any, rate: Any) -> tuple[Any, Any]:
-        """Offset (N m) and slope (N m/rad) of the mean torque over a step from `angle`; `rate` = 1 / step (1/s).
+        """Offset (N m) and slope (N m/rad) of the mean torque over a step of 1 / `rate` (s).
 
         The mean speed over a step is the change of angle over its length, exactly, so that
         the discrete controller can only take from the string what it takes on paper.

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 
 class WeightLaw(Protocol):
     """Weight on bit against bit speed."""
 
-    def weight(self, bit_speed: float) -> float:
+    def weight(self, bit_speed: Any) -> Any:
         """Weight on bit (N) at `bit_speed` (rad/s)."""
         ...

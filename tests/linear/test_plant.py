@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 import drillctl
 from drillctl.linear import closed_loop, open_loop, plant
-from drillctl.linear.plant import closed_loop_matrices, plant_matrices
+from drillctl.linear.state_space import closed_loop_matrices, plant_matrices
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

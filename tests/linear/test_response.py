@@ -10,7 +10,7 @@ import pytest
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import frequency_response, plant
-from drillctl.linear.plant import INPUTS, OUTPUTS
+from drillctl.linear.state_space import INPUTS, OUTPUTS
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

@@ -1,0 +1,261 @@
+"""The command line: one verb a function, no numerics.
+
+Every verb takes a design by path or shipped name. Exit codes: 0 done, 2 the input is wrong,
+130 interrupted, 1 anything else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from drillctl import __version__
+from drillctl.errors import DrillctlError, InputError
+
+if TYPE_CHECKING:
+    from drillctl.design import Design
+
+app = typer.Typer(
+    name="drillctl",
+    help="Control design against torsional stick-slip of oil-well drillstrings.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+DesignName = Annotated[str, typer.Argument(metavar="DESIGN", help="Path or shipped name.")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="PATH=VALUE", help="Set a value, e.g. controller.kp=300."),
+]
+Axes = Annotated[
+    list[str] | None,
+    typer.Option("--axis", metavar="PATH=MIN:MAX:POINTS", help="Axis of a map; repeat for more."),
+]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results.")]
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, nothing else.")]
+Threads = Annotated[int | None, typer.Option("--threads", min=1, help="Threads to use.")]
+Units = Annotated[
+    Literal["si", "field"], typer.Option("--units", help="kN, kN m, m or klbf, klbf ft, ft.")
+]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more on stderr.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the verbs that compute have in common."""
+
+    out: Path | None
+    json: bool
+    units: Literal["si", "field"]
+    verbose: bool
+
+
+def run(arguments: list[str]) -> int:
+    """Run a command line and return its exit code; errors are told in one message."""
+    from drillctl import console
+
+    debug = "--debug" in arguments
+    usage_error: Any = typer.BadParameter.__mro__[1]
+    try:
+        code = app(arguments, standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except InputError as error:
+        if debug:
+            raise
+        console.note(f"drillctl: {error}")
+        return 2
+    except usage_error as error:
+        console.note(f"drillctl: {error.format_message()}")
+        return 2
+    except (KeyboardInterrupt, typer.Abort):
+        console.note("drillctl: interrupted; finished blocks are kept, run it again to go on")
+        return 130
+    except typer.Exit as stop:
+        return int(stop.exit_code)
+    except DrillctlError as error:
+        if debug:
+            raise
+        console.note(f"drillctl: {error}")
+        return 1
+    except Exception as error:
+        if debug:
+            raise
+        console.note(f"drillctl: {type(error).__name__}: {error} (--debug shows where)")
+        return 1
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from drillctl import console
+
+        console.line(f"drillctl {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print version.")
+    ] = False,
+) -> None:
+    """Control design against torsional stick-slip of oil-well drillstrings."""
+
+
+def _load(name: str, sets: list[str] | None) -> Design:
+    from drillctl.design import load, parse_setting
+
+    return load(name, **dict(parse_setting(text) for text in sets or []))
+
+
+def _shelf(shelf: Literal["models", "designs"], as_json: bool) -> None:
+    from drillctl import catalog, console
+
+    found = catalog.entries(shelf)
+    if as_json:
+        keys = [{"name": e.name, "title": e.title, "path": str(e.path)} for e in found]
+        console.emit({shelf: keys})
+    else:
+        console.table(shelf, ["name", "title"], [[e.name, e.title] for e in found])
+
+
+@app.command()
+def models(json: Json = False, debug: Debug = False) -> None:
+    """List the shipped models (rigs)."""
+    _shelf("models", json)
+
+
+@app.command()
+def designs(json: Json = False, debug: Debug = False) -> None:
+    """List the shipped designs (cases to run)."""
+    _shelf("designs", json)
+
+
+@app.command()
+def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False) -> None:
+    """Print a design with its model and all defaults put in."""
+    from drillctl import console
+    from drillctl.design import to_toml
+    from drillctl.design.writing import to_tree
+
+    found = _load(design, sets)
+    if json:
+        console.emit(to_tree(found.tables))
+    else:
+        console.line(to_toml(found).rstrip())
+
+
+@app.command()
+def validate(
+    design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False
+) -> None:
+    """Check a design: every key, unit and range, and its map's axes."""
+    from drillctl import console
+    from drillctl.studies.grid import axes_of
+
+    found = _load(design, sets)
+    axes_of(found, found.tables.map.axes)
+    if json:
+        console.emit({"valid": True, "name": found.name, "path": found.origin})
+    else:
+        console.line(f"{found.origin}: valid")
+
+
+@app.command()
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name or path of the new file.")],
+    debug: Debug = False,
+) -> None:
+    """Write a commented design file to start from."""
+    from drillctl import console
+    from drillctl.design.starter import write_starter
+
+    console.line(f"written: {write_starter(name)}")
+
+
+@app.command()
+def modes(
+    design: DesignName,
+    sets: Sets = None,
+    count: Annotated[int, typer.Option("--count", help="How many modes.")] = 10,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """Natural frequencies, damping and shapes of the string; Bode plot; friction curves."""
+    from drillctl import verbs
+
+    _use(threads)
+    verbs.modes(_load(design, sets), count, Options(out, json, units, verbose))
+
+
+@app.command()
+def simulate(
+    design: DesignName,
+    sets: Sets = None,
+    engine: Annotated[
+        Literal["reference", "batch"] | None,
+        typer.Option("--engine", help="Located events (default), or the fixed-step engine."),
+    ] = None,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """One run: time response, measures, energy balance."""
+    from drillctl import verbs
+
+    _use(threads)
+    values = list(sets or []) + ([f"simulation.engine={engine}"] if engine else [])
+    verbs.simulate(_load(design, values), Options(out, json, units, verbose))
+
+
+@app.command(name="map")
+def map_(
+    design: DesignName,
+    sets: Sets = None,
+    axis: Axes = None,
+    audit: Annotated[
+        int | None, typer.Option("--audit", help="Cells to audit with the reference solver.")
+    ] = None,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """J1 over one or more parameters, with regions, audit and figures."""
+    from drillctl import verbs
+    from drillctl.design.reading import parse_axis
+
+    _use(threads)
+    changes: dict[str, Any] = {}
+    if axis:
+        changes["map.axes"] = [parse_axis(text) for text in axis]
+    if audit is not None:
+        changes["map.audit_cells"] = audit
+    found = _load(design, sets)
+    verbs.stability_map(
+        found.replace(changes) if changes else found, Options(out, json, units, verbose)
+    )
+
+
+def _use(threads: int | None) -> None:
+    if threads is not None:
+        import numba
+
+        if threads > numba.config.NUMBA_NUM_THREADS:
+            most = numba.config.NUMBA_NUM_THREADS
+            raise InputError(f"{threads} is more than this machine's {most}", "--threads")
+        numba.set_num_threads(threads)

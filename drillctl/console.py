@@ -1,0 +1,92 @@
+"""What the command line says: tables on stdout, progress and notes on stderr, strict JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as RichBar
+
+
+def note(text: str) -> None:
+    """A line for people, on stderr."""
+    print(text, file=sys.stderr)  # noqa: T201
+
+
+def emit(summary: dict[str, Any]) -> None:
+    """One strict JSON object on stdout."""
+    from drillctl.store import strict
+
+    print(json.dumps(strict(summary), allow_nan=False))  # noqa: T201
+
+
+def line(text: str) -> None:
+    """A line of a command's answer, on stdout."""
+    print(text)  # noqa: T201
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table on stdout; every column but the first is set flush right."""
+    from rich.console import Console
+    from rich.table import Table
+
+    made = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    for number, column in enumerate(columns):
+        made.add_column(column, justify="left" if number == 0 else "right")
+    for row in rows:
+        made.add_row(*row)
+    console = Console()
+    # Piped output is not cut to a terminal's width.
+    console.print(made, width=None if console.is_terminal else 120, markup=False)
+
+
+class Bar:
+    """Progress as a rich bar on stderr, shown once the work takes longer than a second.
+
+    Parameters
+    ----------
+    bar : rich.progress.Progress
+        Started by `progress`.
+    """
+
+    def __init__(self, bar: RichBar) -> None:
+        self._bar = bar
+        self._task: Any = None
+
+    def begin(self, task: str, total: int) -> None:
+        """A task begins; the one before is finished."""
+        if self._task is not None:
+            self._bar.update(self._task, visible=False)
+        self._task = self._bar.add_task(task, total=total)
+
+    def advance(self, done: int) -> None:
+        """Parts of it are done."""
+        self._bar.advance(self._task, done)
+
+
+@contextmanager
+def progress() -> Iterator[Bar]:
+    """Progress on stderr while the block runs; gone when it ends."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
+    )  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        yield Bar(bar)
+
+
+def sized(value: float | None, digits: int = 5) -> str:
+    """A number for a table; a dash where there is none."""
+    return "-" if value is None or value != value else f"{value:.{digits}g}"

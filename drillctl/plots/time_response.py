@@ -1,0 +1,82 @@
+"""Time responses: speeds of top drive and bit, with the times the bit is stuck shaded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from drillctl import units
+from drillctl.plots.style import BLUE, SMALL, VERMILLION, dress, grid_or_new
+
+if TYPE_CHECKING:
+    from drillctl.simulation import Simulation
+
+
+def time_response(
+    results: Simulation | Sequence[Simulation], ax: Axes | Sequence[Axes] | None = None
+) -> Figure:
+    """Speeds of top drive and bit against time.
+
+    Parameters
+    ----------
+    results : Simulation or sequence of Simulation
+        One panel each, in the order given.
+    ax : Axes or sequence of Axes, optional
+        As many as results.
+
+    Returns
+    -------
+    Figure
+        Speeds in rpm; grey where the bit is at rest.
+
+    Raises
+    ------
+    InputError
+        Not as many axes as results.
+    """
+    runs = list(results) if isinstance(results, Sequence) else [results]
+    columns = 1 if len(runs) == 1 else 2
+    rows = -(-len(runs) // columns)
+    given = [ax] if isinstance(ax, Axes) else ax
+    figure, panels = grid_or_new(
+        given, rows, columns, 4.2 * columns + 1.8, 2.6 * rows + 1.0, share_x=True, share_y=True
+    )
+    for panel, run in zip(panels, runs, strict=False):
+        _panel(panel, run)
+    for panel in panels[len(runs) :]:
+        panel.set_visible(False)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=4, fontsize=SMALL, frameon=False
+    )
+    return figure
+
+
+def _panel(ax: Axes, run: Simulation) -> None:
+    bit = run.signals["bit_speed"] / units.RPM
+    top = run.signals["top_speed"] / units.RPM
+    height = max(float(bit.max()), float(top.max())) * 1.05
+    low = min(0.0, float(bit.min()), float(top.min())) * 1.05
+    ax.fill_between(
+        run.time, low, height, where=run.signals["stuck"] > 0.5, color="#BBBBBB", alpha=0.6,
+        linewidth=0.0, label="bit stuck",
+    )  # fmt: skip
+    ax.plot(run.time, bit, color=BLUE, linewidth=1.1, label="bit")
+    ax.plot(run.time, top, color=VERMILLION, linewidth=1.1, linestyle="--", label="top drive")
+    ax.axhline(
+        run.design.speed / units.RPM, color="black", linewidth=0.7, linestyle=":", label="set speed"
+    )
+    ax.set_xlim(0.0, float(run.time[-1]))
+    ax.set_ylim(low, np.nextafter(height, np.inf))
+    dress(ax, "time (s)", "speed (rpm)", _title(run))
+    ax.label_outer()
+
+
+def _title(run: Simulation) -> str:
+    law = run.design.top_drive
+    numbers = ", ".join(f"{k} {v:g}" for k, v in law._asdict().items())  # type: ignore[attr-defined]
+    return f"J1 {run.measures.j1:.1f} s: {numbers}"

@@ -1,0 +1,31 @@
+"""Which code, packages and machine a result came from."""
+
+from __future__ import annotations
+
+import platform
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+import drillctl
+
+PACKAGES = ("numpy", "scipy", "numba", "llvmlite")
+"""Packages whose version may change the last bits of a result."""
+
+
+@cache
+def provenance() -> dict[str, str]:
+    """Versions and processor, as stored with every result."""
+    found = {"drillctl": drillctl.__version__, "python": platform.python_version()}
+    found |= {name: version(name) for name in PACKAGES}
+    return found | {"processor": processor()}
+
+
+def processor() -> str:
+    """Model of the processor, as the system names it."""
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

@@ -1,0 +1,59 @@
+"""Results back from their dataset and summary, one function a verb."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drillctl.design import Design
+from drillctl.simulation.batch import FLOATS
+from drillctl.simulation.measures import Measures
+from drillctl.simulation.trajectory import SIGNALS, Simulation
+from drillctl.studies.audit import Audit
+from drillctl.studies.grid import Axis
+from drillctl.studies.sweeps import Sweep
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def read_sweep(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Sweep:
+    """A `Sweep` as it was saved."""
+    axes = tuple(
+        Axis(path, data[path].attrs.get("units", ""), data[path].values) for path in summary["axes"]
+    )
+    cells = data["audited_cell"].values.astype(np.int64)
+    j1 = data["j1"].values
+    return Sweep(
+        design=design,
+        axes=axes,
+        levels=design.tables.map.levels,
+        measures={name: data[name].values for name in FLOATS},
+        status=data["status"].values.astype(np.int8),
+        audit=Audit(cells, j1.ravel()[cells], data["audited_j1"].values),
+        step=summary["step"],
+        modes=summary["modes"],
+        seconds=summary["seconds"],
+        total_seconds=summary["total_seconds"],
+        provenance={key: str(value) for key, value in data.attrs.items()},
+    )
+
+
+def read_simulation(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Simulation:
+    """A `Simulation` as it was saved; its events and energy balance are not kept."""
+    return Simulation(
+        design=design,
+        time=data["time"].values,
+        signals={name: data[name].values for name in SIGNALS},
+        events=(),
+        measures=Measures(**summary["measures"]),
+        status=summary["status"],
+        engine=summary["engine"],
+        step=summary["step"],
+        modes=summary["modes"],
+        energy=None,
+    )
+
+
+READERS = {"map": read_sweep, "simulate": read_simulation}

@@ -1,0 +1,162 @@
+"""Self-audit of a map: some of its cells, simulated again by the reference solver."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.errors import SimulationError
+from drillctl.progress import SILENT, Progress
+from drillctl.studies.grid import Axis, cell_design, shape_of
+
+Array = NDArray[np.float64]
+
+SEED = 20121
+"""Seed of the choice of cells: the same map is audited at the same cells."""
+WORST_ALLOWED = 1e-2
+"""Relative difference in J1 above which a map says `audit: look`."""
+TOLERANCE = 1e-7
+"""Tolerance of the reference solver in an audit: J1 to some 1e-7."""
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """Batch engine against reference solver at some cells.
+
+    Attributes
+    ----------
+    cells : ndarray of int, shape (audited,)
+        Index in the flattened map.
+    batch, reference : ndarray, shape (audited,)
+        J1 by either (s); NaN where the reference solver failed.
+    """
+
+    cells: NDArray[np.int64]
+    batch: Array
+    reference: Array
+
+    @property
+    def differences(self) -> Array:
+        """Relative differences, shape (audited,)."""
+        return np.abs(self.batch - self.reference) / np.abs(self.reference)
+
+    @property
+    def worst(self) -> float | None:
+        """Largest relative difference; None if no cell was audited or none could be."""
+        found = self.differences[np.isfinite(self.differences)]
+        return float(found.max()) if found.size else None
+
+    @property
+    def verdict(self) -> str:
+        """`ok`, `look` when a cell differs too much or failed, `none` without audited cells."""
+        if not len(self.cells):
+            return "none"
+        fine = np.isfinite(self.reference).all() and (self.worst or 0.0) <= WORST_ALLOWED
+        return "ok" if fine else "look"
+
+    def summary(self) -> dict[str, Any]:
+        """Number of cells, worst difference, verdict."""
+        return {
+            "cells": len(self.cells),
+            "worst_relative_difference": self.worst,
+            "verdict": self.verdict,
+        }
+
+
+def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> NDArray[np.int64]:
+    """Cells to audit: a seeded random sample, spread over the levels.
+
+    Parameters
+    ----------
+    values : ndarray, shape of the map
+        J1 (s).
+    levels : tuple of float
+        Increasing. Beyond twice the highest, cells are too sensitive to tell anything.
+    count : int
+        How many; fewer if the map has no more.
+
+    Returns
+    -------
+    ndarray of int, shape (at most count,)
+        Sorted indices in the flattened map. Bands between levels take turns.
+    """
+    flat = np.nan_to_num(values.ravel(), nan=np.inf)
+    random = np.random.default_rng(SEED)
+    edges = [-np.inf, *levels, 2.0 * levels[-1]]
+    bands = [
+        list(random.permutation(np.flatnonzero((flat > low) & (flat <= high))))
+        for low, high in pairwise(edges)
+    ]
+    chosen: list[int] = []
+    while len(chosen) < count and any(bands):
+        for band in bands:
+            if band and len(chosen) < count:
+                chosen.append(int(band.pop()))
+    return np.array(sorted(chosen), dtype=np.int64)
+
+
+def audit(
+    design: Design,
+    axes: tuple[Axis, ...],
+    values: Array,
+    levels: tuple[float, ...],
+    count: int,
+    progress: Progress = SILENT,
+) -> Audit:
+    """Simulate some cells of a map again with the reference solver, on all cores.
+
+    Parameters
+    ----------
+    design : Design
+        Of the map.
+    axes : tuple of Axis
+        Of the map.
+    values : ndarray, shape of the map
+        J1 by the batch engine (s).
+    levels : tuple of float
+        Levels over which the cells are spread.
+    count : int
+        How many cells; 0 for none.
+    progress : Progress
+        Told of each cell.
+    """
+    cells = choose_cells(values.reshape(shape_of(axes)), levels, count)
+    designs = [cell_design(design, axes, int(cell)) for cell in cells]
+    reference = np.array(_all(designs, progress))
+    return Audit(cells, values.ravel()[cells], reference)
+
+
+def _all(designs: list[Design], progress: Progress) -> list[float]:
+    import joblib
+
+    progress.begin("auditing cells", len(designs))
+    found = []
+    workers = min(len(designs), os.cpu_count() or 1)
+    if workers == 0:
+        return []
+    runs = joblib.Parallel(n_jobs=workers, return_as="generator")(
+        joblib.delayed(reference_j1)(d) for d in designs
+    )
+    for value in runs:
+        found.append(value)
+        progress.advance(1)
+    return found
+
+
+def reference_j1(design: Design) -> float:
+    """J1 of a design by the reference solver (s); NaN if that fails."""
+    from drillctl.simulation.reference import solve
+    from drillctl.simulation.trajectory import deviation
+
+    table = design.tables.simulation
+    try:
+        motion = solve(design, tolerance=TOLERANCE)
+    except SimulationError:
+        return float("nan")
+    return deviation(motion, table.j1_from, table.duration) / design.speed

@@ -1,0 +1,191 @@
+"""A grid over parameters of a design, and the lanes that it stands for."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.design import Design, parameter
+from drillctl.design.tables import AxisTable
+from drillctl.errors import InputError
+from drillctl.simulation.lanes import Lanes, lane_numbers, lanes_of
+
+Array = NDArray[np.float64]
+
+_SHARED = ("drillstring.", "top_drive.", "bha.", "simulation.")
+"""Paths under these change what all lanes share; the others differ from lane to lane."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One axis of a grid.
+
+    Attributes
+    ----------
+    path : str
+        Dotted path of the parameter.
+    unit : str
+        Unit of `values`, empty for factors and counts.
+    values : ndarray, shape (points,)
+        In SI.
+    """
+
+    path: str
+    unit: str
+    values: Array
+
+    @property
+    def shared(self) -> bool:
+        """Whether it changes the string or the scheme, which all lanes of a group share."""
+        return self.path.startswith(_SHARED)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """The cells of a grid that share a string.
+
+    Attributes
+    ----------
+    design : Design
+        With the values of the shared axes put in.
+    lanes : Lanes
+        One a cell.
+    cells : ndarray of int, shape (lanes,)
+        Index of each cell in the flattened grid.
+    """
+
+    design: Design
+    lanes: Lanes
+    cells: NDArray[np.int64]
+
+
+def axis(design: Design, table: AxisTable) -> Axis:
+    """The axis that a table asks for.
+
+    Raises
+    ------
+    InputError
+        Unknown path, a wrong unit, or an axis that does not increase.
+    """
+    where = f"map.axes {table.path}"
+    found = parameter(design, table.path)
+    try:
+        low, high = found.parse(table.min), found.parse(table.max)
+    except InputError as error:
+        raise InputError(error.problem, where) from None
+    if not low < high:
+        raise InputError(f"min {table.min} must be less than max {table.max}", where)
+    values = np.linspace(low, high, table.points)
+    if found.kind is None and np.array_equal(values, np.round(values)) is False:
+        _refuse_fractional_count(design, table, values)
+    return Axis(table.path, found.si_unit, values)
+
+
+def _refuse_fractional_count(design: Design, table: AxisTable, values: Array) -> None:
+    """A count such as `elements` takes whole numbers only; try the first that is not."""
+    first = next(float(v) for v in values if v != round(v))
+    try:
+        design.replace({table.path: units.SI(first)})
+    except InputError as error:
+        raise InputError(error.problem, f"map.axes {table.path}") from None
+
+
+def axes_of(design: Design, tables: tuple[AxisTable, ...]) -> tuple[Axis, ...]:
+    """All axes of a grid; see `axis`."""
+    return tuple(axis(design, table) for table in tables)
+
+
+def shape_of(axes: tuple[Axis, ...]) -> tuple[int, ...]:
+    """Number of points along each axis."""
+    return tuple(len(a) for a in axes)
+
+
+def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
+    """The cells of a grid, group by group; the string is assembled once a group.
+
+    Raises
+    ------
+    InputError
+        A value on the grid is impossible; the message says which.
+    """
+    cells = np.arange(np.prod(shape_of(axes), dtype=int)).reshape(shape_of(axes))
+    shared = [i for i, a in enumerate(axes) if a.shared]
+    own = tuple(a for a in axes if not a.shared)
+    for where in itertools.product(*(range(len(axes[i])) for i in shared)):
+        chosen = dict(zip(shared, where, strict=True))
+        variant = _replaced(design, {axes[i].path: axes[i].values[k] for i, k in chosen.items()})
+        index = tuple(chosen.get(i, slice(None)) for i in range(len(axes)))
+        lanes = lanes_of(variant, _numbers(variant, own))
+        yield Group(variant, lanes, cells[index].ravel())
+
+
+def cell_design(design: Design, axes: tuple[Axis, ...], cell: int) -> Design:
+    """The design of one cell of the flattened grid."""
+    where = np.unravel_index(cell, shape_of(axes))
+    return _replaced(design, {a.path: a.values[k] for a, k in zip(axes, where, strict=True)})
+
+
+def _replaced(design: Design, values: dict[str, float]) -> Design:
+    """The design with SI values put in; an impossible one is told with its path and value."""
+    try:
+        return design.replace({path: units.SI(value) for path, value in values.items()})
+    except InputError as error:
+        at = ", ".join(f"{path} = {value:g}" for path, value in values.items())
+        raise InputError(f"at {at}: {error}", "map.axes") from None
+
+
+def _numbers(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array]:
+    """Lane numbers of every cell, flattened.
+
+    Where no two axes touch the same number, each axis is resolved alone and the grid is their
+    outer product; else every cell is resolved.
+    """
+    base = lane_numbers(design)
+    shape = shape_of(axes)
+    columns = [[lane_numbers(_replaced(design, {a.path: v})) for v in a.values] for a in axes]
+    touched = [
+        {key for key in base if any(n[key] != base[key] for n in column)} for column in columns
+    ]
+    if _disjoint(touched) and _product_holds(design, axes, base, columns, touched):
+        grid = {key: np.full(shape, value) for key, value in base.items()}
+        for dimension, (column, keys) in enumerate(zip(columns, touched, strict=True)):
+            along = [1] * len(shape)
+            along[dimension] = -1
+            for key in keys:
+                grid[key][:] = np.array([n[key] for n in column]).reshape(along)
+    else:
+        cells = [
+            lane_numbers(cell_design(design, axes, cell))
+            for cell in range(int(np.prod(shape, dtype=int)))
+        ]
+        grid = {key: np.array([c[key] for c in cells]) for key in base}
+    return {key: values.ravel() for key, values in grid.items()}
+
+
+def _disjoint(touched: list[set[str]]) -> bool:
+    return sum(map(len, touched)) == len(set().union(*touched)) if touched else True
+
+
+def _product_holds(
+    design: Design,
+    axes: tuple[Axis, ...],
+    base: dict[str, float],
+    columns: list[list[dict[str, float]]],
+    touched: list[set[str]],
+) -> bool:
+    """Whether the far corner of the grid, resolved as a whole, is what the axes say it is."""
+    if not axes:
+        return True
+    corner = lane_numbers(_replaced(design, {a.path: a.values[-1] for a in axes}))
+    expected = dict(base)
+    for column, keys in zip(columns, touched, strict=True):
+        expected |= {key: column[-1][key] for key in keys}
+    return corner == expected

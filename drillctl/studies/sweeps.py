@@ -1,0 +1,281 @@
+"""Sweeps over any parameters of a design; the J1 map over the gains is one of them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.progress import SILENT, Progress
+from drillctl.provenance import provenance
+from drillctl.simulation.batch import CHUNK, FLOATS, Batch, prepare, run_batch, warm_up
+from drillctl.simulation.measures import STATUSES
+from drillctl.studies import audit as auditing
+from drillctl.studies.blocks import Blocks, KeepNothing
+from drillctl.studies.grid import Axis, axes_of, groups, shape_of
+from drillctl.studies.regions import Region, region
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray
+
+Array = NDArray[np.float64]
+
+BYTES_PER_CELL = 8 * (2 * len(FLOATS) + 20)
+"""Memory that a cell takes while a sweep runs."""
+MEMORY_SHARE = 0.5
+"""Largest share of the free memory that a sweep may ask for."""
+
+_UNITS = {
+    "j1": "s", "j1_rate": "1", "stuck_time": "s", "sticks": "1", "stick_slip_index": "1",
+    "mean_bit_speed": "rad/s", "min_bit_speed": "rad/s", "peak_bit_speed": "rad/s",
+    "peak_pipe_torque": "N*m", "peak_top_torque": "N*m", "settling_time": "s",
+    "settling_time_wide": "s", "mean_weight_on_bit": "N", "rop_proxy": "1",
+    "work_at_bit": "J", "work_per_turn": "J", "time_outside_table": "s",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Measures over a grid of parameters.
+
+    Attributes
+    ----------
+    design : Design
+        What was varied.
+    axes : tuple of Axis
+        Parameters and their values.
+    levels : tuple of float
+        Levels of J1 (s).
+    measures : dict of ndarray, shape of the grid
+        By the names of `simulation.batch.FLOATS`; NaN where undefined.
+    status : ndarray of int8, shape of the grid
+        Index into `simulation.measures.STATUSES`.
+    audit : Audit
+        Cells simulated again with the reference solver.
+    step, modes : float, int
+        Scheme of the batch engine; of the first group where the string varies.
+    seconds, total_seconds : float
+        Spent in the lanes alone and from call to return (s).
+    """
+
+    design: Design
+    axes: tuple[Axis, ...]
+    levels: tuple[float, ...]
+    measures: dict[str, Array]
+    status: NDArray[np.int8]
+    audit: auditing.Audit
+    step: float
+    modes: int
+    seconds: float
+    total_seconds: float
+    provenance: dict[str, str] = field(default_factory=provenance)
+
+    @property
+    def j1(self) -> Array:
+        """J1 over the grid (s)."""
+        return self.measures["j1"]
+
+    @property
+    def regions(self) -> dict[float, Region]:
+        """Region of each level."""
+        return {level: region(self.j1, self.axes, level) for level in self.levels}
+
+    @property
+    def minimum(self) -> tuple[float, dict[str, float]] | None:
+        """Smallest J1 (s) and where it is (SI); None if every cell failed."""
+        if np.isnan(self.j1).all():
+            return None
+        where = np.unravel_index(int(np.nanargmin(self.j1)), self.j1.shape)
+        at = {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)}
+        return float(self.j1[where]), at
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """All measures, labelled by parameter path, with units and provenance."""
+        import xarray
+
+        paths = [a.path for a in self.axes]
+        coordinates = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
+        variables: dict[str, Any] = {
+            name: (paths, values, {"units": _UNITS[name]}) for name, values in self.measures.items()
+        }
+        flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
+        variables["status"] = (paths, self.status, flags)
+        variables["audited_cell"] = ("audited", self.audit.cells, {})
+        variables["audited_j1"] = ("audited", self.audit.reference, {"units": "s"})
+        return xarray.Dataset(variables, coordinates, dict(self.provenance))
+
+    def summary(self) -> dict[str, Any]:
+        """Axes, minimum, regions, audit, failures, times; SI units, parameters by path."""
+        minimum = self.minimum
+        return {
+            "axes": {
+                a.path: {
+                    "min": float(a.values[0]),
+                    "max": float(a.values[-1]),
+                    "points": len(a),
+                }
+                for a in self.axes
+            },
+            "minimum": None if minimum is None else {"j1": minimum[0], "at": minimum[1]},
+            "regions": {f"{level:g}": r.summary() for level, r in self.regions.items()},
+            "audit": self.audit.summary(),
+            "statuses": {
+                name: int((self.status == code).sum())
+                for code, name in enumerate(STATUSES)
+                if (self.status == code).any()
+            },
+            "step": self.step,
+            "modes": self.modes,
+            "seconds": self.seconds,
+            "total_seconds": self.total_seconds,
+        }
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
+
+
+def sweep(
+    design: Design,
+    axes: tuple[Axis, ...] | None = None,
+    audit_cells: int | None = None,
+    progress: Progress = SILENT,
+    blocks: Blocks | None = None,
+) -> Sweep:
+    """Simulate a design over a grid of its parameters with the batch engine.
+
+    Parameters
+    ----------
+    design : Design
+        Its `[map]` table gives axes, levels and number of audited cells.
+    axes : tuple of Axis, optional
+        Instead of the design's own.
+    audit_cells : int, optional
+        Instead of the design's own; 0 for no audit.
+    progress : Progress
+        Told of blocks and audited cells.
+    blocks : Blocks, optional
+        Where finished blocks are kept and found again.
+
+    Returns
+    -------
+    Sweep
+        Failed cells carry the status `failed`, not an exception.
+
+    Raises
+    ------
+    InputError
+        An axis that does not fit the design, or a grid too large for the memory.
+    """
+    begin = time.perf_counter()
+    table = design.tables.map
+    axes = axes_of(design, table.axes) if axes is None else axes
+    _refuse_too_large(axes)
+    collected = _Collected(axes)
+    collected.run(design, progress, blocks or KeepNothing())
+    count = table.audit_cells if audit_cells is None else audit_cells
+    audited = auditing.audit(design, axes, collected.measures["j1"], table.levels, count, progress)
+    shape = shape_of(axes)
+    return Sweep(
+        design=design,
+        axes=axes,
+        levels=table.levels,
+        measures={name: values.reshape(shape) for name, values in collected.measures.items()},
+        status=collected.status.reshape(shape),
+        audit=audited,
+        step=collected.step,
+        modes=collected.modes,
+        seconds=collected.seconds,
+        total_seconds=time.perf_counter() - begin,
+    )
+
+
+def stability_map(design: Design, **options: Any) -> Sweep:
+    """The J1 map of a design over the two parameters of its `[map]` table.
+
+    Parameters
+    ----------
+    design : Design
+        By default the map runs over the gains, kp 0-1000 and ki 0-500.
+    **options
+        As for `sweep`.
+
+    Raises
+    ------
+    InputError
+        The map does not run over exactly two parameters.
+    """
+    axes = options.pop("axes", None) or axes_of(design, design.tables.map.axes)
+    if len(axes) != 2:
+        raise InputError(f"a map runs over 2 parameters, got {len(axes)}; use sweep", "map.axes")
+    return sweep(design, axes, **options)
+
+
+class _Collected:
+    """Measures of the cells as blocks of them are finished."""
+
+    def __init__(self, axes: tuple[Axis, ...]) -> None:
+        self.axes = axes
+        cells = int(np.prod(shape_of(axes), dtype=int))
+        self.measures = {name: np.full(cells, np.nan) for name in FLOATS}
+        self.status = np.full(cells, STATUSES.index("failed"), dtype=np.int8)
+        self.step, self.modes, self.seconds = np.nan, 0, 0.0
+
+    def run(self, design: Design, progress: Progress, blocks: Blocks) -> None:
+        number = 0
+        for index, group in enumerate(groups(design, self.axes)):
+            table, lanes = group.design.tables.simulation, group.lanes
+            prepared = blocks.prepared(index, partial(prepare, lanes, table))
+            if index == 0:
+                self.step, self.modes = prepared.scheme.step, prepared.scheme.modes
+                progress.begin("loading kernels", 1)
+                warm_up(lanes, prepared)
+                progress.begin("simulating lanes", len(self.status))
+            for first in range(0, len(lanes), CHUNK):
+                part = slice(first, first + CHUNK)
+                batch = blocks.find(number)
+                if batch is None:
+                    begin = time.perf_counter()
+                    batch = run_batch(lanes[part], prepared)
+                    self.seconds += time.perf_counter() - begin
+                    blocks.keep(number, batch)
+                self._put(group.cells[part], batch)
+                progress.advance(len(batch.status))
+                number += 1
+
+    def _put(self, cells: NDArray[np.int64], batch: Batch) -> None:
+        for name, values in batch.measures.items():
+            self.measures[name][cells] = values
+        self.status[cells] = batch.status
+
+
+def _refuse_too_large(axes: tuple[Axis, ...]) -> None:
+    cells = int(np.prod([float(len(a)) for a in axes]))
+    needed, free = cells * BYTES_PER_CELL, _free_memory()
+    if needed > MEMORY_SHARE * free:
+        raise InputError(
+            f"{cells:,} cells need about {needed / 2**30:.1f} GiB; "
+            f"{MEMORY_SHARE * free / 2**30:.1f} GiB may be used: fewer points",
+            "map.axes",
+        )
+
+
+def _free_memory() -> float:
+    """Memory that is free (bytes); infinite where the system does not tell."""
+    import os
+
+    try:
+        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (ValueError, OSError, AttributeError):
+        return float("inf")

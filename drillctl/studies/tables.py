@@ -1,0 +1,40 @@
+"""Maps and regions as CSV, for spreadsheets."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+from pathlib import Path
+
+from drillctl.simulation.batch import FLOATS
+from drillctl.simulation.measures import STATUSES
+from drillctl.studies.sweeps import Sweep
+
+
+def write_tables(result: Sweep, folder: Path) -> None:
+    """Write `map.csv`, a row a cell, and `regions.csv`, a row a level; SI units.
+
+    Parameters
+    ----------
+    result : Sweep
+        What was computed.
+    folder : Path
+        Where to.
+    """
+    paths = [axis.path for axis in result.axes]
+    with (folder / "map.csv").open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow([*paths, *FLOATS, "status"])
+        columns = [result.measures[name].ravel() for name in FLOATS]
+        points = itertools.product(*(axis.values for axis in result.axes))
+        for point, status, *values in zip(points, result.status.ravel(), *columns, strict=True):
+            # An undefined measure is an empty field.
+            numbers = ["" if v != v else repr(float(v)) for v in values]
+            writer.writerow([*map(float, point), *numbers, STATUSES[status]])
+    with (folder / "regions.csv").open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        ends = [f"{path} {end}" for path in paths for end in ("min", "max")]
+        writer.writerow(["level", "cells", "area_fraction", *ends])
+        for level, region in result.regions.items():
+            bounds = [value for path in paths for value in region.bounds.get(path, ("", ""))]
+            writer.writerow([level, region.cells, region.area_fraction, *bounds])

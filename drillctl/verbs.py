@@ -1,0 +1,108 @@
+"""What the verbs that compute do: claim a folder, compute, save, draw, print."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from drillctl import console
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+    from drillctl.cli import Options
+    from drillctl.design import Design
+    from drillctl.store import RunFolder
+
+DPI = 150
+
+
+def _draw(figure: Figure, path: Path) -> None:
+    figure.savefig(path, dpi=DPI)
+
+
+def _shown_again(folder: RunFolder, options: Options) -> bool:
+    """Whether the folder held the finished run, whose summary is then shown once more."""
+    if not folder.finished:
+        return False
+    if options.json:
+        console.emit(folder.summary())
+    else:
+        console.note(f"already done: {folder.path}")
+    return True
+
+
+def _conclude(folder: RunFolder, summary: dict[str, Any], options: Options) -> None:
+    folder.finish(summary)
+    if options.json:
+        console.emit(summary)
+        console.note(f"results: {folder.path}")
+    else:
+        console.line(f"results: {folder.path}")
+
+
+def modes(design: Design, count: int, options: Options) -> None:
+    """Modes with their figures, the Bode plot and the friction curves."""
+    from drillctl import linear, plots, printing, store
+
+    result = linear.modes(design, count)
+    folder = store.claim("modes", design, options.out, count=count)
+    if _shown_again(folder, options):
+        return
+    summary = result.summary()
+    store.write_data(result, folder.path)
+    _draw(plots.mode_shapes(result), folder.path / "modes.png")
+    _draw(plots.bode(linear.frequency_response(design.string)), folder.path / "bode.png")
+    _draw(plots.friction_curves(design), folder.path / "friction.png")
+    if not options.json:
+        printing.modes(summary)
+    _conclude(folder, summary, options)
+
+
+def simulate(design: Design, options: Options) -> None:
+    """One run with its figure, signals and measures."""
+    import drillctl
+    from drillctl import plots, printing, store
+
+    folder = store.claim("simulate", design, options.out)
+    if _shown_again(folder, options):
+        return
+    with console.progress() as bar:
+        bar.begin("simulating", 1)
+        result = drillctl.simulate(design)
+    store.write_data(result, folder.path)
+    _draw(plots.time_response(result), folder.path / "time-response.png")
+    summary = result.summary()
+    share = result.share_of_yield
+    if share is not None:
+        summary["share_of_torsional_yield"] = share
+    if not options.json:
+        printing.simulation(result, options.units)
+    if result.energy is not None and options.verbose:
+        console.note(f"energy balance closes to {result.energy.relative_residual:.1e}")
+    _conclude(folder, summary, options)
+
+
+def stability_map(design: Design, options: Options) -> None:
+    """A sweep with its map, regions, audit and responses."""
+    from drillctl import plots, printing, store, studies
+
+    folder = store.claim("map", design, options.out)
+    if _shown_again(folder, options):
+        return
+    with console.progress() as bar:
+        result = studies.sweep(design, progress=bar, blocks=folder.blocks())
+    store.write_data(result, folder.path)
+    studies.write_tables(result, folder.path)
+    if len(result.axes) == 2:
+        _draw(plots.stability_map(result, system=options.units), folder.path / "map.png")
+        _draw(plots.time_response(studies.responses(result)), folder.path / "responses.png")
+    elif len(result.axes) == 1:
+        _draw(plots.sweep_line(result, system=options.units), folder.path / "map.png")
+    summary = result.summary()
+    if not options.json:
+        printing.sweep(result, options.units)
+    if result.audit.verdict == "look":
+        console.note("audit: look: the engines differ by more than 1 % in J1 in some cell")
+    _conclude(folder, summary, options)
