@@ -139,10 +139,8 @@ def branch(path: str, value: object, tree: Tree) -> Tree:
         if not fitting:
             raise InputError(f"no section {keys[2]!r}; {nearest(keys[2], names)}", path)
         name = max(fitting, key=len)
-        if rest == name:
-            entry = value
-        else:
-            entry = _nest(rest[len(name) + 1 :].split("."), value)
+        inside = rest[len(name) + 1 :]
+        entry = _nest(inside.split("."), value) if inside else value
         if not isinstance(entry, Mapping):
             raise InputError(f"got {shown(value)}; a section is a table", path)
         if entry.get("name", name) != name:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drillctl.errors import InputError
+from drillctl.errors import InputError, shown
 
 STARTER = """\
 # A rig for drillctl. Quantities are text with units; gains and factors are bare numbers.
@@ -89,6 +89,8 @@ def write_starter(name: str) -> Path:
         The file exists already, or cannot be written.
     """
     path = Path(name)
+    if not path.name or not name.isprintable():
+        raise InputError(f"{shown(name)} is not a file name")
     path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
     title = path.stem.replace("\\", "").replace('"', "")
     try:

@@ -70,7 +70,7 @@ def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = 
     shown = [level for level in result.levels if result.j1[np.isfinite(result.j1)].min() <= level]
     if shown:
         lines = ax.contour(x, y, result.j1.T, levels=shown, colors=BLACK, linewidths=LINE)
-        ax.clabel(lines, fmt=lambda level: f"{level:g}", fontsize=SMALL)
+        ax.clabel(lines, fmt=lambda level: f"{level:g}", fontsize=SMALL, inline_spacing=2)
         bar.add_lines(lines)
     _mark_cells(result, ax, x, y)
     dress(ax, x_label, y_label, result.design.tables.title or result.design.name)

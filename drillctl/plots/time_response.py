@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -59,11 +58,10 @@ def time_response(
 def _panel(ax: Axes, run: Simulation) -> None:
     bit = run.signals["bit_speed"] / units.RPM
     top = run.signals["top_speed"] / units.RPM
-    height = max(float(bit.max()), float(top.max())) * 1.05
-    low = min(0.0, float(bit.min()), float(top.min())) * 1.05
+    stuck = run.signals["stuck"] > 0.5
     ax.fill_between(
-        run.time, low, height, where=run.signals["stuck"] > 0.5, color="#BBBBBB", alpha=0.6,
-        linewidth=0.0, label="bit stuck",
+        run.time, 0.0, 1.0, where=stuck, transform=ax.get_xaxis_transform(), color="#BBBBBB",
+        alpha=0.6, linewidth=0.0, label="bit stuck",
     )  # fmt: skip
     ax.plot(run.time, bit, color=BLUE, linewidth=1.1, label="bit")
     ax.plot(run.time, top, color=VERMILLION, linewidth=1.1, linestyle="--", label="top drive")
@@ -71,7 +69,6 @@ def _panel(ax: Axes, run: Simulation) -> None:
         run.design.speed / units.RPM, color="black", linewidth=0.7, linestyle=":", label="set speed"
     )
     ax.set_xlim(0.0, float(run.time[-1]))
-    ax.set_ylim(low, np.nextafter(height, np.inf))
     dress(ax, "time (s)", "speed (rpm)", _title(run))
     ax.label_outer()
 

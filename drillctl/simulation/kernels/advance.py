@@ -16,7 +16,8 @@ from drillctl.simulation.kernels.lane_step import (
     decide,
     eliminate,
     solve_inclusion,
-    time_changes,
+    time_releases,
+    time_stops,
 )
 from drillctl.simulation.kernels.laws import at_lane, load_block, torque_and_slope, weight_at
 from drillctl.simulation.kernels.measure_step import (
@@ -135,12 +136,13 @@ def advance_block(
         if n == clock.steps:
             break
         begin = n * clock.step
-        eliminate(string, drive, weight, friction, work, rate)
+        # What takes divisions and happens rarely is done when some lane needs it; it leaves
+        # the other lanes as they are.
+        if eliminate(string, drive, weight, friction, work, rate) > 0:
+            time_releases(friction, work)
         solve_inclusion(friction, work)
-        # What takes divisions and happens rarely is done when some lane needs it; it
-        # leaves the other lanes as they are.
         if decide(friction, work) > 0:
-            time_changes(friction, work)
+            time_stops(friction, work)
         conclude(string, work)
         in_j1 = _share_after(begin, clock.step, clock.j1_from)
         in_window = _share_after(begin, clock.step, clock.window_from)

@@ -38,8 +38,12 @@ NEWTON_LIMIT = 30
 
 
 @inlined
-def eliminate(string: Any, drive: Any, weight: Any, friction: Any, work: Any, rate: float) -> None:
-    """Reduce string and control to free and gain, and set the inclusion up; `rate` is 1 / step."""
+def eliminate(string: Any, drive: Any, weight: Any, friction: Any, work: Any, rate: float) -> int:
+    """Reduce string and control to free and gain, and set the inclusion up; `rate` is 1 / step.
+
+    Returns how many lanes break loose.
+    """
+    releases = 0
     for lane in range(WIDTH):
         drag = work[r.DRAG + lane]
         offset, slope = mean_torque(at_lane(drive, work, r.DRIVE, lane), work[r.ANGLE + lane], rate)
@@ -56,6 +60,7 @@ def eliminate(string: Any, drive: Any, weight: Any, friction: Any, work: Any, ra
         work[r.SHARE + lane] = share
         work[r.FREE + lane] = free
         work[r.GAIN + lane] = gain
+        work[r.PER_GAIN + lane] = 1.0 / gain
 
         load = weight_at(at_lane(weight, work, r.WEIGHT, lane), work[r.BIT_SPEED + lane])
         law = at_lane(friction, work, r.FRICTION, lane)
@@ -74,6 +79,36 @@ def eliminate(string: Any, drive: Any, weight: Any, friction: Any, work: Any, ra
         work[r.RIGHT + lane] = right
         work[r.SPEED + lane] = guess if guess > 0.0 else 0.0
         work[r.OPEN + lane] = 1.0
+
+        holding = abs(free) * work[r.PER_GAIN + lane]
+        work[r.NEW_HOLDING + lane] = holding
+        releases += 1 if direction == 0.0 and holding > static_torque(law, load) else 0
+    return releases
+
+
+@inlined
+def time_releases(friction: Any, work: Any) -> None:
+    """Date the moment a stuck bit breaks loose, and give it no friction torque before it.
+
+    The torque that would hold it rises along the line through the holding torques of this step
+    and the last, each in the middle of its step; it meets the static one after the share
+    `held` of this step, or before its beginning if that is negative. Until then the bit bears
+    the holding torque, which the slip equation has as the slip torque: the difference of the
+    two impulses goes to the right-hand side.
+    """
+    for lane in range(WIDTH):
+        law = at_lane(friction, work, r.FRICTION, lane)
+        load = work[r.LOAD + lane]
+        static, kinetic = static_torque(law, load), kinetic_torque_at_rest(law, load)
+        holding, last = work[r.NEW_HOLDING + lane], work[r.HOLDING + lane]
+        rise = holding - last
+        held = 0.5 + (static - holding) / rise
+        # Without a step wholly at rest behind it, nothing is known of the rise.
+        known = last >= 0.0
+        loose = work[r.DIRECTION + lane] == 0.0 and holding > static
+        early = work[r.GAIN + lane] * (0.5 * rise * held * held - held * (static - kinetic))
+        work[r.RIGHT + lane] += early if loose and known else 0.0
+        work[r.STUCK_SHARE + lane] = held if known else 0.0
 
 
 @inlined
@@ -100,55 +135,45 @@ def solve_inclusion(friction: Any, work: Any) -> None:
 
 @inlined
 def decide(friction: Any, work: Any) -> int:
-    """Stick or slip, and the bit torque of the step; returns how many lanes change phase."""
-    changes = 0
+    """Stick or slip, and the bit torque of the step; returns how many lanes come to rest."""
+    stops = 0
     for lane in range(WIDTH):
         law = at_lane(friction, work, r.FRICTION, lane)
         static = static_torque(law, work[r.LOAD + lane])
-        free, per_gain = work[r.FREE + lane], 1.0 / work[r.GAIN + lane]
-        holding = abs(free) * per_gain
+        free, per_gain = work[r.FREE + lane], work[r.PER_GAIN + lane]
+        holding = work[r.NEW_HOLDING + lane]
         sticks = holding <= static and not work[r.OWN + lane] > 0.0
         was_stuck = work[r.DIRECTION + lane] == 0.0
         speed = 0.0 if sticks else work[r.SIGN + lane] * work[r.SPEED + lane]
         # The slip torque at the new speed follows from the equation that u solves.
         slip = 2.0 * (work[r.RIGHT + lane] - work[r.SPEED + lane]) * per_gain
         work[r.NEW_SPEED + lane] = speed
-        work[r.NEW_HOLDING + lane] = holding
         work[r.NEW_DIRECTION + lane] = 0.0 if sticks else work[r.SIGN + lane]
         work[r.NEW_KINETIC + lane] = 0.0 if sticks else work[r.SIGN + lane] * slip
         work[r.BIT_TORQUE + lane] = (free - speed) * per_gain
-        work[r.STUCK_SHARE + lane] = 1.0 if sticks else 0.0
-        changes += 1 if sticks != was_stuck else 0
-    return changes
+        # A bit that breaks loose keeps the share that `time_releases` found.
+        loose = was_stuck and not sticks
+        work[r.STUCK_SHARE + lane] = work[r.STUCK_SHARE + lane] if loose else 1.0 * sticks
+        stops += 1 if sticks and not was_stuck else 0
+    return stops
 
 
 @inlined
-def time_changes(friction: Any, work: Any) -> None:
-    """Share of the step spent stuck in lanes that come to rest or break loose, to second order.
+def time_stops(friction: Any, work: Any) -> None:
+    """Share of the step spent stuck in lanes that come to rest.
 
-    A bit that comes to rest is followed in a straight line through zero speed. One that breaks
-    loose does so where the line through the holding torques of this step and the last, each in
-    the middle of its step, meets the static one; that may be in the step before, whose time
-    is then taken back.
+    The bit is followed in a straight line from its speed before through zero.
     """
     for lane in range(WIDTH):
         law = at_lane(friction, work, r.FRICTION, lane)
-        load = work[r.LOAD + lane]
         half = 0.5 * work[r.GAIN + lane]
         direction = work[r.DIRECTION + lane]
-        before = abs(work[r.BIT_SPEED + lane])
         past_zero = direction * (work[r.FREE + lane] - half * work[r.KINETIC + lane])
-        past_zero -= half * kinetic_torque_at_rest(law, load)
-        coming = past_zero / (past_zero - before)
-        holding, last = work[r.NEW_HOLDING + lane], work[r.HOLDING + lane]
-        leaving = 0.5 + (static_torque(law, load) - holding) / (holding - last)
-        leaving = leaving if last >= 0.0 else 0.0
-        sticks = work[r.NEW_DIRECTION + lane] == 0.0
-        was_stuck = direction == 0.0
-        share = work[r.STUCK_SHARE + lane]
-        share = coming if sticks and not was_stuck else share
-        work[r.STUCK_SHARE + lane] = leaving if was_stuck and not sticks else share
-        work[r.STICKS + lane] += 1.0 if sticks and not was_stuck else 0.0
+        past_zero -= half * kinetic_torque_at_rest(law, work[r.LOAD + lane])
+        stuck = past_zero / (past_zero - abs(work[r.BIT_SPEED + lane]))
+        stops = direction != 0.0 and work[r.NEW_DIRECTION + lane] == 0.0
+        work[r.STUCK_SHARE + lane] = stuck if stops else work[r.STUCK_SHARE + lane]
+        work[r.STICKS + lane] += 1.0 if stops else 0.0
 
 
 @inlined

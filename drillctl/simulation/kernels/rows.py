@@ -46,6 +46,7 @@ SIGN = 41 * WIDTH  # direction in which the bit would turn
 LOAD = 42 * WIDTH  # weight on bit, N
 OWN = 43 * WIDTH  # 1 if it keeps the direction it has
 RIGHT = 44 * WIDTH
+PER_GAIN = 46 * WIDTH  # 1 / GAIN
 SPEED = 45 * WIDTH  # the unknown u, rad/s
 OPEN = 47 * WIDTH  # 1 while Newton goes on
 

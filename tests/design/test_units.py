@@ -1,0 +1,213 @@
+"""Quantities: text with a unit in, SI numbers out, and back to the same bits."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import drillctl
+from drillctl import units
+from drillctl.errors import InputError
+
+KINDS = [value for value in vars(units).values() if isinstance(value, units.Kind)]
+RPM = 2 * math.pi / 60
+
+
+def bits(value):
+    return struct.pack("<d", value)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "si"),
+    [
+        ("4 1/2 in", units.DIAMETER, 0.1143),
+        ("4-1/2 in", units.DIAMETER, 0.1143),
+        ("  4 1/2in ", units.DIAMETER, 0.1143),
+        ("5 in", units.DIAMETER, 0.127),
+        ("1/2 in", units.DIAMETER, 0.0127),
+        ("13 3/8 in", units.DIAMETER, 0.339725),
+        ("127 mm", units.DIAMETER, 0.127),
+        ("9842.5 ft", units.LENGTH, 2999.994),
+        ("-3 m", units.LENGTH, -3.0),
+        ("+3 m", units.LENGTH, 3.0),
+        ("-4 1/2 in", units.DIAMETER, -0.1143),
+        (".5 m", units.LENGTH, 0.5),
+        ("140 kN", units.FORCE, 140e3),
+        ("1.4e5 N", units.FORCE, 140e3),
+        ("1.4E+2 kN", units.FORCE, 140e3),
+        ("14e-2 MN", units.FORCE, 140e3),
+        ("20 klbf", units.FORCE, 20e3 * 4.4482216152605),
+        ("14 tf", units.FORCE, 14e3 * 9.80665),
+        ("100 rpm", units.SPEED, 100 * RPM),
+        ("100 rev/min", units.SPEED, 100 * RPM),
+        ("10 rad/s", units.SPEED, 10.0),
+        ("180 deg/s", units.SPEED, math.pi),
+        ("10 kN*m", units.TORQUE, 10e3),
+        ("10 klbf*ft", units.TORQUE, 10e3 * 4.4482216152605 * 0.3048),
+        ("20 ms", units.TIME, 0.02),
+        ("2 min", units.TIME, 120.0),
+        ("7850 kg/m3", units.DENSITY, 7850.0),
+        ("7850 kg/m^3", units.DENSITY, 7850.0),
+        ("7.85 g/cm^3", units.DENSITY, 7850.0),
+        ("500 kg*m2", units.INERTIA, 500.0),
+        ("500 kg*m^2", units.INERTIA, 500.0),
+        ("1 in4", units.POLAR_MOMENT, 0.0254**4),
+        ("8.494e-5 m^4", units.POLAR_MOMENT, 8.494e-5),
+        ("79.6 GPa", units.MODULUS, 79.6e9),
+        ("11.5e6 psi", units.MODULUS, 11.5e6 * 6894.757293168361),
+        ("200 N*m*s", units.PROPORTIONAL_GAIN, 200.0),
+        ("200 N*m*s/rad", units.DAMPING, 200.0),
+        ("100 N*m", units.INTEGRAL_GAIN, 100.0),
+        ("0.2 1/s", units.RATE, 0.2),
+        ("0.1 s/rad", units.SLOWNESS, 0.1),
+    ],
+)
+def test_text_is_read_in_its_unit(text, kind, si):
+    assert units.parse(text, kind) == pytest.approx(si, rel=1e-12)
+
+
+def test_a_drillers_fraction_is_not_a_product():
+    assert units.parse("4 1/2 in", units.DIAMETER) == 0.1143
+
+
+@pytest.mark.parametrize("text", ["1.667 Hz", "100 1/min", "1.667 1/s", "100 RPM", "10 m/s"])
+def test_a_speed_comes_in_four_units_only(text):
+    with pytest.raises(InputError) as caught:
+        units.parse(text, units.SPEED)
+    assert repr(text) in str(caught.value)
+    assert "rpm, rev/min, rad/s or deg/s" in str(caught.value)
+
+
+def test_a_mass_is_no_force():
+    with pytest.raises(InputError) as caught:
+        units.parse("140 kg", units.FORCE)
+    assert str(caught.value) == "'140 kg': 'kg' is not a unit of force; use kN, N, klbf or tf"
+
+
+@pytest.mark.parametrize("text", ["3 furlongz", "3 m**", "3 $", "3 2 m", "-1/2 in", "3 /m", "3 m)"])
+def test_what_is_no_unit_is_refused(text):
+    with pytest.raises(InputError, match=r"not a known unit; use m or ft"):
+        units.parse(text, units.LENGTH)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "suggestion"),
+    [
+        (100, units.SPEED, '"100 rpm"'),
+        (100.0, units.SPEED, '"100 rpm"'),
+        ("100", units.SPEED, '"100 rpm"'),
+        (140, units.FORCE, '"140 kN"'),
+        (0.5, units.TIME, '"0.5 s"'),
+        (3000, units.LENGTH, '"3000 m"'),
+        ("4 1/2", units.DIAMETER, '"4.5 mm"'),
+        (10, units.TORQUE, '"10 kN*m"'),
+        (1234567.25, units.LENGTH, '"1234567.25 m"'),
+        (-3, units.LENGTH, '"-3 m"'),
+    ],
+)
+def test_a_bare_number_is_refused_with_the_likely_meaning(value, kind, suggestion):
+    with pytest.raises(InputError) as caught:
+        units.parse(value, kind)
+    number = suggestion.strip('"').split()[0]
+    assert str(caught.value) == f"{number} has no unit; did you mean {suggestion}?"
+
+
+@pytest.mark.parametrize("kind", [units.PROPORTIONAL_GAIN, units.INTEGRAL_GAIN])
+def test_gains_may_be_bare(kind):
+    assert units.parse(200, kind) == 200.0
+    assert units.parse("200", kind) == 200.0
+    assert units.parse(-1e-3, kind) == -1e-3
+
+
+@pytest.mark.parametrize(
+    "value", [True, None, [1], {"a": 1}, "", "kN", "ten kN", "1/0 in", 10**400, b"1 m", "nan m"]
+)
+def test_what_is_no_quantity_is_an_input_error(value):
+    with pytest.raises(InputError):
+        units.parse(value, units.LENGTH)
+
+
+@pytest.mark.parametrize("text", ["1" * 5000 + "/3 m", "3 1/" + "7" * 5000 + " m"])
+def test_numbers_of_thousands_of_digits_raise_nothing_else(text):
+    assert not math.isnan(units.parse(text, units.LENGTH))
+
+
+@pytest.mark.parametrize(
+    "value", [math.nan, math.inf, -math.inf, "nan rpm", "inf rpm", "1e999 rpm"]
+)
+def test_a_design_takes_finite_numbers_only(value):
+    with pytest.raises(InputError, match=r"operating_point\.speed"):
+        drillctl.load("monteiro-trindade-140kn", **{"operating_point.speed": value})
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 10**400])
+def test_a_gain_is_finite(value):
+    with pytest.raises(InputError, match=r"controller\.kp: .* is not a"):
+        drillctl.load("monteiro-trindade-140kn", **{"controller.kp": value})
+
+
+def test_si_numbers_need_no_reading():
+    assert units.parse(units.SI(0.1), units.SPEED) == 0.1
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "text"),
+    [
+        (100 * units.RPM, units.SPEED, "100 rpm"),
+        (140e3, units.FORCE, "140 kN"),
+        (0.127, units.DIAMETER, "127 mm"),
+        (0.0, units.DAMPING, "0 N*m*s/rad"),
+        (np.float64(3000.0), units.LENGTH, "3000 m"),
+    ],
+)
+def test_written_as_people_write_it(value, kind, text):
+    assert units.write(value, kind) == text
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: f"{kind.name}-{kind.si}")
+@settings(max_examples=150, deadline=None)
+@given(value=st.floats(allow_nan=False, allow_infinity=False))
+def test_what_is_written_reads_back_to_the_same_bits(kind, value):
+    assert bits(units.parse(units.write(value, kind), kind)) == bits(value)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    value=st.one_of(
+        st.text(max_size=12),
+        st.builds("{} {}".format, st.floats(), st.text("mkNrads/*^ 0123456789in.e-", max_size=8)),
+        st.integers(),
+        st.floats(),
+    ),
+    kind=st.sampled_from(KINDS),
+)
+def test_any_text_is_a_number_or_an_input_error(value, kind):
+    try:
+        found = units.parse(value, kind)
+    except InputError:
+        return
+    assert isinstance(found, float)
+
+
+@pytest.mark.parametrize(
+    ("si_unit", "system", "per_unit", "name"),
+    [
+        ("rad/s", "si", RPM, "rpm"),
+        ("N", "si", 1e3, "kN"),
+        ("N", "field", 4448.2216152605, "klbf"),
+        ("N*m", "field", 4448.2216152605 * 0.3048, "klbf ft"),
+        ("m", "si", 1.0, "m"),
+        ("m", "field", 0.3048, "ft"),
+        ("", "field", 1.0, ""),
+    ],
+)
+def test_numbers_are_shown_in_the_units_people_read(si_unit, system, per_unit, name):
+    values = np.array([0.0, 1.0, 250.0])
+    shown, unit = units.displayed(values, si_unit, system)
+    np.testing.assert_allclose(shown, values / per_unit, rtol=1e-12)
+    assert unit == name
