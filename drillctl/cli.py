@@ -6,6 +6,7 @@ Every verb takes a design by path or shipped name. Exit codes: 0 done, 2 the inp
 
 from __future__ import annotations
 
+import traceback
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -59,36 +60,29 @@ class Options:
 
 def run(arguments: list[str]) -> int:
     """Run a command line and return its exit code; errors are told in one message."""
-    from drillctl import console
-
-    debug = "--debug" in arguments
     usage_error: Any = typer.BadParameter.__mro__[1]
     try:
-        code = app(arguments, standalone_mode=False)
+        code = app(arguments or ["--help"], standalone_mode=False)
         return code if isinstance(code, int) else 0
-    except InputError as error:
-        if debug:
-            raise
-        console.note(f"drillctl: {error}")
-        return 2
-    except usage_error as error:
-        console.note(f"drillctl: {error.format_message()}")
-        return 2
-    except (KeyboardInterrupt, typer.Abort):
-        console.note("drillctl: interrupted; finished blocks are kept, run it again to go on")
-        return 130
     except typer.Exit as stop:
         return int(stop.exit_code)
-    except DrillctlError as error:
-        if debug:
-            raise
-        console.note(f"drillctl: {error}")
-        return 1
+    except (KeyboardInterrupt, typer.Abort):
+        return _told("interrupted", 130)
+    except usage_error as error:
+        return _told(error.format_message(), 2)
     except Exception as error:
-        if debug:
-            raise
-        console.note(f"drillctl: {type(error).__name__}: {error} (--debug shows where)")
-        return 1
+        if "--debug" in arguments:
+            traceback.print_exc()
+        if isinstance(error, DrillctlError):
+            return _told(str(error), 2 if isinstance(error, InputError) else 1)
+        return _told(f"{type(error).__name__}: {error} (--debug shows where)", 1)
+
+
+def _told(message: str, code: int) -> int:
+    from drillctl import console
+
+    console.note(f"drillctl: {message}")
+    return code
 
 
 def _version(asked: bool) -> None:
@@ -160,7 +154,8 @@ def validate(
     from drillctl.studies.grid import axes_of
 
     found = _load(design, sets)
-    axes_of(found, found.tables.map.axes)
+    if "axes" in found.tree.get("map", {}):  # the default ones need not fit every law
+        axes_of(found, found.tables.map.axes)
     if json:
         console.emit({"valid": True, "name": found.name, "path": found.origin})
     else:

@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from rich.progress import Progress as RichBar
 
 
+PIPED_WIDTH = 160
+"""Width of tables that do not go to a terminal (characters)."""
+
+
 def note(text: str) -> None:
     """A line for people, on stderr."""
     print(text, file=sys.stderr)  # noqa: T201
@@ -19,7 +23,7 @@ def note(text: str) -> None:
 
 def emit(summary: dict[str, Any]) -> None:
     """One strict JSON object on stdout."""
-    from drillctl.store import strict
+    from drillctl.json_files import strict
 
     print(json.dumps(strict(summary), allow_nan=False))  # noqa: T201
 
@@ -34,18 +38,22 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
     from rich.console import Console
     from rich.table import Table
 
-    made = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    made = Table(header_style="bold")
     for number, column in enumerate(columns):
-        made.add_column(column, justify="left" if number == 0 else "right")
+        made.add_column(column, justify="left" if number == 0 else "right", overflow="fold")
     for row in rows:
         made.add_row(*row)
-    console = Console()
-    # Piped output is not cut to a terminal's width.
-    console.print(made, width=None if console.is_terminal else 120, markup=False)
+    # Titles and names are the user's: a bracket or a colon in them is no markup.
+    console = Console(markup=False, emoji=False, highlight=False)
+    if not console.is_terminal:
+        console.width = PIPED_WIDTH
+    # Not as the table's own title, which would be broken at the table's width.
+    console.print(title, style="bold", soft_wrap=True)
+    console.print(made)
 
 
 class Bar:
-    """Progress as a rich bar on stderr, shown once the work takes longer than a second.
+    """Progress as a rich bar on stderr.
 
     Parameters
     ----------
@@ -70,7 +78,7 @@ class Bar:
 
 @contextmanager
 def progress() -> Iterator[Bar]:
-    """Progress on stderr while the block runs; gone when it ends."""
+    """Progress on stderr while the block runs; gone when it ends, absent from files and pipes."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -83,7 +91,10 @@ def progress() -> Iterator[Bar]:
     columns = (
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
     )  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
         yield Bar(bar)
 
 

@@ -13,12 +13,11 @@ No pickle anywhere; a folder that holds anything else is never written to.
 from __future__ import annotations
 
 import hashlib
-import json
-import math
+import itertools
 import os
 import shutil
-from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +26,13 @@ import numpy as np
 import drillctl
 from drillctl.design import Design, load, to_toml
 from drillctl.errors import InputError
+from drillctl.json_files import read_json, write_json, write_text
 from drillctl.provenance import provenance
-from drillctl.simulation.batch import FLOATS, Batch, Prepared
-from drillctl.simulation.kernels.string_step import BlockString, DenseString
-from drillctl.simulation.propagator import StringStep
-from drillctl.simulation.scheme import Scheme
+from drillctl.simulation.trajectory import Simulation
+from drillctl.store_blocks import FolderBlocks
+from drillctl.studies.audit import choose_cells
+from drillctl.studies.grid import axes_of
+from drillctl.studies.sweeps import Sweep
 
 RUNS = Path("runs")
 """Where runs go that were given no folder."""
@@ -55,23 +56,37 @@ class RunFolder:
         Command that made it.
     finished : bool
         Whether it held the finished run when it was opened.
+    made : bool
+        Whether the folder was not there before.
     """
 
     path: Path
     verb: str
     finished: bool
+    made: bool = False
 
     def summary(self) -> dict[str, Any]:
         """The summary of a finished run."""
-        found: dict[str, Any] = _read_json(self.path / "summary.json")
+        found: dict[str, Any] = read_json(self.path / "summary.json")
         return found
 
     def finish(self, summary: dict[str, Any]) -> None:
         """Write the summary, mark the run finished and drop its blocks."""
         write_json(self.path / "summary.json", summary)
-        about = _read_json(self.path / "run.json")
+        about = read_json(self.path / "run.json")
         write_json(self.path / "run.json", about | {"finished": True})
         shutil.rmtree(self.path / "blocks", ignore_errors=True)
+
+    def discard(self) -> None:
+        """Take back what `claim` wrote, for a run that turned out to be impossible."""
+        if any((self.path / "blocks").glob("[0-9]*.npz")):
+            return  # hours of work, perhaps
+        shutil.rmtree(self.path / "blocks", ignore_errors=True)
+        for name in ("design.toml", "run.json"):
+            (self.path / name).unlink(missing_ok=True)
+        if self.made:
+            with suppress(OSError):  # something else was put in meanwhile
+                self.path.rmdir()
 
     def blocks(self) -> FolderBlocks:
         """Blocks kept in this folder."""
@@ -104,173 +119,90 @@ def claim(verb: str, design: Design, folder: str | Path | None, **settings: Any)
     InputError
         The folder holds something else, or cannot be written.
     """
-    path = _fresh(verb, design) if folder is None else Path(folder)
     about = {"verb": verb, "identity": identity(verb, design, **settings), "design": design.name}
-    if path.exists() and not path.is_dir():
-        raise InputError("is a file, not a folder", f"--out {path}")
-    if path.is_dir() and any(path.iterdir()):
-        return _same_run(path, about)
+    path = RUNS / f"{design.name}-{verb}-*" if folder is None else Path(folder)
     try:
-        path.mkdir(parents=True, exist_ok=True)
-        (path / "design.toml").write_text(to_toml(design), encoding="utf-8")
-        write_json(path / "run.json", about | {"finished": False, "provenance": provenance()})
+        if folder is None:
+            path = _fresh(verb, design)
+            run = RunFolder(path, verb, finished=False, made=True)
+        elif path.exists() and not path.is_dir():
+            raise InputError("is a file, not a folder", f"--out {path}")
+        elif path.is_dir() and not _empty(path):
+            run = _same_run(path, about)
+        else:
+            run = RunFolder(path, verb, finished=False, made=not path.exists())
+            path.mkdir(parents=True, exist_ok=True)
+        if not (path / "run.json").exists():
+            write_json(path / "run.json", about | {"finished": False, "provenance": provenance()})
+        if not run.finished:
+            write_text(path / "design.toml", to_toml(design))
     except OSError as error:
         raise InputError(f"cannot be written: {error.strerror}", f"--out {path}") from None
-    return RunFolder(path, verb, finished=False)
+    return run
 
 
 def _fresh(verb: str, design: Design) -> Path:
-    number = 1
-    while (path := RUNS / f"{design.name}-{verb}-{number}").exists():
-        number += 1
+    """A new folder; made at once, lest another process take the same."""
+    RUNS.mkdir(parents=True, exist_ok=True)
+    for number in itertools.count(1):
+        path = RUNS / f"{design.name}-{verb}-{number}"
+        with suppress(FileExistsError):
+            path.mkdir()
+            break
     return path
+
+
+def _empty(path: Path) -> bool:
+    """Whether a folder holds nothing, or only what a run leaves that was killed at its birth."""
+    return all(item.name == "run.part" for item in path.iterdir())
 
 
 def _same_run(path: Path, about: dict[str, str]) -> RunFolder:
     where = f"--out {path}"
     if not (path / "run.json").is_file():
         raise InputError("holds something that is not a run; give an empty or new folder", where)
-    held = _read_json(path / "run.json")
+    held = _about(path)
     if held.get("verb") != about["verb"]:
         raise InputError(f"holds a run of {held.get('verb')!r}, not {about['verb']!r}", where)
     if held.get("identity") != about["identity"]:
-        came_from = held.get("provenance", {}).get("drillctl")
+        came_from = held["provenance"].get("drillctl")
         reason = "another design or other settings"
         if came_from != drillctl.__version__:
             reason = f"version {came_from}, this is {drillctl.__version__}"
         raise InputError(f"holds a run of {reason}; give another folder", where)
+    if held.get("finished"):
+        return RunFolder(path, about["verb"], finished=True)
     if not os.access(path, os.W_OK):
         raise InputError("cannot be written: permission denied", where)
-    if held["provenance"] != provenance() and not held["finished"]:
+    if held["provenance"] != provenance():
         raise InputError(
             "holds an unfinished run begun with other packages or on another processor; the "
             "rest would differ in the last bits: give another folder",
             where,
         )
-    return RunFolder(path, about["verb"], held["finished"])
+    return RunFolder(path, about["verb"], finished=False)
 
 
-@dataclass(frozen=True)
-class FolderBlocks:
-    """Finished blocks as files; see `studies.blocks.Blocks`.
-
-    Attributes
-    ----------
-    folder : Path
-        Where they lie.
-    """
-
-    folder: Path
-
-    def prepared(self, number: int, prepare: Callable[[], Prepared]) -> Prepared:
-        """The string of a group, read back if it was prepared before."""
-        path = self.folder / f"string-{number:06d}.npz"
-        if not path.is_file():
-            made = prepare()
-            _write_npz(path, _string_arrays(made))
-            return made
-        with np.load(path, allow_pickle=False) as held:
-            return _string_from(dict(held))
-
-    def find(self, number: int) -> Batch | None:
-        """The block if it was finished before."""
-        path = self.folder / f"{number:06d}.npz"
-        if not path.is_file():
-            return None
-        with np.load(path, allow_pickle=False) as held:
-            values = held["measures"]
-            measures = {name: values[i] for i, name in enumerate(FLOATS)}
-            return Batch(measures, held["status"])
-
-    def keep(self, number: int, batch: Batch) -> None:
-        """Keep a finished block."""
-        values = np.stack([batch.measures[name] for name in FLOATS])
-        path = self.folder / f"{number:06d}.npz"
-        _write_npz(path, {"measures": values, "status": batch.status})
-
-
-def _string_arrays(prepared: Prepared) -> dict[str, Any]:
-    stepper = prepared.stepper
-    fields = {f"kernel.{k}": v for k, v in stepper.string._asdict().items()}
-    return fields | {
-        "blocks": isinstance(stepper.string, BlockString),
-        "angle_to_state": stepper.angle_to_state,
-        "speed_to_state": stepper.speed_to_state,
-        "rest": stepper.rest,
-        "step": prepared.scheme.step,
-        "steps": prepared.scheme.steps,
-        "modes": prepared.scheme.modes,
-        "duration": prepared.duration,
-        "j1_from": prepared.j1_from,
-    }
-
-
-def _string_from(held: dict[str, Any]) -> Prepared:
-    kind = BlockString if held["blocks"] else DenseString
-    string = kind(**{name: _number(held[f"kernel.{name}"]) for name in kind._fields})
-    scheme = Scheme(float(held["step"]), int(held["steps"]), int(held["modes"]))
-    stepper = StringStep(
-        string,
-        held["angle_to_state"],
-        held["speed_to_state"],
-        held["rest"],
-        scheme.modes,
-        scheme.step,
-    )
-    return Prepared(stepper, scheme, float(held["duration"]), float(held["j1_from"]))
-
-
-def _number(array: Any) -> Any:
-    return float(array) if array.ndim == 0 else array
-
-
-def _write_npz(path: Path, arrays: dict[str, Any]) -> None:
-    """Write beside the target and move: a reader sees a whole file or none."""
-    part = path.with_suffix(".part")
-    with part.open("wb") as stream:
-        np.savez(stream, **arrays)
-        stream.flush()
-        os.fsync(stream.fileno())
-    part.replace(path)
-
-
-def write_json(path: Path, content: Any) -> None:
-    """Write strict JSON (null, never NaN), atomically."""
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(strict(content), indent=2, allow_nan=False) + "\n", "utf-8")
-    part.replace(path)
-
-
-def strict(content: Any) -> Any:
-    """The same with None for every number that is not finite, and plain Python types."""
-    if isinstance(content, dict):
-        return {str(key): strict(value) for key, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [strict(value) for value in content]
-    if isinstance(content, (np.generic, np.ndarray)):
-        return strict(content.tolist())
-    if isinstance(content, float) and not math.isfinite(content):
-        return None
-    return content
-
-
-def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read: {error}", str(path)) from None
+def _about(path: Path) -> dict[str, Any]:
+    """What `run.json` says, if it is one of ours."""
+    held = read_json(path / "run.json")
+    if not isinstance(held, dict) or not isinstance(held.get("provenance"), dict):
+        raise InputError("holds a run.json that is not of a run", str(path))
+    return held
 
 
 def write_data(result: Any, folder: Path) -> None:
-    """Write a result's dataset as `data.zarr`, whole or not at all."""
+    """Write a result's dataset as `data.zarr`, with its provenance, whole or not at all."""
     part, target = folder / "data.part", folder / "data.zarr"
     shutil.rmtree(part, ignore_errors=True)
-    result.data.to_zarr(part, mode="w", consolidated=False)
+    data = result.data
+    data.attrs = provenance() | data.attrs
+    data.to_zarr(part, mode="w", consolidated=False)
     shutil.rmtree(target, ignore_errors=True)
     part.rename(target)
 
 
-VERBS = {"Sweep": "map", "Simulation": "simulate", "Modes": "modes"}
+VERBS = {"Sweep": "map", "Simulation": "simulate"}
 
 
 def save(result: Any, folder: str | Path) -> Path:
@@ -293,10 +225,41 @@ def save(result: Any, folder: str | Path) -> Path:
     InputError
         The folder holds something else, or cannot be written.
     """
-    run = claim(VERBS[type(result).__name__], result.design, folder)
+    design, settings = _asked(result)
+    run = claim(VERBS[type(result).__name__], design, folder, **settings)
     write_data(result, run.path)
     run.finish(result.summary())
     return run.path
+
+
+def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
+    """The design that gives this result again, and what was asked for beside it.
+
+    Python takes an engine, axes and audited cells that the design does not hold; a command
+    that runs the design itself must not take such a result for its own.
+    """
+    design: Design = result.design
+    tables = design.tables
+    settings: dict[str, Any] = {}
+    if isinstance(result, Simulation):
+        if result.engine != (tables.simulation.engine or "reference"):
+            design = design.replace({"simulation.engine": result.engine})
+    elif isinstance(result, Sweep):
+        axes = [[a.path, a.values.tolist()] for a in result.axes]
+        cells = choose_cells(result.j1, result.levels, tables.map.audit_cells)
+        if axes != _own_axes(design):
+            settings["axes"] = axes
+        if not np.array_equal(cells, result.audit.cells):
+            settings["audited"] = result.audit.cells.tolist()
+    return design, settings
+
+
+def _own_axes(design: Design) -> list[Any] | None:
+    try:
+        own = axes_of(design, design.tables.map.axes)
+    except InputError:  # the default ones do not fit every law
+        return None
+    return [[a.path, a.values.tolist()] for a in own]
 
 
 def open(folder: str | Path) -> Any:
@@ -309,8 +272,8 @@ def open(folder: str | Path) -> Any:
 
     Returns
     -------
-    Sweep or Simulation
-        Equal to what was saved, to the bit.
+    Sweep, Simulation or Modes
+        Equal to what was saved, to the bit; a simulation without its events and energy balance.
 
     Raises
     ------
@@ -324,11 +287,15 @@ def open(folder: str | Path) -> Any:
     path = Path(folder)
     if not (path / "run.json").is_file():
         raise InputError("is not a saved run: there is no run.json", str(path))
-    about = _read_json(path / "run.json")
+    about = _about(path)
     if not about.get("finished"):
         raise InputError("holds a run that is not finished; run the command again", str(path))
-    if about["verb"] not in READERS:
-        raise InputError(f"results of {about['verb']!r} are not read back", str(path))
-    design = load(path / "design.toml")
-    with xarray.open_zarr(path / "data.zarr", consolidated=False) as data:
-        return READERS[about["verb"]](design, data.load(), _read_json(path / "summary.json"))
+    if about.get("verb") not in READERS:
+        raise InputError(f"results of {about.get('verb')!r} are not read back", str(path))
+    design = replace(load(path / "design.toml"), name=str(about.get("design")))
+    summary = read_json(path / "summary.json")
+    try:
+        with xarray.open_zarr(path / "data.zarr", consolidated=False) as data:
+            return READERS[about["verb"]](design, data.load(), summary)
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise InputError(f"cannot be read back: {error}", str(path)) from None

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from drillctl.design import Design
+from drillctl.linear.modal import Mode, Modes
 from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.measures import Measures
 from drillctl.simulation.trajectory import SIGNALS, Simulation
@@ -56,4 +58,29 @@ def read_simulation(design: Design, data: xarray.Dataset, summary: dict[str, Any
     )
 
 
-READERS = {"map": read_sweep, "simulate": read_simulation}
+def read_modes(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Modes:
+    """`Modes` as they were saved."""
+    return Modes(
+        free_free=_modes(data, "free_free"),
+        fixed_top=_modes(data, "fixed_top"),
+        node_depth=data["node_depth"].values,
+        element_depth=data["element_depth"].values,
+    )
+
+
+def _modes(data: xarray.Dataset, support: str) -> tuple[Mode, ...]:
+    columns = (
+        data[f"{support}_{name}"].values
+        for name in ("frequency", "damping_ratio", "overdamped", "shape", "torque_shape")
+    )
+    return tuple(
+        Mode(float(frequency), None if np.isnan(ratio) else float(ratio), bool(real), *shapes)
+        for frequency, ratio, real, *shapes in zip(*columns, strict=True)
+    )
+
+
+READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
+    "map": read_sweep,
+    "simulate": read_simulation,
+    "modes": read_modes,
+}

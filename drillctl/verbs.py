@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from drillctl import console
+from drillctl.errors import InputError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,15 +25,29 @@ def _draw(figure: Figure, path: Path) -> None:
     figure.savefig(path, dpi=DPI)
 
 
-def _shown_again(folder: RunFolder, options: Options) -> bool:
+def _shown_again(folder: RunFolder, options: Options, show: Callable[[], None]) -> bool:
     """Whether the folder held the finished run, whose summary is then shown once more."""
     if not folder.finished:
         return False
     if options.json:
         console.emit(folder.summary())
     else:
-        console.note(f"already done: {folder.path}")
+        show()
+    console.note(f"already done: {folder.path}")
     return True
+
+
+@contextmanager
+def _running(folder: RunFolder) -> Iterator[None]:
+    """A run in its folder: an impossible one leaves none, an interrupted one can go on."""
+    try:
+        yield
+    except InputError:
+        folder.discard()
+        raise
+    except KeyboardInterrupt:
+        console.note(f"what is finished is kept: the same with --out {folder.path} goes on")
+        raise
 
 
 def _conclude(folder: RunFolder, summary: dict[str, Any], options: Options) -> None:
@@ -46,10 +63,11 @@ def modes(design: Design, count: int, options: Options) -> None:
     """Modes with their figures, the Bode plot and the friction curves."""
     from drillctl import linear, plots, printing, store
 
-    result = linear.modes(design, count)
     folder = store.claim("modes", design, options.out, count=count)
-    if _shown_again(folder, options):
+    if _shown_again(folder, options, lambda: printing.modes(folder.summary())):
         return
+    with _running(folder):
+        result = linear.modes(design, count)
     summary = result.summary()
     store.write_data(result, folder.path)
     _draw(plots.mode_shapes(result), folder.path / "modes.png")
@@ -66,9 +84,11 @@ def simulate(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store
 
     folder = store.claim("simulate", design, options.out)
-    if _shown_again(folder, options):
+    if _shown_again(
+        folder, options, lambda: printing.simulation(store.open(folder.path), options.units)
+    ):
         return
-    with console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         bar.begin("simulating", 1)
         result = drillctl.simulate(design)
     store.write_data(result, folder.path)
@@ -89,9 +109,11 @@ def stability_map(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("map", design, options.out)
-    if _shown_again(folder, options):
+    if _shown_again(
+        folder, options, lambda: printing.sweep(store.open(folder.path), options.units)
+    ):
         return
-    with console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         result = studies.sweep(design, progress=bar, blocks=folder.blocks())
     store.write_data(result, folder.path)
     studies.write_tables(result, folder.path)

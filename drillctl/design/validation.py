@@ -43,10 +43,21 @@ def validated(tree: Tree, origin: str) -> DesignTables:
         parts.refuse_impossible_string(tables)
         parts.bit_rock(tables)
     except ValidationError as error:
-        raise _told(error.errors()[0], tree, origin) from None
+        raise _told(_first(error.errors()), tree, origin) from None
     except InputError as error:
         raise error.within(origin) if origin else error from None
     return tables
+
+
+def _first(problems: list[Any]) -> Any:
+    """The first error; a misspelt key before the missing one it was meant for."""
+    first = problems[0]
+    if first["type"] == "missing":
+        table = first["loc"][:-1]
+        for problem in problems:
+            if problem["type"] == "extra_forbidden" and problem["loc"][:-1] == table:
+                return problem
+    return first
 
 
 def _told(problem: Any, tree: Tree, origin: str) -> InputError:

@@ -11,8 +11,8 @@ thirty elements. `control` is imported where a system is made and not before, as
 """
 
 from drillctl.linear.modal import Mode, Modes, modes
-from drillctl.linear.state_space import closed_loop, open_loop, plant
 from drillctl.linear.response import FrequencyResponse, frequency_response
+from drillctl.linear.state_space import closed_loop, open_loop, plant
 
 __all__ = [
     "FrequencyResponse",

@@ -67,7 +67,8 @@ def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = 
     bar = figure.colorbar(mesh, ax=ax, extend="max", pad=0.02)
     bar.set_label("J1 (s)")
     bar.ax.tick_params(labelsize=SMALL)
-    shown = [level for level in result.levels if result.j1[np.isfinite(result.j1)].min() <= level]
+    finite = result.j1[np.isfinite(result.j1)]
+    shown = [v for v in result.levels if finite.size and finite.min() <= v <= finite.max()]
     if shown:
         lines = ax.contour(x, y, result.j1.T, levels=shown, colors=BLACK, linewidths=LINE)
         ax.clabel(lines, fmt=lambda level: f"{level:g}", fontsize=SMALL, inline_spacing=2)

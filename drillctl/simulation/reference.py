@@ -224,7 +224,7 @@ class _System:
         # Past zero speed the law is continued smoothly, so that the event can be located.
         speed = self.bit_speed(state)
         torque, _ = self.friction.torque_and_slope(
-            self.weight.weight(speed), direction * speed, math.exp
+            self.weight.weight(speed), direction * speed, _exp
         )
         return direction * float(torque)
 
@@ -299,7 +299,8 @@ class _System:
             return self.rates(self.slip, state, self.slip_torque(state, direction))
 
         def comes_to_rest(time: float, state: Array) -> float:
-            return direction * self.bit_speed(state)
+            # Exactly zero is the release itself, in a step too short to move the bit.
+            return direction * self.bit_speed(state) or 1e-300
 
         def at_set_speed(time: float, state: Array) -> float:
             return float(state[2 * self.nodes - 1])
@@ -330,6 +331,11 @@ class _System:
         after = stored_energy(self.string, state[:nodes], state[nodes : 2 * nodes] + self.set_speed)
         drive, bit, damping = (float(work) for work in state[2 * nodes :])
         return EnergyAudit(drive, bit, damping, after - before)
+
+
+def _exp(x: float) -> float:
+    """exp(x), finite: a trial step far past zero speed is to be rejected, not to raise."""
+    return math.exp(min(x, 100.0))
 
 
 def _integrate(*arguments: Any, **options: Any) -> Any:

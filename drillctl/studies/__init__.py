@@ -6,6 +6,7 @@
 - `audit.py`: cells of a map simulated again with the reference solver.
 - `responses.py`, `tables.py`: time responses at cells of a map; maps as CSV.
 - `blocks.py`: finished blocks of a long run.
+- `memory.py`: grids too large for the memory.
 """
 
 from drillctl.studies.grid import Axis

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -43,8 +42,10 @@ class Audit:
 
     @property
     def differences(self) -> Array:
-        """Relative differences, shape (audited,)."""
-        return np.abs(self.batch - self.reference) / np.abs(self.reference)
+        """Relative differences, shape (audited,); 0 where both are 0."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = np.abs(self.batch - self.reference) / np.abs(self.reference)
+        return np.where(self.batch == self.reference, 0.0, found)
 
     @property
     def worst(self) -> float | None:
@@ -134,12 +135,14 @@ def audit(
 
 def _all(designs: list[Design], progress: Progress) -> list[float]:
     import joblib
+    import numba
 
+    if not designs:
+        return []
     progress.begin("auditing cells", len(designs))
     found = []
-    workers = min(len(designs), os.cpu_count() or 1)
-    if workers == 0:
-        return []
+    # As many as the lanes may use, which is what `--threads` sets.
+    workers = min(len(designs), numba.get_num_threads())
     runs = joblib.Parallel(n_jobs=workers, return_as="generator")(
         joblib.delayed(reference_j1)(d) for d in designs
     )
@@ -150,13 +153,14 @@ def _all(designs: list[Design], progress: Progress) -> list[float]:
 
 
 def reference_j1(design: Design) -> float:
-    """J1 of a design by the reference solver (s); NaN if that fails."""
+    """J1 of a design by the reference solver (s); NaN if that fails, be it by overflow."""
     from drillctl.simulation.reference import solve
     from drillctl.simulation.trajectory import deviation
 
     table = design.tables.simulation
     try:
-        motion = solve(design, tolerance=TOLERANCE)
-    except SimulationError:
+        with np.errstate(all="ignore"):  # a run that grows without bound is told as failed
+            motion = solve(design, tolerance=TOLERANCE)
+    except (SimulationError, ArithmeticError, np.linalg.LinAlgError):
         return float("nan")
     return deviation(motion, table.j1_from, table.duration) / design.speed

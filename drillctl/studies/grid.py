@@ -14,6 +14,7 @@ from drillctl.design import Design, parameter
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
 from drillctl.simulation.lanes import Lanes, lane_numbers, lanes_of
+from drillctl.studies.memory import refuse_too_large
 
 Array = NDArray[np.float64]
 
@@ -76,8 +77,8 @@ def axis(design: Design, table: AxisTable) -> Axis:
         Unknown path, a wrong unit, or an axis that does not increase.
     """
     where = f"map.axes {table.path}"
-    found = parameter(design, table.path)
     try:
+        found = parameter(design, table.path)
         low, high = found.parse(table.min), found.parse(table.max)
     except InputError as error:
         raise InputError(error.problem, where) from None
@@ -99,7 +100,14 @@ def _refuse_fractional_count(design: Design, table: AxisTable, values: Array) ->
 
 
 def axes_of(design: Design, tables: tuple[AxisTable, ...]) -> tuple[Axis, ...]:
-    """All axes of a grid; see `axis`."""
+    """All axes of a grid; see `axis`.
+
+    Raises
+    ------
+    InputError
+        An axis that does not fit the design, or a grid too large for the memory.
+    """
+    refuse_too_large([table.points for table in tables])
     return tuple(axis(design, table) for table in tables)
 
 
@@ -143,49 +151,44 @@ def _replaced(design: Design, values: dict[str, float]) -> Design:
 
 
 def _numbers(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array]:
-    """Lane numbers of every cell, flattened.
-
-    Where no two axes touch the same number, each axis is resolved alone and the grid is their
-    outer product; else every cell is resolved.
-    """
-    base = lane_numbers(design)
-    shape = shape_of(axes)
-    columns = [[lane_numbers(_replaced(design, {a.path: v})) for v in a.values] for a in axes]
-    touched = [
-        {key for key in base if any(n[key] != base[key] for n in column)} for column in columns
-    ]
-    if _disjoint(touched) and _product_holds(design, axes, base, columns, touched):
-        grid = {key: np.full(shape, value) for key, value in base.items()}
-        for dimension, (column, keys) in enumerate(zip(columns, touched, strict=True)):
-            along = [1] * len(shape)
-            along[dimension] = -1
-            for key in keys:
-                grid[key][:] = np.array([n[key] for n in column]).reshape(along)
-    else:
+    """Lane numbers of every cell, flattened."""
+    grid = _outer_product(design, axes)
+    if grid is None:
         cells = [
             lane_numbers(cell_design(design, axes, cell))
-            for cell in range(int(np.prod(shape, dtype=int)))
+            for cell in range(int(np.prod(shape_of(axes), dtype=int)))
         ]
-        grid = {key: np.array([c[key] for c in cells]) for key in base}
+        grid = {key: np.array([c[key] for c in cells]) for key in cells[0]}
     return {key: values.ravel() for key, values in grid.items()}
 
 
-def _disjoint(touched: list[set[str]]) -> bool:
-    return sum(map(len, touched)) == len(set().union(*touched)) if touched else True
+def _outer_product(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array] | None:
+    """Lane numbers over the grid, from each axis resolved alone; None if that does not hold.
+
+    The other axes stand at their lowest values meanwhile, not at the design's: those may be
+    impossible together with values of this axis, or the reason why it changes nothing.
+    """
+    low = {a.path: a.values[0] for a in axes}
+    base = lane_numbers(_replaced(design, low) if axes else design)
+    grid = {key: np.full(shape_of(axes), value) for key, value in base.items()}
+    taken: set[str] = set()
+    for dimension, a in enumerate(axes):
+        column = [lane_numbers(_replaced(design, low | {a.path: v})) for v in a.values]
+        touched = {key for key in base if any(n[key] != base[key] for n in column)}
+        if touched & taken:
+            return None
+        taken |= touched
+        along = [-1 if d == dimension else 1 for d in range(len(axes))]
+        for key in touched:
+            grid[key][:] = np.array([n[key] for n in column]).reshape(along)
+    return grid if _right_at_corners(design, axes, grid) else None
 
 
-def _product_holds(
-    design: Design,
-    axes: tuple[Axis, ...],
-    base: dict[str, float],
-    columns: list[list[dict[str, float]]],
-    touched: list[set[str]],
-) -> bool:
-    """Whether the far corner of the grid, resolved as a whole, is what the axes say it is."""
-    if not axes:
-        return True
-    corner = lane_numbers(_replaced(design, {a.path: a.values[-1] for a in axes}))
-    expected = dict(base)
-    for column, keys in zip(columns, touched, strict=True):
-        expected |= {key: column[-1][key] for key in keys}
-    return corner == expected
+def _right_at_corners(design: Design, axes: tuple[Axis, ...], grid: dict[str, Array]) -> bool:
+    """Whether every corner, resolved as a whole, is possible and what the grid says it is."""
+    for corner in itertools.product((0, -1), repeat=len(axes)):
+        values = {a.path: a.values[k] for a, k in zip(axes, corner, strict=True)}
+        numbers = lane_numbers(_replaced(design, values) if axes else design)
+        if any(grid[key][corner] != value for key, value in numbers.items()):
+            return False
+    return True

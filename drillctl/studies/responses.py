@@ -28,8 +28,9 @@ def responses(result: Sweep, count: int = 4) -> list[Simulation]:
     if result.minimum is None:
         return []
     flat = result.j1.ravel()
-    low = result.minimum[0]
-    targets = np.geomspace(low, max(low, 2.0 * result.levels[-1]), count)
+    high = 2.0 * result.levels[-1]
+    low = max(result.minimum[0], 1e-6 * high)  # a rig that never leaves its set speed has J1 = 0
+    targets = np.geomspace(low, max(low, high), count)
     cells = dict.fromkeys(int(np.nanargmin(np.abs(flat - target))) for target in targets)
     designs = [cell_design(result.design, result.axes, cell) for cell in cells]
     return [simulate(design, engine="batch", interval=0.05) for design in designs]

@@ -19,6 +19,7 @@ from drillctl.simulation.measures import STATUSES
 from drillctl.studies import audit as auditing
 from drillctl.studies.blocks import Blocks, KeepNothing
 from drillctl.studies.grid import Axis, axes_of, groups, shape_of
+from drillctl.studies.memory import refuse_too_large
 from drillctl.studies.regions import Region, region
 
 if TYPE_CHECKING:
@@ -27,11 +28,6 @@ if TYPE_CHECKING:
     import xarray
 
 Array = NDArray[np.float64]
-
-BYTES_PER_CELL = 8 * (2 * len(FLOATS) + 20)
-"""Memory that a cell takes while a sweep runs."""
-MEMORY_SHARE = 0.5
-"""Largest share of the free memory that a sweep may ask for."""
 
 _UNITS = {
     "j1": "s", "j1_rate": "1", "stuck_time": "s", "sticks": "1", "stick_slip_index": "1",
@@ -181,7 +177,7 @@ def sweep(
     begin = time.perf_counter()
     table = design.tables.map
     axes = axes_of(design, table.axes) if axes is None else axes
-    _refuse_too_large(axes)
+    refuse_too_large(shape_of(axes))
     collected = _Collected(axes)
     collected.run(design, progress, blocks or KeepNothing())
     count = table.audit_cells if audit_cells is None else audit_cells
@@ -233,15 +229,20 @@ class _Collected:
         self.step, self.modes, self.seconds = np.nan, 0, 0.0
 
     def run(self, design: Design, progress: Progress, blocks: Blocks) -> None:
-        number = 0
+        number = done = 0
+        warm: set[type] = set()
         for index, group in enumerate(groups(design, self.axes)):
             table, lanes = group.design.tables.simulation, group.lanes
             prepared = blocks.prepared(index, partial(prepare, lanes, table))
             if index == 0:
                 self.step, self.modes = prepared.scheme.step, prepared.scheme.modes
+            kind = type(prepared.stepper.string)
+            if kind not in warm:  # a string of another kind takes another kernel
+                warm.add(kind)
                 progress.begin("loading kernels", 1)
                 warm_up(lanes, prepared)
                 progress.begin("simulating lanes", len(self.status))
+                progress.advance(done)
             for first in range(0, len(lanes), CHUNK):
                 part = slice(first, first + CHUNK)
                 batch = blocks.find(number)
@@ -252,30 +253,10 @@ class _Collected:
                     blocks.keep(number, batch)
                 self._put(group.cells[part], batch)
                 progress.advance(len(batch.status))
+                done += len(batch.status)
                 number += 1
 
     def _put(self, cells: NDArray[np.int64], batch: Batch) -> None:
         for name, values in batch.measures.items():
             self.measures[name][cells] = values
         self.status[cells] = batch.status
-
-
-def _refuse_too_large(axes: tuple[Axis, ...]) -> None:
-    cells = int(np.prod([float(len(a)) for a in axes]))
-    needed, free = cells * BYTES_PER_CELL, _free_memory()
-    if needed > MEMORY_SHARE * free:
-        raise InputError(
-            f"{cells:,} cells need about {needed / 2**30:.1f} GiB; "
-            f"{MEMORY_SHARE * free / 2**30:.1f} GiB may be used: fewer points",
-            "map.axes",
-        )
-
-
-def _free_memory() -> float:
-    """Memory that is free (bytes); infinite where the system does not tell."""
-    import os
-
-    try:
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (ValueError, OSError, AttributeError):
-        return float("inf")

@@ -57,7 +57,7 @@ speed = "70 rpm"
 """
 
 
-@pytest.fixture()
+@pytest.fixture
 def over_rig(tmp_path):
     """A function that loads a design with the given text, laid over `RIG`."""
 

@@ -1,5 +1,6 @@
 """Compiled loops of the batch engine; nothing here knows of designs, units or files.
 
+- `arithmetic.py`, `compiling.py`: fused multiply-adds; how everything is compiled.
 - `exponential.py`: an exponential that the compiler can run on many lanes at once.
 - `laws.py`: lets the laws of `bit_rock`, `top_drive` and `weight_on_bit` be called by type.
 - `rows.py`: what each row of a block's working array holds.

@@ -6,9 +6,10 @@ from typing import Any
 
 import numba
 
-# Fused multiply-adds are allowed and nothing else: `fastmath=True` would delete NaN tests.
-# Division follows IEEE: a test for zero before each would keep loops over lanes scalar.
-OPTIONS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy"}
+# No fastmath of any kind: multiply-adds are fused where `arithmetic.fma` says so, the same for
+# any width of vectors, and tests for NaN stay. Division follows IEEE: a test for zero before
+# each would keep loops over lanes scalar.
+OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 
 inlined = numba.njit(forceinline=True, **OPTIONS)
 """Decorator for what is part of the step of a lane."""

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from drillctl.simulation.kernels import rows as r
+from drillctl.simulation.kernels.arithmetic import fma
 from drillctl.simulation.kernels.compiling import inlined
 from drillctl.simulation.kernels.rows import WIDTH
 
@@ -114,11 +115,11 @@ def _by_blocks(string: Any, state: Any, work: Any) -> None:
         at_y = at_x + WIDTH
         for lane in range(WIDTH):
             top, bit = work[r.TOP_TORQUE + lane], work[r.BIT_TORQUE + lane]
-            x = state[at_x + lane] + b11 * top + b12 * bit
-            y = state[at_y + lane] + b21 * top + b22 * bit
-            work[r.PIPE + lane] += p1 * x + p2 * y
-            x_free = a11 * x + a12 * y
-            y_free = a21 * x + a22 * y
+            x = fma(b12, bit, fma(b11, top, state[at_x + lane]))
+            y = fma(b22, bit, fma(b21, top, state[at_y + lane]))
+            work[r.PIPE + lane] = fma(p2, y, fma(p1, x, work[r.PIPE + lane]))
+            x_free = fma(a12, y, a11 * x)
+            y_free = fma(a22, y, a21 * x)
             state[at_x + lane] = x_free
             state[at_y + lane] = y_free
             work[r.TOP_FREE + lane] += x_free
@@ -134,9 +135,10 @@ def _by_matrix(string: Any, state: Any, work: Any) -> None:
         b1, b2, p = string.push[i, 0], string.push[i, 1], string.pipe[i]
         at = i * WIDTH
         for lane in range(WIDTH):
-            z = state[at + lane] + b1 * work[r.TOP_TORQUE + lane] + b2 * work[r.BIT_TORQUE + lane]
+            z = fma(b1, work[r.TOP_TORQUE + lane], state[at + lane])
+            z = fma(b2, work[r.BIT_TORQUE + lane], z)
             state[complete + at + lane] = z
-            work[r.PIPE + lane] += p * z
+            work[r.PIPE + lane] = fma(p, z, work[r.PIPE + lane])
     for i in range(states):
         at = i * WIDTH
         for lane in range(WIDTH):
@@ -145,11 +147,12 @@ def _by_matrix(string: Any, state: Any, work: Any) -> None:
             a = string.free[i, j]
             other = complete + j * WIDTH
             for lane in range(WIDTH):
-                state[at + lane] += a * state[other + lane]
+                state[at + lane] = fma(a, state[other + lane], state[at + lane])
         c_top, c_bit = string.top_angle[i], string.bit_speed[i]
         for lane in range(WIDTH):
-            work[r.TOP_FREE + lane] += c_top * state[at + lane]
-            work[r.BIT_FREE + lane] += c_bit * state[at + lane]
+            z = state[at + lane]
+            work[r.TOP_FREE + lane] = fma(c_top, z, work[r.TOP_FREE + lane])
+            work[r.BIT_FREE + lane] = fma(c_bit, z, work[r.BIT_FREE + lane])
 
 
 @overload(complete_and_propagate)

@@ -1,0 +1,35 @@
+"""Grids that would not fit the memory, refused before anything is computed."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+
+from drillctl.errors import InputError
+from drillctl.simulation.batch import FLOATS
+
+BYTES_PER_CELL = 8 * (2 * len(FLOATS) + 20)
+"""Memory that a cell takes while a sweep runs."""
+MEMORY_SHARE = 0.5
+"""Largest share of the free memory that a sweep may ask for."""
+
+
+def refuse_too_large(points: Sequence[int]) -> None:
+    """Refuse (`InputError`) a grid of so many points along its axes, if memory falls short."""
+    cells = math.prod(points)
+    needed, usable = cells * BYTES_PER_CELL, MEMORY_SHARE * _free_memory()
+    if needed > usable:
+        raise InputError(
+            f"{cells:,} cells need about {needed / 2**30:,.1f} GiB; "
+            f"{usable / 2**30:.1f} GiB may be used: fewer points",
+            "map.axes",
+        )
+
+
+def _free_memory() -> float:
+    """Memory that is free (bytes); infinite where the system does not tell."""
+    try:
+        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (ValueError, OSError, AttributeError):
+        return float("inf")

@@ -1,0 +1,190 @@
+"""The exact step of a string against the matrix exponential, for any viscous damping."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drillctl.drillstring import Drillstring, Section, assemble
+from drillctl.simulation.kernels import rows as r
+from drillctl.simulation.kernels.compiling import OPTIONS
+from drillctl.simulation.kernels.string_step import (
+    BlockString,
+    DenseString,
+    complete_and_propagate,
+    look,
+)
+from drillctl.simulation.propagator import string_step
+
+numba = pytest.importorskip("numba")
+STEP = 0.02
+
+
+@numba.njit(**OPTIONS)
+def _steps(string, state, work, torques, seen):
+    for n in range(len(torques)):
+        complete_and_propagate(string, state, work)
+        work[r.TOP_TORQUE] = torques[n, 0]
+        work[r.BIT_TORQUE] = torques[n, 1]
+        speed, angle = look(string, state, work, 0)
+        seen[n, 0] = speed
+        seen[n, 1] = angle
+
+
+def by_kernel(string: Drillstring, angle, speed, torques, modes=999):
+    """Top speed and bit angle after each step, in lane 0."""
+    stepper = string_step(string, STEP, modes)
+    z = stepper.state(angle[:, None], speed[:, None], np.zeros(1))[:, 0]
+    state = np.zeros((2 * len(z), r.WIDTH))
+    state[: len(z), 0] = z
+    seen = np.zeros((len(torques), 2))
+    _steps(stepper.string, state.ravel(), np.zeros(r.ROWS * r.WIDTH), torques, seen)
+    return stepper, seen
+
+
+def by_exponential(string: Drillstring, angle, speed, torques):
+    n = string.nodes
+    mass = string.mass.toarray()
+    a = np.zeros((2 * n + 2, 2 * n + 2))
+    a[:n, n : 2 * n] = np.eye(n)
+    a[n : 2 * n, :n] = -np.linalg.solve(mass, string.stiffness.toarray())
+    a[n : 2 * n, n : 2 * n] = -np.linalg.solve(mass, string.damping.toarray())
+    inputs = np.zeros((n, 2))
+    inputs[0, 0], inputs[-1, 1] = 1.0, -1.0
+    a[n : 2 * n, 2 * n :] = np.linalg.solve(mass, inputs)
+    step = scipy.linalg.expm(a * STEP)
+    z, seen = np.concatenate([angle, speed, [0.0, 0.0]]), []
+    for torque in torques:
+        z[2 * n :] = torque
+        z = step @ z
+        seen.append([z[n], z[n - 1]])
+    return np.array(seen)
+
+
+def a_string(stiffness_damping=0.0, mass_damping=0.0, top=0.0, bit=0.0, ratio=0.0, uneven=0.0):
+    sections = (
+        Section("pipe", 6, 400.0, 200.0, 0.0, 2000.0, 0.0, stiffness_damping, mass_damping),
+        Section("collar", 3, 5000.0, 90.0, 0.0, 200.0, uneven, stiffness_damping, mass_damping),
+    )
+    return assemble(sections, 500.0, 300.0, top, bit, modal_damping=ratio)
+
+
+CASES = {
+    "undamped": a_string(),
+    "modal ratio": a_string(ratio=0.03),
+    "over and under critical": a_string(stiffness_damping=0.3),
+    "all dampers": a_string(1e-3, 0.1, 40.0, 15.0, 0.01, 60.0),
+    "internal, not classical": a_string(uneven=400.0),
+    "to ground, not classical": a_string(top=300.0),
+    "heavily damped bit": a_string(bit=5e4),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_steps_equal_the_matrix_exponential(name):
+    string = CASES[name]
+    random = np.random.default_rng(3)
+    angle, speed = random.normal(size=(2, string.nodes))
+    torques = 1e3 * random.normal(size=(200, 2))
+    stepper, seen = by_kernel(string, angle, speed, torques)
+    expected = by_exponential(string, angle, speed, torques)
+    assert np.abs(seen - expected).max() <= 1e-9 * np.abs(expected).max()
+    assert isinstance(stepper.string, BlockString)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    top=st.floats(0, 1e4),
+    bit=st.floats(0, 1e4),
+    uneven=st.floats(0, 1e4),
+    internal=st.floats(0, 1.0),
+    ground=st.floats(0, 10.0),
+)
+def test_any_viscous_damping(top, bit, uneven, internal, ground):
+    string = a_string(internal, ground, top, bit, 0.0, uneven)
+    random = np.random.default_rng(4)
+    angle, speed = random.normal(size=(2, string.nodes))
+    torques = 1e3 * random.normal(size=(60, 2))
+    _, seen = by_kernel(string, angle, speed, torques)
+    expected = by_exponential(string, angle, speed, torques)
+    assert np.abs(seen - expected).max() <= 1e-7 * np.abs(expected).max()
+
+
+def critically_damped() -> Drillstring:
+    """Two inertias with a damper on one of them: a double pole, no basis of eigenvectors."""
+    # (s^2 m + c s + k)(s^2 m + k) - k^2 has a double root where its discriminant vanishes.
+    spring = (Section("spring", 1, 1.0, 0.0),)
+
+    def gap(damper: float) -> float:
+        roots = np.roots([1.0, damper, 2.0, damper])
+        return float(np.abs(roots[:, None] - roots[None, :] + 9.0 * np.eye(3)).min())
+
+    tried = np.linspace(2.0, 3.5, 30001)
+    low = tried[np.argmin([gap(d) for d in tried])]
+    return assemble(spring, 1.0, 1.0, top_damping=low)
+
+
+def test_a_badly_conditioned_basis_is_not_used():
+    string = critically_damped()
+    random = np.random.default_rng(5)
+    angle, speed = random.normal(size=(2, 2))
+    torques = random.normal(size=(300, 2))
+    stepper, seen = by_kernel(string, angle, speed, torques)
+    expected = by_exponential(string, angle, speed, torques)
+    assert np.abs(seen - expected).max() <= 1e-9 * np.abs(expected).max()
+    poles = np.linalg.eigvals(np.block([
+        [np.zeros((2, 2)), np.eye(2)], [-string.stiffness.toarray(), -string.damping.toarray()]
+    ]))  # fmt: skip
+    conditioned = np.linalg.cond(np.linalg.eig(np.block([
+        [np.zeros((2, 2)), np.eye(2)], [-string.stiffness.toarray(), -string.damping.toarray()]
+    ]))[1])  # fmt: skip
+    assert isinstance(stepper.string, DenseString) == (conditioned > 1e6), poles
+
+
+def test_dense_and_block_steps_agree(monkeypatch):
+    from drillctl.simulation import propagator
+
+    string = CASES["all dampers"]
+    random = np.random.default_rng(6)
+    angle, speed = random.normal(size=(2, string.nodes))
+    torques = 1e3 * random.normal(size=(100, 2))
+    _, by_blocks = by_kernel(string, angle, speed, torques)
+    monkeypatch.setattr(propagator, "WORST_CONDITION", 0.0)
+    stepper, dense = by_kernel(string, angle, speed, torques)
+    assert isinstance(stepper.string, DenseString)
+    assert np.abs(dense - by_blocks).max() <= 1e-10 * np.abs(by_blocks).max()
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**31), steps=st.integers(1, 400))
+def test_a_free_undamped_string_keeps_its_energy(seed, steps):
+    string = CASES["undamped"]
+    random = np.random.default_rng(seed)
+    angle, speed = random.normal(size=(2, string.nodes))
+    stepper = string_step(string, STEP, 999)
+    z = stepper.state(angle[:, None], speed[:, None], np.zeros(1))[:, 0]
+    state = np.zeros((2 * len(z), r.WIDTH))
+    state[: len(z), 0] = z
+    flat = state.ravel()
+    _steps(
+        stepper.string, flat, np.zeros(r.ROWS * r.WIDTH), np.zeros((steps, 2)), np.zeros((steps, 2))
+    )
+    n = string.nodes
+    back = np.linalg.inv(np.hstack([stepper.angle_to_state, stepper.speed_to_state]))
+    motion = back @ flat.reshape(-1, r.WIDTH)[: len(z), 0]
+
+    def energy(u, v):
+        return u @ (string.stiffness @ u) + v @ (string.mass @ v)
+
+    assert energy(motion[:n], motion[n:]) == pytest.approx(energy(angle, speed), rel=1e-10)
+
+
+def test_held_torques_do_exactly_the_work_of_the_change_of_angle():
+    # What makes the discrete controller passive: work over a step = torque x change of angle.
+    string = CASES["undamped"]
+    stepper = string_step(string, STEP, 999)
+    s = stepper.string
+    assert s.angle_by_top > 0
+    assert s.speed_by_bit > 0
+    assert s.speed_by_bit == pytest.approx(STEP / 300.0, rel=0.2)

@@ -1,0 +1,186 @@
+"""The reference solver against event-accurate values, balances and known behaviour."""
+
+import numpy as np
+import pytest
+
+import drillctl
+from drillctl.design import Design
+from drillctl.simulation.reference import solve
+from drillctl.simulation.trajectory import sample
+
+# Kp, Ki, WOB (kN), J1 (s), time stuck (s), peak bit speed (rad/s): computed once with another
+# program (LSODA at 1e-9 with located events), to the digits given.
+EVENT_ACCURATE = [
+    (625, 125, 140, 19.45694, 8.8444, 22.9684),
+    (600, 150, 140, 20.02091, 7.926, 24.5234),
+    (200, 100, 140, 103.04558, 41.6554, 32.5694),
+    (400, 100, 140, 82.43215, 30.9162, 23.5447),
+    (625, 125, 120, 12.22839, 5.4076, 17.7486),
+    (200, 100, 120, 80.40938, 36.0667, 26.4402),
+]
+
+
+def paper(kp: float, ki: float, weight: float, **values: object) -> Design:
+    return drillctl.load(
+        "monteiro-trindade-2012",
+        **{
+            "controller.kp": kp,
+            "controller.ki": ki,
+            "operating_point.weight_on_bit": f"{weight} kN",
+            **values,
+        },
+    )
+
+
+@pytest.mark.parametrize(("kp", "ki", "weight", "j1", "stuck", "peak"), EVENT_ACCURATE)
+def test_event_accurate_values(kp, ki, weight, j1, stuck, peak):
+    motion = solve(paper(kp, ki, weight))
+    measures = sample(motion).measures
+    assert measures.j1 == pytest.approx(j1, rel=1e-5)
+    assert measures.stuck_time == pytest.approx(stuck, abs=1e-3)
+    assert measures.peak_bit_speed == pytest.approx(peak, abs=1e-4)
+    assert motion.energy.relative_residual < 1e-8
+
+
+def test_tolerance_converges():
+    design = paper(625, 125, 140, **{"simulation.duration": "20 s"})
+    exact = sample(solve(design, tolerance=1e-11)).measures.j1
+    errors = [abs(sample(solve(design, tolerance=t)).measures.j1 - exact) for t in (1e-4, 1e-7)]
+    assert errors[1] < 1e-6
+    assert errors[1] < errors[0] / 10
+
+
+def test_another_integrator_agrees():
+    design = paper(400, 100, 140, **{"simulation.duration": "15 s"})
+    by_dop853 = sample(solve(design, 1e-9)).measures
+    by_radau = sample(solve(design, 1e-8, method="Radau")).measures
+    assert by_radau.j1 == pytest.approx(by_dop853.j1, rel=1e-6)
+    assert by_radau.stuck_time == pytest.approx(by_dop853.stuck_time, abs=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["rest", "turning", "wound_up"])
+def test_energy_balance_from_any_start(kind):
+    design = paper(
+        500, 100, 120,
+        **{
+            "start.kind": kind,
+            "simulation.duration": "30 s",
+            "drillstring.sections.pipe.stiffness_damping": "1e-3 s",
+            "drillstring.sections.pipe.mass_damping": "0.05 1/s",
+            "bha.damping": "20 N*m*s/rad",
+        },
+    )  # fmt: skip
+    motion = solve(design)
+    assert motion.energy.drive > 0
+    assert motion.energy.bit > 0
+    assert motion.energy.damping > 0
+    assert motion.energy.relative_residual < 1e-8
+
+
+def test_friction_never_leaves_its_set():
+    run = drillctl.simulate(paper(200, 100, 120))
+    stuck = run.signals["stuck"] > 0.5
+    static = 9480.0
+    assert stuck.sum() > 1000
+    assert np.abs(run.signals["bit_torque"][stuck]).max() <= static * (1 + 1e-9)
+    assert np.all(run.signals["bit_speed"][stuck] == 0.0)
+    turning = ~stuck & (np.abs(run.signals["bit_speed"]) > 1e-6)
+    opposes = run.signals["bit_torque"][turning] * run.signals["bit_speed"][turning]
+    assert np.all(opposes > 0)
+
+
+def test_a_stop_of_the_bit_reaches_the_top_after_the_travel_time():
+    # 200 elements, so that the front is sharp: L / c = 0.942 s.
+    common = {
+        "drillstring.sections.pipe.elements": 200,
+        "simulation.duration": "1.6 s",
+        "controller.kp": 0,
+        "controller.ki": 0,
+        "start.speed": "100 rpm",
+    }
+    braked = drillctl.simulate(paper(0, 0, 140, **common), interval=1e-3)
+    # The bit is braked from the first moment; until the wave arrives the top knows nothing, and
+    # then it slows down quadratically, as torque and then speed build up.
+    change = np.abs(braked.signals["top_speed"] - braked.signals["top_speed"][0])
+    assert change[braked.time < 0.85].max() < 1e-3 * change[-1]
+    growing = (braked.time > 1.05) & (braked.time < 1.25)
+    slope, offset = np.polyfit(braked.time[growing], np.sqrt(change[growing]), 1)
+    assert -offset / slope == pytest.approx(0.942, abs=0.01)
+
+
+def test_signs():
+    run = drillctl.simulate(paper(625, 125, 140))
+    late = run.time > 95
+    # Steady drilling: drive, pipe and bit torque are all near T(100 rpm), and the top leads.
+    for name in ("top_torque", "pipe_torque", "bit_torque"):
+        assert run.signals[name][late].mean() == pytest.approx(6600, rel=0.02)
+    assert run.signals["twist"][late].mean() == pytest.approx(6600 / 315.32, rel=0.02)
+
+
+def test_lumped_string_is_bistable():
+    # At 10 kN m: from 12 rad/s it settles at 5.005 rad/s, from rest it sticks and slips for ever.
+    settles = drillctl.load("navarro-lopez-2dof-bistable", **{"simulation.duration": "150 s"})
+    run = drillctl.simulate(settles)
+    assert run.status == "ok"
+    assert run.signals["bit_speed"][-1] == pytest.approx(5.005, abs=1e-3)
+    sticks = solve(settles.replace({"start.kind": "rest"}))
+    breaks = [event.time for event in sticks.events if event.kind == "slip"]
+    assert breaks[-1] - breaks[-2] == pytest.approx(5.092533, abs=1e-6)
+    late = sample(sticks)
+    assert late.status == "sticking"
+    cycle = late.signals["bit_speed"][late.time > 130]
+    assert cycle.max() == pytest.approx(6.945236, abs=1e-4)
+
+
+@pytest.mark.parametrize(("start", "expected"), [("4.4 rad/s", 4.34501), ("0.15 rad/s", None)])
+def test_lumped_string_equilibria_under_constant_torque(start, expected):
+    # 6 kN m at 50 kN: equilibria at .14967 (unstable) and 4.34501 rad/s.
+    design = drillctl.load(
+        "navarro-lopez-2dof",
+        **{
+            "controller.torque": "6 kN*m",
+            "operating_point.weight_on_bit": "50 kN",
+            "start.kind": "turning",
+            "start.speed": start,
+            "simulation.duration": "200 s",
+        },
+    )
+    final = drillctl.simulate(design).signals["bit_speed"][-1]
+    if expected is None:
+        assert abs(final - 0.14967) > 0.1
+    else:
+        assert final == pytest.approx(expected, abs=1e-4)
+
+
+def test_damping_to_ground_loads_the_frame():
+    # With the constant load J1 is 33.5; a frame that forgets it gives 31.7.
+    design = paper(400, 100, 140, **{"drillstring.sections.pipe.mass_damping": "0.2 1/s"})
+    assert drillctl.simulate(design).measures.j1 == pytest.approx(33.5, abs=0.1)
+
+
+@pytest.mark.slow
+def test_periodic_orbit_with_a_little_damping():
+    design = paper(
+        200, 100, 120,
+        **{
+            "drillstring.sections.pipe.stiffness_damping": "1e-3 s",
+            "simulation.duration": "400 s",
+        },
+    )  # fmt: skip
+    motion = solve(design)
+    releases = [event.time for event in motion.events if event.kind == "slip"]
+    # It closes slowly: the mean of the last four cycles.
+    assert (releases[-1] - releases[-5]) / 4 == pytest.approx(22.3036, abs=1e-3)
+    run = sample(motion)
+    assert run.signals["bit_speed"][run.time > 350].max() == pytest.approx(26.119, abs=1e-3)
+
+
+def test_a_bit_that_cannot_be_freed_is_stalled():
+    design = drillctl.load(
+        "monteiro-trindade-140kn",
+        **{"controller.law": "constant-torque", "controller.torque": "5 kN*m"},
+    )
+    run = drillctl.simulate(design.replace({"simulation.duration": "60 s", "start.kind": "rest"}))
+    assert run.status == "stalled"
+    assert run.measures.stick_slip_index is None
+    assert run.measures.work_per_turn is None
