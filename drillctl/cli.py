@@ -62,8 +62,9 @@ def run(arguments: list[str]) -> int:
     """Run a command line and return its exit code; errors are told in one message."""
     usage_error: Any = typer.BadParameter.__mro__[1]
     try:
-        code = app(arguments or ["--help"], standalone_mode=False)
-        return code if isinstance(code, int) else 0
+        code = app(arguments or ["--help"], prog_name="drillctl", standalone_mode=False)
+        # Some versions of typer return 130 on an interruption, others raise Abort.
+        return _told("interrupted", 130) if code == 130 else int(code or 0)
     except typer.Exit as stop:
         return int(stop.exit_code)
     except (KeyboardInterrupt, typer.Abort):

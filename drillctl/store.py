@@ -30,6 +30,7 @@ from drillctl.json_files import read_json, write_json, write_text
 from drillctl.provenance import provenance
 from drillctl.simulation.trajectory import Simulation
 from drillctl.store_blocks import FolderBlocks
+from drillctl.store_reading import READERS, stored_name
 from drillctl.studies.audit import choose_cells
 from drillctl.studies.grid import axes_of
 from drillctl.studies.sweeps import Sweep
@@ -196,6 +197,7 @@ def write_data(result: Any, folder: Path) -> None:
     part, target = folder / "data.part", folder / "data.zarr"
     shutil.rmtree(part, ignore_errors=True)
     data = result.data
+    data = data.rename({name: stored_name(str(name)) for name in (*data.variables, *data.dims)})
     data.attrs = provenance() | data.attrs
     data.to_zarr(part, mode="w", consolidated=False)
     shutil.rmtree(target, ignore_errors=True)
@@ -281,8 +283,6 @@ def open(folder: str | Path) -> Any:
         Not a run, an unfinished one, or one that cannot be read back.
     """
     import xarray
-
-    from drillctl.store_reading import READERS
 
     path = Path(folder)
     if not (path / "run.json").is_file():

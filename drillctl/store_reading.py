@@ -20,11 +20,18 @@ if TYPE_CHECKING:
     import xarray
 
 
+def stored_name(name: str) -> str:
+    """Name of a variable on disk: zarr takes a slash, as a section's name may hold, for a group."""
+    return name.replace("/", "%2F")
+
+
+def _axis(path: str, values: xarray.DataArray) -> Axis:
+    return Axis(path, values.attrs.get("units", ""), values.values)
+
+
 def read_sweep(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Sweep:
     """A `Sweep` as it was saved."""
-    axes = tuple(
-        Axis(path, data[path].attrs.get("units", ""), data[path].values) for path in summary["axes"]
-    )
+    axes = tuple(_axis(path, data[stored_name(path)]) for path in summary["axes"])
     cells = data["audited_cell"].values.astype(np.int64)
     j1 = data["j1"].values
     return Sweep(

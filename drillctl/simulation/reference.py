@@ -29,7 +29,9 @@ from drillctl.simulation.phases import (
 from drillctl.simulation.start import start
 
 Array = NDArray[np.float64]
-Method = Literal["DOP853", "RK45", "LSODA", "Radau", "BDF"]
+Method = Literal["DOP853", "RK45", "Radau", "BDF"]
+"""Integrators of SciPy; not LSODA, whose dense output does not meet its own steps closely
+enough to locate events on."""
 
 LONGEST_STEP = 0.05
 """Longest step (s): a touch of zero speed shorter than that could go unseen."""
@@ -277,7 +279,6 @@ class _System:
             method=method,
             rtol=tolerance,
             atol=tolerance,
-            max_step=LONGEST_STEP,
             events=equations.events,
             dense_output=True,
         )
@@ -339,11 +340,18 @@ def _exp(x: float) -> float:
 
 
 def _integrate(*arguments: Any, **options: Any) -> Any:
-    """`solve_ivp`, with a failure to locate an event told as what it is."""
-    try:
-        return solve_ivp(*arguments, **options)
-    except ValueError as error:  # brentq: the dense output does not bracket the event
-        raise SimulationError(f"an event could not be located: {error}") from error
+    """`solve_ivp` with steps of at most `LONGEST_STEP`; a little shorter if an event is missed.
+
+    SciPy finds events on its dense output, which at the ends of a step may differ from the step
+    itself by rounding; an event that lies just there is then not bracketed. Other steps move it
+    inside.
+    """
+    for share in (1.0, 0.83, 0.71, 0.59, 0.47):
+        try:
+            return solve_ivp(*arguments, max_step=share * LONGEST_STEP, **options)
+        except ValueError as error:
+            failure = error
+    raise SimulationError(f"an event could not be located: {failure}") from failure
 
 
 class _Equations:

@@ -60,6 +60,8 @@ class Sweep:
         Scheme of the batch engine; of the first group where the string varies.
     seconds, total_seconds : float
         Spent in the lanes alone and from call to return (s).
+    provenance : dict of str
+        Versions and processor it came from.
     """
 
     design: Design

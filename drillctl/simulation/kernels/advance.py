@@ -159,7 +159,7 @@ def advance_block(
 def _compile() -> Any:
     # A constant of the compiled code, so that numba's disk cache, which looks at the date of
     # one file only, notices a change in any law or kernel.
-    fingerprint = _fingerprint()
+    version = fingerprint(sources())
 
     @njit(parallel=True, cache=True, **OPTIONS)
     def run(
@@ -171,19 +171,23 @@ def _compile() -> Any:
                 string, friction, drive, weight,
                 speed, start, clock, measures, traces, block * WIDTH,
             )  # fmt: skip
-        return fingerprint
+        return version
 
     return run
 
 
-def _fingerprint() -> str:
-    """Hash of the width and of every source that is compiled into the kernels."""
+def sources() -> list[Path]:
+    """Every source that is compiled into the kernels."""
     package = Path(__file__).resolve().parents[2]
     folders = ("simulation/kernels", "bit_rock", "top_drive", "weight_on_bit")
+    return [path for folder in folders for path in sorted((package / folder).glob("*.py"))]
+
+
+def fingerprint(paths: list[Path]) -> str:
+    """Hash of the block width and of these sources."""
     digest = hashlib.sha256(str(WIDTH).encode())
-    for folder in folders:
-        for path in sorted((package / folder).glob("*.py")):
-            digest.update(path.read_bytes())
+    for path in paths:
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -1,0 +1,60 @@
+# Everything a newcomer or a machine does with this repository.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+DEMO := runs/demo
+
+.PHONY: demo test test-all test-lowest lint format bench reports clean
+
+$(BIN)/drillctl: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade "pip>=24"
+	$(BIN)/python -m pip install --quiet -e ".[dev]"
+	@touch $(BIN)/drillctl
+
+# The source paper's case: modes, one run, the J1 map; figures, data and summaries.
+demo: $(BIN)/drillctl
+	$(BIN)/drillctl modes monteiro-trindade-140kn --out $(DEMO)/modes
+	$(BIN)/drillctl simulate monteiro-trindade-140kn --out $(DEMO)/simulate
+	$(BIN)/drillctl map monteiro-trindade-140kn --out $(DEMO)/map
+	@echo "pictures, data and summaries: $(CURDIR)/$(DEMO)"
+
+test: $(BIN)/drillctl
+	$(BIN)/python -m pytest -q -n 2 --dist loadgroup -m "not slow"
+
+test-all: $(BIN)/drillctl
+	$(BIN)/python -m pytest -q -n 2 --dist loadgroup
+
+# The lower bounds of pyproject.toml, in an environment of their own.
+test-lowest:
+	$(PYTHON) -m venv $(VENV)-lowest
+	$(VENV)-lowest/bin/python -m pip install --quiet -c lowest.txt -e ".[test]"
+	$(VENV)-lowest/bin/python -m pytest -q -n 2 -m "not slow"
+
+lint: $(BIN)/drillctl
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(BIN)/drillctl
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(BIN)/drillctl
+	$(BIN)/python benchmarks/map_speed.py
+
+clean:
+	rm -rf runs build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	find . -name __pycache__ -not -path "./$(VENV)*" -prune -exec rm -rf {} +
+
+# The committed figures and summaries, made again.
+REPORT := reports/monteiro-trindade-140kn
+reports: $(BIN)/drillctl
+	rm -rf runs/reports
+	$(BIN)/drillctl modes monteiro-trindade-140kn --out runs/reports/modes
+	$(BIN)/drillctl simulate monteiro-trindade-140kn --out runs/reports/simulate
+	$(BIN)/drillctl map monteiro-trindade-140kn --out runs/reports/map
+	mkdir -p $(REPORT)
+	cp runs/reports/*/*.png $(REPORT)/
+	cp runs/reports/map/summary.json runs/reports/map/regions.csv $(REPORT)/

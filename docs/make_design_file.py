@@ -1,0 +1,87 @@
+"""Write `design-file.md` from the tables that validate design files.
+
+python docs/make_design_file.py
+"""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Any, get_args
+
+from drillctl.design import tables
+from drillctl.design.paths import kind_of
+
+HEAD = """# Keys of a design file
+
+Made from the code by `docs/make_design_file.py`; a test keeps it true. TOML, `schema = 1`. At
+the top level: `schema`, `model` (a shipped name or a path; the design is laid over it), `title`,
+`source`, `status`, `notes`. Everything below is optional in a design that names a model.
+
+A key with a unit takes text such as the example; the unit may be any of its kind. Gains may be
+bare numbers. Sections of a design and of its model are merged by name. A table whose `law`
+changes drops the numbers of the old law.
+"""
+
+TABLES = (
+    ("[operating_point]", tables.OperatingPoint),
+    ("[drillstring]", tables.DrillstringTable),
+    ("[[drillstring.sections]]", tables.SectionTable),
+    ("[top_drive]", tables.TopDriveTable),
+    ("[bha]", tables.BhaTable),
+    ('[bit_rock] law = "navarro-lopez-suarez"', tables.NavarroLopezSuarezTable),
+    ("rows of bit_rock.table", tables.FrictionRow),
+    ('[bit_rock] law = "bit-radius-friction"', tables.BitRadiusFrictionTable),
+    ('[controller] law = "pi"', tables.PITable),
+    ('[controller] law = "constant-torque"', tables.ConstantTorqueTable),
+    ("[weight_on_bit]", tables.ConstantWeightTable),
+    ("[start]", tables.StartTable),
+    ("[simulation]", tables.SimulationTable),
+    ("[map]", tables.MapTable),
+    ("entries of map.axes", tables.AxisTable),
+)
+
+
+def main() -> None:
+    """Write the page beside this file."""
+    Path(__file__).with_name("design-file.md").write_text(page(), encoding="utf-8")
+
+
+def page() -> str:
+    """The whole page."""
+    return "\n".join([HEAD, *(_section(name, table) for name, table in TABLES)])
+
+
+def _section(name: str, table: type[tables.Table]) -> str:
+    lines = [f"## `{name}`", "", inspect.getdoc(table) or "", ""]
+    lines += ["| key | unit | default |", "|---|---|---|"]
+    for key, info in table.model_fields.items():
+        kind = kind_of(info)
+        unit = ", ".join(kind.examples) if kind else _values(info.annotation)
+        lines.append(f"| `{info.alias or key}` | {unit} | {_default(info, kind)} |")
+    return "\n".join([*lines, ""])
+
+
+def _values(annotation: Any) -> str:
+    """Words that a key may take, if it takes words."""
+    words = [w for part in (annotation, *get_args(annotation)) for w in get_args(part)]
+    return " or ".join(f"`{w}`" for w in dict.fromkeys(words) if isinstance(w, str))
+
+
+def _default(info: Any, kind: Any) -> str:
+    from drillctl import units
+
+    if info.is_required():
+        return "required"
+    value = info.default
+    if value is None:
+        return ""
+    if kind is not None:
+        return units.write(value, kind)
+    if isinstance(value, tuple):
+        return ", ".join(str(getattr(item, "path", item)) for item in value)
+    return str(value)
+
+
+if __name__ == "__main__":
+    main()

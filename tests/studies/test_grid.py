@@ -1,0 +1,252 @@
+"""Grids over parameters: axes, groups that share a string, and the numbers of every lane."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import drillctl
+from drillctl.design.tables import AxisTable
+from drillctl.errors import InputError
+from drillctl.simulation.lanes import lane_numbers
+from drillctl.studies import sweep
+from drillctl.studies.grid import axes_of, axis, cell_design, groups, shape_of
+from drillctl.units import RPM
+
+PAPER = "monteiro-trindade-140kn"
+COEFFICIENTS = {
+    "bit_rock.law": "navarro-lopez-suarez",
+    "bit_rock.a1": 0.03, "bit_rock.a2": 0.06, "bit_rock.beta": 0.1,
+}  # fmt: skip
+
+
+def table(path, low, high, points):
+    return AxisTable(path=path, min=low, max=high, points=points)
+
+
+def grid(design, *axes):
+    return axes_of(design, tuple(table(*a) for a in axes))
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return drillctl.load(PAPER, **{"simulation.duration": "5 s"})
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """A rig with one set of friction coefficients and no table of them."""
+    return drillctl.load("navarro-lopez-2dof-bistable", **COEFFICIENTS)
+
+
+def lane(lanes, index):
+    """What one lane holds, by the names of `lane_numbers`."""
+    laws = {"friction": lanes.friction, "drive": lanes.drive, "weight": lanes.weight}
+    held = {
+        f"{part}.{name}": values[index]
+        for part, law in laws.items()
+        for name, values in law._asdict().items()
+    }
+    for name in ("set_speed", "turning_speed", "nominal_weight"):
+        held[name] = getattr(lanes, name)[index]
+    return held
+
+
+def check_every_cell(design, axes):
+    """Each lane is what its cell gives when resolved as a whole; return the groups."""
+    found = list(groups(design, axes))
+    for group in found:
+        assert len(group.lanes) == len(group.cells)
+        for index, cell in enumerate(group.cells):
+            alone = cell_design(design, axes, int(cell))
+            assert lane(group.lanes, index) == lane_numbers(alone)
+            assert group.design.tables.drillstring == alone.tables.drillstring
+            assert group.design.tables.top_drive == alone.tables.top_drive
+            assert group.design.tables.bha == alone.tables.bha
+            assert group.design.tables.simulation == alone.tables.simulation
+    cells = np.concatenate([group.cells for group in found])
+    np.testing.assert_array_equal(np.sort(cells), np.arange(np.prod(shape_of(axes))))
+    return found
+
+
+# --- axes ------------------------------------------------------------------------------------
+
+
+def test_axes_are_in_si(paper):
+    speed, weight, gain, factor = grid(
+        paper,
+        ("operating_point.speed", "60 rpm", "120 rpm", 3),
+        ("operating_point.weight_on_bit", "100 kN", "20 tf", 2),
+        ("controller.kp", 0, 1000, 5),
+        ("bit_rock.a1_factor", 0.9, 1.1, 3),
+    )
+    np.testing.assert_allclose(speed.values, np.array([60, 90, 120]) * RPM, rtol=1e-15)
+    np.testing.assert_allclose(weight.values, [100e3, 20 * 9806.65], rtol=1e-15)
+    np.testing.assert_array_equal(gain.values, [0.0, 250.0, 500.0, 750.0, 1000.0])
+    assert [a.unit for a in (speed, weight, gain, factor)] == ["rad/s", "N", "N*m*s/rad", ""]
+    assert len(factor) == 3
+    assert shape_of((speed, weight, gain, factor)) == (3, 2, 5, 3)
+
+
+@pytest.mark.parametrize(
+    ("path", "shared"),
+    [
+        ("drillstring.sections.pipe.length", True), ("top_drive.inertia", True),
+        ("bha.damping", True), ("simulation.duration", True), ("controller.kp", False),
+        ("operating_point.weight_on_bit", False), ("start.speed", False),
+    ],
+)  # fmt: skip
+def test_what_lanes_share(paper, path, shared):
+    from drillctl.studies import Axis
+
+    assert Axis(path, "", np.zeros(2)).shared is shared
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (("controller.kq", 0, 1, 3), "map.axes controller.kq: no numeric parameter"),
+        (("operating_point.speed", 60, 120, 3), 'did you mean "60 rpm"'),
+        (("operating_point.speed", "60 kN", "120 rpm", 3), "60 kN"),
+        (("controller.kp", 3, 3, 2), "must be less"),
+        (("controller.kp", 4, 3, 2), "must be less"),
+        (("drillstring.sections.pipe.elements", 1, 4, 3), "2.5 is not a whole number"),
+    ],
+)
+def test_axes_that_do_not_fit(paper, asked, words):
+    with pytest.raises(InputError, match=words) as told:
+        axis(paper, table(*asked))
+    assert f"map.axes {asked[0]}" in str(told.value)
+
+
+def test_grids_too_large_are_refused_before_they_are_made(paper, monkeypatch):
+    monkeypatch.setattr("drillctl.studies.memory._free_memory", lambda: 1e6)
+    assert shape_of(grid(paper, ("controller.kp", 0, 1, 1000))) == (1000,)
+    with pytest.raises(InputError, match=r"10,000 cells need about 0\.0 GiB"):
+        grid(paper, ("controller.kp", 0, 1, 100), ("controller.ki", 0, 1, 100))
+    monkeypatch.setattr("drillctl.studies.memory._free_memory", lambda: float("inf"))
+    assert shape_of(grid(paper, ("controller.kp", 0, 1, 100), ("controller.ki", 0, 1, 100)))
+
+
+def test_axes_given_by_hand_are_refused_too(paper, monkeypatch):
+    axes = grid(paper, ("controller.kp", 0, 1, 100))
+    monkeypatch.setattr("drillctl.studies.memory._free_memory", lambda: 1e4)
+    with pytest.raises(InputError, match="fewer points"):
+        sweep(paper, axes)
+
+
+# --- lanes -----------------------------------------------------------------------------------
+
+OWN = {
+    "gains": [("controller.kp", 0, 1000, 3), ("controller.ki", 0, 500, 2)],
+    "one axis": [("controller.kp", 10, 900, 4)],
+    "one number twice": [
+        ("operating_point.weight_on_bit", "90 kN", "150 kN", 3),
+        ("bit_rock.a1_factor", 0.9, 1.1, 2),
+    ],
+    "two factors": [("bit_rock.a1_factor", 0.5, 1.1, 3), ("bit_rock.a2_factor", 1.0, 1.5, 3)],
+    "speed and start": [
+        ("operating_point.speed", "60 rpm", "120 rpm", 3), ("start.speed", "20 rpm", "90 rpm", 2),
+    ],
+    "three": [
+        ("controller.ki", 0, 500, 2), ("operating_point.speed", "60 rpm", "120 rpm", 2),
+        ("bit_rock.beta_factor", 0.5, 2.0, 3),
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", OWN)
+def test_lanes_are_their_cells(paper, case):
+    found = check_every_cell(paper, grid(paper, *OWN[case]))
+    assert len(found) == 1
+    assert found[0].design is not None
+
+
+def test_an_axis_that_another_switches_off_at_its_end(plain):
+    """At a1 = 0 its factor changes nothing; elsewhere it does."""
+    check_every_cell(
+        plain, grid(plain, ("bit_rock.a1", 0, 0.03, 3), ("bit_rock.a1_factor", 1, 2, 3))
+    )
+    check_every_cell(
+        plain, grid(plain, ("bit_rock.a1_factor", 1, 2, 3), ("bit_rock.a1", 0, 0.03, 3))
+    )
+
+
+def test_values_possible_only_together(plain):
+    """Every cell is possible, though a1 = 0.1 is not with the design's own a2 = 0.06."""
+    axes = grid(plain, ("bit_rock.a1", 0.05, 0.1, 3), ("bit_rock.a2", 0.2, 0.3, 3))
+    check_every_cell(plain, axes)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_an_impossible_corner_is_told(plain, swapped):
+    """Either axis is possible with the design's other value; not a1 = 0.055 with a2 = 0.04."""
+    asked = [("bit_rock.a1", 0.03, 0.055, 3), ("bit_rock.a2", 0.04, 0.3, 3)]
+    with pytest.raises(InputError, match=r"a2 = 0\.04 must not be less than a1") as told:
+        list(groups(plain, grid(plain, *(reversed(asked) if swapped else asked))))
+    assert "map.axes: at " in str(told.value)
+    assert "bit_rock.a1 = " in str(told.value)
+
+
+def test_large_grids_are_not_resolved_cell_by_cell(paper, monkeypatch):
+    resolved = []
+    real = drillctl.Design.replace
+    monkeypatch.setattr(drillctl.Design, "replace", lambda *a: resolved.append(1) or real(*a))
+    axes = grid(paper, ("controller.kp", 0, 1000, 60), ("controller.ki", 0, 500, 50))
+    (group,) = groups(paper, axes)
+    assert len(group.lanes) == 3000
+    assert len(resolved) < 130
+
+
+SHARED = {
+    "length": [("drillstring.sections.pipe.length", "1000 m", "3000 m", 3)],
+    "elements": [("drillstring.sections.pipe.elements", 10, 30, 3)],
+    "top drive": [("top_drive.inertia", "1000 kg*m^2", "3000 kg*m^2", 2)],
+    "duration": [("simulation.duration", "5 s", "10 s", 2)],
+    "own last": [("bha.inertia", "300 kg*m^2", "400 kg*m^2", 2), ("controller.kp", 0, 500, 3)],
+    "own first": [("controller.kp", 0, 500, 3), ("bha.inertia", "300 kg*m^2", "400 kg*m^2", 2)],
+    "shared between": [
+        ("controller.kp", 0, 500, 2), ("simulation.duration", "5 s", "9 s", 3),
+        ("bit_rock.a1_factor", 0.9, 1.1, 2), ("top_drive.damping", "0 N*m*s/rad", "9 N*m*s/rad", 2),
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SHARED)
+def test_shared_axes_make_groups(paper, case):
+    axes = grid(paper, *SHARED[case])
+    found = check_every_cell(paper, axes)
+    assert len(found) == np.prod([len(a) for a in axes if a.shared])
+    for group in found:  # each with a string of its own
+        np.testing.assert_array_equal(
+            group.lanes.string.undamped_modes[0],
+            cell_design(paper, axes, int(group.cells[0])).string.undamped_modes[0],
+        )
+
+
+def test_elements_reach_the_string(paper):
+    axes = grid(paper, ("drillstring.sections.pipe.elements", 10, 30, 3))
+    nodes = [group.lanes.string.nodes for group in groups(paper, axes)]
+    assert np.diff(nodes).tolist() == [10, 10]
+
+
+def test_cells_are_in_c_order(paper):
+    axes = grid(paper, ("controller.kp", 0, 2, 3), ("controller.ki", 0, 30, 4))
+    for cell, (kp, ki) in {0: (0, 0), 1: (0, 10), 4: (1, 0), 11: (2, 30)}.items():
+        law = cell_design(paper, axes, cell).top_drive
+        assert (law.kp, law.ki) == (kp, ki)
+
+
+# --- sweeps over what lanes share ------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", ["length", "top drive", "duration", "own first"])
+def test_sweep_equals_its_cells_alone(paper, case):
+    """A cell simulated by itself gives the same bits as in the sweep, in its own place."""
+    axes = grid(paper, *SHARED[case])
+    found = sweep(paper, axes, audit_cells=0)
+    assert found.j1.shape == shape_of(axes)
+    for cell in range(found.j1.size):
+        alone = drillctl.simulate(cell_design(paper, axes, cell), engine="batch")
+        assert found.j1.ravel()[cell] == alone.measures.j1
+        assert found.measures["peak_pipe_torque"].ravel()[cell] == alone.measures.peak_pipe_torque

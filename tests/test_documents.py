@@ -1,0 +1,94 @@
+"""README, docs and examples say what the code does."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(text: str, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
+
+
+def test_the_python_example_runs(tmp_path):
+    (code,) = blocks(README, "python")
+    assert len(code.strip().splitlines()) <= 14
+    script = tmp_path / "example.py"
+    script.write_text(code, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "map.png").stat().st_size > 10_000
+
+
+def test_the_rig_of_the_readme_is_a_valid_design(tmp_path):
+    import drillctl
+
+    (text,) = blocks(README, "toml")
+    path = tmp_path / "rig.toml"
+    path.write_text(text, encoding="utf-8")
+    assert drillctl.load(path).tables.title == tomllib.loads(text)["title"]
+
+
+def test_the_starter_file_is_a_valid_design(tmp_path, monkeypatch):
+    import drillctl
+    from drillctl.design.starter import write_starter
+
+    monkeypatch.chdir(tmp_path)
+    design = drillctl.load(write_starter("my-rig"))
+    assert design.string.yield_torque == pytest.approx(100.5e3, rel=2e-3)
+
+
+def test_every_command_of_the_readme_exists():
+    from drillctl.cli import app
+
+    known = {c.name or c.callback.__name__ for c in app.registered_commands}
+    named = set(re.findall(r"`drillctl (\w+)", README))
+    assert named <= known
+    assert known <= named
+
+
+def test_links_lead_somewhere():
+    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]:
+        text = path.read_text(encoding="utf-8")
+        for link in re.findall(r"\]\(([^)#]+?)\)", text):
+            assert (path.parent / link).exists(), f"{path.name}: {link}"
+        for named in re.findall(r"`(tests/[\w/.]+?\.py)", text):
+            assert (ROOT / named).exists(), f"{path.name}: {named}"
+
+
+def test_the_page_of_keys_is_up_to_date():
+    path = ROOT / "docs" / "make_design_file.py"
+    spec = importlib.util.spec_from_file_location("make_design_file", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.page() == (ROOT / "docs" / "design-file.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["modes_and_bode", "four_gain_pairs", "own_rig"])
+def test_examples_run(name, tmp_path):
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / f"{name}.py"), str(tmp_path)],
+        capture_output=True, text=True, check=False, env=os.environ,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert list(tmp_path.glob("*.png"))
+
+
+def test_nothing_speaks_of_where_it_was_made():
+    words = ("/wo" + "rk/", "sha" + "red/", "sess" + "ion")
+    for folder in ("drillctl", "models", "designs", "docs", "examples", "benchmarks"):
+        for path in (ROOT / folder).rglob("*"):
+            if path.suffix in (".py", ".toml", ".md"):
+                text = path.read_text(encoding="utf-8")
+                for word in words:
+                    assert word not in text, f"{path}: {word}"

@@ -1,0 +1,153 @@
+"""What holds of every module: cheap imports, docstrings, and documented parameters."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import pkgutil
+import re
+import subprocess
+import sys
+import time
+
+import pytest
+
+import drillctl
+
+HEAVY = ("numpy", "scipy", "numba", "control", "casadi", "matplotlib", "xarray", "pint", "pydantic")
+MODULES = sorted(
+    found.name
+    for found in pkgutil.walk_packages(drillctl.__path__, "drillctl.")
+    if not found.name.endswith("__main__")
+)
+
+
+def loaded_by(statement):
+    """Heavy packages that a statement imports in a fresh process, and what it prints."""
+    script = f"{statement}\nimport sys\nprint('loaded:', *(m for m in {HEAVY} if m in sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stderr == ""
+    assert done.stdout.startswith("loaded:")  # nothing else is printed
+    return done.stdout.split()[1:]
+
+
+def test_import_is_cheap_and_silent():
+    begin = time.perf_counter()
+    assert loaded_by("import drillctl") == []
+    assert time.perf_counter() - begin < 2.0  # a twentieth of that on an idle machine
+
+
+@pytest.mark.parametrize("module", ["drillctl.cli", "drillctl.__main__", "drillctl.catalog"])
+def test_the_command_starts_light(module):
+    assert loaded_by(f"import {module}") == []
+
+
+def test_lists_of_names_need_nothing_heavy():
+    run = "import io, contextlib\nfrom drillctl.cli import run\n"
+    quiet = "with contextlib.redirect_stdout(io.StringIO()): run(['designs', '--json'])"
+    assert loaded_by(run + quiet) == []
+
+
+def test_map_needs_neither_control_nor_casadi():
+    assert not {"control", "casadi", "matplotlib"} & set(loaded_by("import drillctl.studies"))
+
+
+def test_pyplot_is_never_imported():
+    for name in MODULES:
+        source = inspect.getsource(importlib.import_module(name))
+        imports = [
+            n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.Import | ast.ImportFrom)
+        ]
+        for node in imports:
+            assert "pyplot" not in ast.unparse(node), name
+
+
+@pytest.mark.parametrize("name", ["drillctl", *MODULES])
+def test_modules_are_documented_and_their_names_resolve(name):
+    module = importlib.import_module(name)
+    assert (module.__doc__ or "").strip()
+    names = getattr(module, "__all__", [])
+    assert len(names) == len(set(names))
+    for public in names:
+        assert getattr(module, public) is not None
+    assert set(names) <= set(dir(module))
+
+
+def test_unknown_names_are_attribute_errors():
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        drillctl.simulat  # noqa: B018
+
+
+# --- numpydoc --------------------------------------------------------------------------------
+
+
+def section(text, title):
+    """Names of the entries of a numpydoc section; None if there is no such section."""
+    found = re.search(rf"^{title}\n-+\n(.*?)(?=^\S[^\n]*\n-+\n|\Z)", text, re.M | re.S)
+    if found is None:
+        return None
+    heads = re.findall(r"^(\*{0,2}\w[^:\n]*?)(?:\s:\s.*)?$", found[1], re.M)
+    return [name.strip().lstrip("*") for head in heads for name in head.split(",")]
+
+
+def own(module):
+    """Public functions, classes and methods that a module defines."""
+    for name, value in vars(module).items():
+        value = inspect.unwrap(value) if callable(value) else value
+        if name.startswith("_") or getattr(value, "__module__", None) != module.__name__:
+            continue
+        if inspect.isfunction(value) and "<locals>" not in value.__qualname__:
+            yield name, value
+        elif inspect.isclass(value):
+            yield name, value
+            for inner, method in vars(value).items():
+                method = getattr(method, "__func__", method)
+                if inspect.isfunction(method) and not inner.startswith("_"):
+                    yield f"{name}.{inner}", method
+
+
+def documented():
+    for name in MODULES:
+        module = importlib.import_module(name)
+        for label, value in own(module):
+            yield pytest.param(value, id=f"{name}.{label}")
+
+
+@pytest.mark.parametrize("value", list(documented()))
+def test_public_names_are_documented_as_they_are(value):
+    text = inspect.cleandoc(value.__doc__ or "")
+    assert text
+    if inspect.isclass(value):
+        listed, real = section(text, "Attributes"), None
+        if dataclasses.is_dataclass(value):
+            real = [field.name for field in dataclasses.fields(value)]
+    else:
+        listed = section(text, "Parameters")
+        real = [name for name in inspect.signature(value).parameters if name not in ("self", "cls")]
+    if listed is not None and real is not None:
+        assert listed == real
+
+
+def test_the_parser_of_docstrings_sees_what_is_there():
+    text = inspect.cleandoc("""One.
+
+    Parameters
+    ----------
+    a, b : float
+        Two of them (s):
+        and more.
+    **rest
+        Others.
+
+    Returns
+    -------
+    c : int
+        No parameter.
+    """)
+    assert section(text, "Parameters") == ["a", "b", "rest"]
+    assert section(text, "Returns") == ["c"]
+    assert section(text, "Raises") is None
