@@ -27,7 +27,7 @@ SMALL = [*GAINS, "--audit", "0", *SHORT]
 
 
 @pytest.fixture(autouse=True)
-def _workplace(tmp_path, monkeypatch):
+def _own_folder(tmp_path, monkeypatch):
     """Runs go to a folder of their own; pictures are not rendered; threads are given back."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
@@ -36,7 +36,7 @@ def _workplace(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def _pictures(_workplace, monkeypatch):
+def _pictures(_own_folder, monkeypatch):
     """Coarse pictures are rendered after all."""
     monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: figure.savefig(path, dpi=30))
 
@@ -222,20 +222,42 @@ def test_maps_over_one_and_three_parameters(call):
     assert drillctl.open("three").j1.shape == (5, 4, 2)
 
 
-@pytest.mark.usefixtures("_pictures")
-@pytest.mark.parametrize("name", catalog.names("designs"))
-def test_every_verb_on_every_design(call, name):
+def verbs_on(name):
+    """The verbs that compute, with options that keep them short."""
     axes = []
     for axis in drillctl.load(name).tables.map.axes:
         axes += ["--axis", f"{axis.path}={axis.min}:{axis.max}:3"]
     short = ["--set", "simulation.duration=5 s"]
+    return {"modes": [], "simulate": short, "map": [*axes, *short, "--audit", "0"]}
+
+
+# The same rig at other weights on bit tells nothing new in a quick run.
+WEIGHTS = ("monteiro-trindade-80kn", "monteiro-trindade-100kn", "monteiro-trindade-160kn")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in WEIGHTS else ())
+        for name in catalog.names("designs")
+    ],
+)
+def test_every_verb_on_every_design(call, name):
     assert call("validate", name)[0] == 0
     assert call("show", name)[0] == 0
-    for verb, options in {"modes": [], "simulate": short, "map": [*axes, *short]}.items():
-        audit = ["--audit", "0"] if verb == "map" else []
-        code, out, err = call(verb, name, *options, *audit, "--json")
+    for verb, options in verbs_on(name).items():
+        code, out, err = call(verb, name, *options, "--json")
         assert (code, err) == (0, f"results: runs/{name}-{verb}-1\n")
         assert parsed(out)
+
+
+@pytest.mark.usefixtures("_pictures")
+def test_pictures_of_every_verb(call):
+    for verb, options in verbs_on("wob-rpm-chart").items():
+        assert call(verb, "wob-rpm-chart", *options, "--out", verb)[0] == 0
+        pictures = list(Path(verb).glob("*.png"))
+        assert len(pictures) == {"modes": 3, "simulate": 1, "map": 2}[verb]
+        assert all(path.stat().st_size > 3000 for path in pictures)
 
 
 def test_units_of_tables(call):
