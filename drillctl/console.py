@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from drillctl.progress import SILENT, Progress
+
 if TYPE_CHECKING:
     from rich.progress import Progress as RichBar
 
@@ -77,24 +79,25 @@ class Bar:
 
 
 @contextmanager
-def progress() -> Iterator[Bar]:
+def progress() -> Iterator[Progress]:
     """Progress on stderr while the block runs; gone when it ends, absent from files and pipes."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
-        Progress,
         TextColumn,
         TimeRemainingColumn,
     )
+    from rich.progress import Progress as RichBar
 
     columns = (
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
     )  # fmt: skip
     console = Console(stderr=True)
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
+    if not console.is_terminal:
+        yield SILENT
+        return
+    with RichBar(*columns, console=console, transient=True) as bar:
         yield Bar(bar)
 
 

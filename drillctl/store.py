@@ -27,6 +27,7 @@ import drillctl
 from drillctl.design import Design, load, to_toml
 from drillctl.errors import InputError
 from drillctl.json_files import read_json, write_json, write_text
+from drillctl.linear.modal import Modes
 from drillctl.provenance import provenance
 from drillctl.simulation.trajectory import Simulation
 from drillctl.store_blocks import FolderBlocks
@@ -204,7 +205,7 @@ def write_data(result: Any, folder: Path) -> None:
     part.rename(target)
 
 
-VERBS = {"Sweep": "map", "Simulation": "simulate"}
+VERBS = {"Sweep": "map", "Simulation": "simulate", "Modes": "modes"}
 
 
 def save(result: Any, folder: str | Path) -> Path:
@@ -212,7 +213,7 @@ def save(result: Any, folder: str | Path) -> Path:
 
     Parameters
     ----------
-    result : Sweep or Simulation
+    result : Sweep, Simulation or Modes
         Anything with `.design`, `.data` and `.summary()`.
     folder : str or Path
         New, empty, or holding the very same run.
@@ -225,8 +226,11 @@ def save(result: Any, folder: str | Path) -> Path:
     Raises
     ------
     InputError
-        The folder holds something else, or cannot be written.
+        The folder holds something else, or cannot be written; or the result is of a bare
+        string and has no design to go with it.
     """
+    if result.design is None:
+        raise InputError("modes of a bare string have no design to be saved with", "save")
     design, settings = _asked(result)
     run = claim(VERBS[type(result).__name__], design, folder, **settings)
     write_data(result, run.path)
@@ -253,6 +257,8 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["axes"] = axes
         if not np.array_equal(cells, result.audit.cells):
             settings["audited"] = result.audit.cells.tolist()
+    elif isinstance(result, Modes):
+        settings["count"] = max(len(result.free_free), len(result.fixed_top))
     return design, settings
 
 

@@ -72,6 +72,7 @@ def read_modes(design: Design, data: xarray.Dataset, summary: dict[str, Any]) ->
         fixed_top=_modes(data, "fixed_top"),
         node_depth=data["node_depth"].values,
         element_depth=data["element_depth"].values,
+        design=design,
     )
 
 

@@ -340,3 +340,17 @@ def test_open_refuses_an_unfinished_run(design, tmp_path):
     claim("map", design, tmp_path / "run")
     with pytest.raises(InputError, match="not finished"):
         drillctl.open(tmp_path / "run")
+
+
+def test_results_save_themselves(bistable, tmp_path):
+    modes = drillctl.modes(bistable, count=2)
+    back = drillctl.open(modes.save(tmp_path / "modes"))
+    assert back.summary() == modes.summary()
+    assert back.design == bistable
+    run = drillctl.simulate(bistable, engine="batch")
+    assert drillctl.open(run.save(tmp_path / "run")).measures == run.measures
+
+
+def test_modes_of_a_bare_string_have_no_design_to_be_saved_with(bistable, tmp_path):
+    with pytest.raises(InputError, match="bare string"):
+        drillctl.modes(bistable.string).save(tmp_path / "modes")

@@ -14,6 +14,8 @@ from drillctl.errors import InputError
 from drillctl.linear.poles import Pole, fixed_top_poles, free_free_poles
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import xarray
 
     from drillctl.design import Design
@@ -67,12 +69,15 @@ class Modes:
         Measured depth of the nodes (m); all zero for a lumped string.
     element_depth : ndarray, shape (elements,)
         Depth of the middle of the elements (m).
+    design : Design or None
+        The rig they belong to; None for the modes of a bare string.
     """
 
     free_free: tuple[Mode, ...]
     fixed_top: tuple[Mode, ...]
     node_depth: Array
     element_depth: Array
+    design: Design | None = None
 
     def summary(self) -> dict[str, list[dict[str, Any]]]:
         """Frequencies (Hz) and damping ratios as strict JSON values.
@@ -100,6 +105,12 @@ class Modes:
         variables = _variables("free_free", self.free_free)
         variables |= _variables("fixed_top", self.fixed_top)
         return xarray.Dataset(variables, coords)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
 
 
 def modes(subject: Design | Drillstring, count: int = 10) -> Modes:
@@ -131,6 +142,7 @@ def modes(subject: Design | Drillstring, count: int = 10) -> Modes:
         fixed_top=tuple(_mode(pole, string) for pole in fixed_top_poles(string)[:count]),
         node_depth=depth,
         element_depth=0.5 * (depth[:-1] + depth[1:]),
+        design=None if isinstance(subject, Drillstring) else subject,
     )
 
 

@@ -15,6 +15,8 @@ from drillctl.simulation.phases import stick_phase
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, Piece
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import xarray
 
 Array = NDArray[np.float64]
@@ -99,6 +101,12 @@ class Simulation:
             "step": self.step,
             "modes": self.modes,
         }
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
 
 
 def sample(motion: Motion, interval: float = 0.01) -> Simulation:
