@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit, prange
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined
+from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined, widest_vectors
 from drillctl.simulation.kernels.lane_step import (
     conclude,
     decide,
@@ -63,7 +63,8 @@ def _begin(friction: Any, weight: Any, work: Any) -> None:
         speed = work[r.BIT_SPEED + lane]
         load = weight_at(at_lane(weight, work, r.WEIGHT, lane), speed)
         law = at_lane(friction, work, r.FRICTION, lane)
-        torque, _ = torque_and_slope(law, load, abs(speed))
+        torque, slope = torque_and_slope(law, load, abs(speed))
+        work[r.SLOPE + lane] = slope
         direction = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
         work[r.DIRECTION + lane] = direction
         work[r.KINETIC + lane] = direction * torque
@@ -108,6 +109,7 @@ def advance_block(
     speed: Any, start: Any, clock: Any, measures: Any, traces: Any, first: int,
 ) -> None:  # fmt: skip
     """Advance the lanes from `first` on, one block, from time zero to the end."""
+    widest_vectors()
     work = np.zeros(r.ROWS * WIDTH)
     state = np.zeros(2 * start.shape[0] * WIDTH)
     looks = np.zeros((2, WIDTH))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined
+from drillctl.simulation.kernels.compiling import inlined, widest_vectors
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.measures import NARROW_BAND, WIDE_BAND
 
@@ -13,6 +13,7 @@ from drillctl.simulation.measures import NARROW_BAND, WIDE_BAND
 @inlined
 def begin_measures(work: Any) -> None:
     """Set the measures of a run that has not begun."""
+    widest_vectors()
     for lane in range(WIDTH):
         for measure in range(r.MEASURES):
             work[r.FIRST_MEASURE + measure * WIDTH + lane] = 0.0
@@ -31,6 +32,7 @@ def measure(work: Any, begin: float, step: float, in_j1: float, in_window: float
     `in_j1` and `in_window` are the shares of the step that lie in the J1 window and in the
     window at the end of the run.
     """
+    widest_vectors()
     crossings = 0
     end = begin + step
     for lane in range(WIDTH):
@@ -68,6 +70,7 @@ def measure(work: Any, begin: float, step: float, in_j1: float, in_window: float
 @inlined
 def measure_crossings(work: Any, begin: float, step: float, in_j1: float) -> None:
     """Mend J1 where the deviation changes sign, and date the last departure from each band."""
+    widest_vectors()
     for lane in range(WIDTH):
         set_speed = work[r.SET_SPEED + lane]
         error_before = work[r.SPEED_BEFORE + lane] - set_speed
@@ -89,6 +92,7 @@ def measure_crossings(work: Any, begin: float, step: float, in_j1: float) -> Non
 @inlined
 def measure_window(work: Any) -> None:
     """Extremes of the bit speed in the window at the end of the run."""
+    widest_vectors()
     for lane in range(WIDTH):
         speed = work[r.BIT_SPEED + lane]
         work[r.LATE_LOW + lane] = min(work[r.LATE_LOW + lane], speed)
@@ -98,6 +102,7 @@ def measure_window(work: Any) -> None:
 @inlined
 def measure_pipe(work: Any) -> None:
     """Largest pipe torque so far; the pass over the string has just read it."""
+    widest_vectors()
     for lane in range(WIDTH):
         torque = abs(work[r.PIPE + lane] + work[r.PIPE_OFFSET + lane])
         work[r.PEAK_PIPE + lane] = max(work[r.PEAK_PIPE + lane], torque)

@@ -46,39 +46,40 @@ SIGN = 41 * WIDTH  # direction in which the bit would turn
 LOAD = 42 * WIDTH  # weight on bit, N
 OWN = 43 * WIDTH  # 1 if it keeps the direction it has
 RIGHT = 44 * WIDTH
-PER_GAIN = 46 * WIDTH  # 1 / GAIN
-SPEED = 45 * WIDTH  # the unknown u, rad/s
-OPEN = 47 * WIDTH  # 1 while Newton goes on
+PER_GAIN = 45 * WIDTH  # 1 / GAIN
+SPEED = 46 * WIDTH  # the unknown u, rad/s
+SLOPE = 47 * WIDTH  # slope of the law where Newton last looked, N m s
+OPEN = 48 * WIDTH  # 1 while Newton goes on
 
 
 # What the step decides, until it is concluded.
-NEW_SPEED = 48 * WIDTH
-NEW_HOLDING = 49 * WIDTH
-NEW_DIRECTION = 50 * WIDTH
-NEW_KINETIC = 51 * WIDTH
-SPEED_BEFORE = 52 * WIDTH  # bit speed at the beginning of the step, rad/s
-STUCK_SHARE = 53 * WIDTH  # share of the step spent stuck
+NEW_SPEED = 49 * WIDTH
+NEW_HOLDING = 50 * WIDTH
+NEW_DIRECTION = 51 * WIDTH
+NEW_KINETIC = 52 * WIDTH
+SPEED_BEFORE = 53 * WIDTH  # bit speed at the beginning of the step, rad/s
+STUCK_SHARE = 54 * WIDTH  # share of the step spent stuck
 
 # Measures, in the order in which they leave the kernel.
-J1 = 54 * WIDTH
-STUCK_TIME = 55 * WIDTH
-STICKS = 56 * WIDTH
-LATE_LOW = 57 * WIDTH
-LATE_HIGH = 58 * WIDTH
-LATE_ANGLE = 59 * WIDTH
-LATE_STUCK = 60 * WIDTH
-BIT_ANGLE = 61 * WIDTH
-LOW = 62 * WIDTH
-HIGH = 63 * WIDTH
-PEAK_PIPE = 64 * WIDTH
-PEAK_TOP = 65 * WIDTH
-OUTSIDE_NARROW = 66 * WIDTH
-OUTSIDE_WIDE = 67 * WIDTH
-WORK = 68 * WIDTH
-WEIGHT_SUM = 69 * WIDTH
-ROP_SUM = 70 * WIDTH
+J1 = 55 * WIDTH
+STUCK_TIME = 56 * WIDTH
+STICKS = 57 * WIDTH
+LATE_LOW = 58 * WIDTH
+LATE_HIGH = 59 * WIDTH
+LATE_ANGLE = 60 * WIDTH
+LATE_STUCK = 61 * WIDTH
+BIT_ANGLE = 62 * WIDTH
+LOW = 63 * WIDTH
+HIGH = 64 * WIDTH
+PEAK_PIPE = 65 * WIDTH
+PEAK_TOP = 66 * WIDTH
+OUTSIDE_NARROW = 67 * WIDTH
+OUTSIDE_WIDE = 68 * WIDTH
+WORK = 69 * WIDTH
+WEIGHT_SUM = 70 * WIDTH
+ROP_SUM = 71 * WIDTH
 
-ROWS = 71
+ROWS = 72
 FIRST_MEASURE = J1
 MEASURES = ROWS - FIRST_MEASURE // WIDTH
 """Number of measures of a lane."""

@@ -20,7 +20,7 @@ from numba.extending import overload
 
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import fma
-from drillctl.simulation.kernels.compiling import inlined
+from drillctl.simulation.kernels.compiling import inlined, widest_vectors
 from drillctl.simulation.kernels.rows import WIDTH
 
 
@@ -96,6 +96,7 @@ def complete_and_propagate(string: Any, state: Any, work: Any) -> None:
 
 @inlined
 def _clear_sums(work: Any) -> None:
+    widest_vectors()
     for lane in range(WIDTH):
         work[r.TOP_FREE + lane] = 0.0
         work[r.BIT_FREE + lane] = 0.0
@@ -104,6 +105,7 @@ def _clear_sums(work: Any) -> None:
 
 @inlined
 def _by_blocks(string: Any, state: Any, work: Any) -> None:
+    widest_vectors()
     _clear_sums(work)
     for block in range(string.free.shape[0]):
         a11, a12 = string.free[block, 0], string.free[block, 1]
@@ -128,6 +130,7 @@ def _by_blocks(string: Any, state: Any, work: Any) -> None:
 
 @inlined
 def _by_matrix(string: Any, state: Any, work: Any) -> None:
+    widest_vectors()
     _clear_sums(work)
     states = string.free.shape[0]
     complete = states * WIDTH
@@ -169,6 +172,7 @@ def look(string: Any, state: Any, work: Any, lane: int) -> tuple[float, float]:
 
 @inlined
 def _look_at_blocks(string: Any, state: Any, work: Any, lane: int) -> tuple[float, float]:
+    widest_vectors()
     speed, angle = 0.0, 0.0
     top, bit = work[r.TOP_TORQUE + lane], work[r.BIT_TORQUE + lane]
     for block in range(string.free.shape[0]):
@@ -182,6 +186,7 @@ def _look_at_blocks(string: Any, state: Any, work: Any, lane: int) -> tuple[floa
 
 @inlined
 def _look_at_matrix(string: Any, state: Any, work: Any, lane: int) -> tuple[float, float]:
+    widest_vectors()
     speed, angle = 0.0, 0.0
     top, bit = work[r.TOP_TORQUE + lane], work[r.BIT_TORQUE + lane]
     for i in range(string.free.shape[0]):
