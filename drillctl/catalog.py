@@ -76,6 +76,8 @@ def find(name_or_path: str, shelves: tuple[Shelf, ...] = ("designs", "models")) 
     for shelf in shelves:
         if name_or_path in names(shelf):
             return _folder(shelf) / f"{name_or_path}.toml"
+    if Path(f"{name_or_path[:200]}.toml").is_file():
+        raise InputError(f"not a shipped name; did you mean '{name_or_path}.toml'?", name_or_path)
     known = [name for shelf in shelves for name in names(shelf)]
     raise InputError(
         f"not a shipped name ({nearest(name_or_path, known)}), nor a path to a .toml file",

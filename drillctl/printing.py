@@ -46,6 +46,8 @@ def simulation(result: Simulation, system: units.System) -> None:
             rows.append([name, sized(shown), label])
     if result.share_of_yield is not None:
         rows.append(["share of torsional yield", f"{result.share_of_yield:.1%}", ""])
+    if result.energy is not None:
+        rows.append(["energy balance", f"{result.energy.relative_residual:.0e}", "of the work"])
     rows.append(["status", result.status, ""])
     engine = result.engine
     if result.step is not None:

@@ -281,7 +281,7 @@ def open(folder: str | Path) -> Any:
     Returns
     -------
     Sweep, Simulation or Modes
-        Equal to what was saved, to the bit; a simulation without its events and energy balance.
+        Equal to what was saved, to the bit; a simulation without its events.
 
     Raises
     ------

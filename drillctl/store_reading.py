@@ -11,6 +11,7 @@ from drillctl.design import Design
 from drillctl.linear.modal import Mode, Modes
 from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.measures import Measures
+from drillctl.simulation.reference import EnergyAudit
 from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.studies.audit import Audit
 from drillctl.studies.grid import Axis
@@ -49,8 +50,12 @@ def read_sweep(design: Design, data: xarray.Dataset, summary: dict[str, Any]) ->
     )
 
 
+_TERMS = ("drive", "bit", "damping", "stored")
+
+
 def read_simulation(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Simulation:
-    """A `Simulation` as it was saved; its events and energy balance are not kept."""
+    """A `Simulation` as it was saved; its events are not kept."""
+    energy = {key: value for key, value in (summary["energy"] or {}).items() if key in _TERMS}
     return Simulation(
         design=design,
         time=data["time"].values,
@@ -61,7 +66,7 @@ def read_simulation(design: Design, data: xarray.Dataset, summary: dict[str, Any
         engine=summary["engine"],
         step=summary["step"],
         modes=summary["modes"],
-        energy=None,
+        energy=EnergyAudit(**energy) if energy else None,
     )
 
 

@@ -71,7 +71,8 @@ def modes(design: Design, count: int, options: Options) -> None:
     summary = result.summary()
     store.write_data(result, folder.path)
     _draw(plots.mode_shapes(result), folder.path / "modes.png")
-    _draw(plots.bode(linear.frequency_response(design.string)), folder.path / "bode.png")
+    string, frequencies = design.string, linear.telling_frequencies(design.string)
+    _draw(plots.bode(linear.frequency_response(string, frequencies)), folder.path / "bode.png")
     _draw(plots.friction_curves(design), folder.path / "friction.png")
     if not options.json:
         printing.modes(summary)
@@ -99,8 +100,6 @@ def simulate(design: Design, options: Options) -> None:
         summary["share_of_torsional_yield"] = share
     if not options.json:
         printing.simulation(result, options.units)
-    if result.energy is not None and options.verbose:
-        console.note(f"energy balance closes to {result.energy.relative_residual:.1e}")
     _conclude(folder, summary, options)
 
 
@@ -119,7 +118,9 @@ def stability_map(design: Design, options: Options) -> None:
     studies.write_tables(result, folder.path)
     if len(result.axes) == 2:
         _draw(plots.stability_map(result, system=options.units), folder.path / "map.png")
-        _draw(plots.time_response(studies.responses(result)), folder.path / "responses.png")
+        runs = studies.responses(result)
+        paths = [axis.path for axis in result.axes]
+        _draw(plots.time_response(runs, paths=paths), folder.path / "responses.png")
     elif len(result.axes) == 1:
         _draw(plots.sweep_line(result, system=options.units), folder.path / "map.png")
     summary = result.summary()

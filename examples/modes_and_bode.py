@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import drillctl
-from drillctl.linear import frequency_response
+from drillctl.linear import frequency_response, telling_frequencies
 
 
 def main(folder: Path) -> None:
@@ -21,7 +21,8 @@ def main(folder: Path) -> None:
     for number, mode in enumerate(modes.free_free):
         print(f"free-free mode {number}: {mode.frequency_hz:.4f} Hz")
     drillctl.plots.mode_shapes(modes).savefig(folder / "modes.png")
-    drillctl.plots.bode(frequency_response(design.string)).savefig(folder / "bode.png")
+    response = frequency_response(design.string, telling_frequencies(design.string))
+    drillctl.plots.bode(response).savefig(folder / "bode.png")
 
 
 if __name__ == "__main__":

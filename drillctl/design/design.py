@@ -91,6 +91,11 @@ class Design:
         """Weight-on-bit law."""
         return parts.weight_on_bit(self.tables)
 
+    @property
+    def outside_table(self) -> bool:
+        """Whether the weight on bit lies outside the friction table, if there is one."""
+        return parts.outside_table(self.tables)
+
     def plant(self) -> control.StateSpace:
         """The string without control, see `drillctl.linear.plant`."""
         from drillctl.linear import plant

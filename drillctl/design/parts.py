@@ -8,6 +8,7 @@ from drillctl.bit_rock import BitRockLaw, NavarroLopezSuarez, WeightTable
 from drillctl.design.tables import (
     ConstantTorqueTable,
     DesignTables,
+    FrictionRow,
     NavarroLopezSuarezTable,
     SectionTable,
 )
@@ -183,15 +184,27 @@ def _refuse_impossible_friction(law: NavarroLopezSuarez, tables: DesignTables) -
             )
 
 
+def outside_table(tables: DesignTables) -> bool:
+    """Whether the operating weight lies outside the friction table; False without a table."""
+    table = tables.bit_rock
+    if not isinstance(table, NavarroLopezSuarezTable) or table.table is None:
+        return False
+    return not _rows(table.table).covers(tables.operating_point.weight_on_bit)
+
+
+def _rows(table: tuple[FrictionRow, ...]) -> WeightTable:
+    return WeightTable(
+        weight=tuple(row.weight_on_bit for row in table),
+        a1=tuple(row.a1 for row in table),
+        a2=tuple(row.a2 for row in table),
+        beta=tuple(row.beta for row in table),
+    )
+
+
 def _coefficients(table: NavarroLopezSuarezTable, weight: float) -> NavarroLopezSuarez:
     if table.table is None:
         return NavarroLopezSuarez(table.a1, table.a2, table.beta)
-    rows = WeightTable(
-        weight=tuple(row.weight_on_bit for row in table.table),
-        a1=tuple(row.a1 for row in table.table),
-        a2=tuple(row.a2 for row in table.table),
-        beta=tuple(row.beta for row in table.table),
-    )
+    rows = _rows(table.table)
     if not rows.covers(weight) and table.outside_table == "refuse":
         raise InputError(
             f"{weight / 1e3:g} kN lies outside the friction table "

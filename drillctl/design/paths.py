@@ -28,11 +28,14 @@ class Parameter:
         What it measures; None for factors and counts.
     value : float or None
         In SI; None where the design leaves it out.
+    whole : bool
+        Whether it is a count and takes whole numbers only.
     """
 
     path: str
     kind: Kind | None
     value: float | None
+    whole: bool = False
 
     @property
     def si_unit(self) -> str:
@@ -100,13 +103,15 @@ def _collect(table: Table, prefix: str, found: list[Parameter]) -> None:
             for section in value:
                 _collect(section, f"{path}.{section.name}.", found)
         elif _is_number(info.annotation):
-            found.append(Parameter(path, kind_of(info), value))
+            whole = _is_number(info.annotation, int) and not _is_number(info.annotation, float)
+            found.append(Parameter(path, kind_of(info), value, whole))
 
 
-def _is_number(annotation: Any) -> bool:
-    if annotation in (int, float):
+def _is_number(annotation: Any, *types: type) -> bool:
+    """Whether an annotation is, or holds, one of `types`; of int and float if none is given."""
+    if annotation in (types or (int, float)):
         return True
-    return any(_is_number(a) for a in get_args(annotation) if a is not annotation)
+    return any(_is_number(a, *types) for a in get_args(annotation) if a is not annotation)
 
 
 def kind_of(info: Any) -> Kind | None:

@@ -11,7 +11,11 @@ thirty elements. `control` is imported where a system is made and not before, as
 """
 
 from drillctl.linear.modal import Mode, Modes, modes
-from drillctl.linear.response import FrequencyResponse, frequency_response
+from drillctl.linear.response import (
+    FrequencyResponse,
+    frequency_response,
+    telling_frequencies,
+)
 from drillctl.linear.state_space import closed_loop, open_loop, plant
 
 __all__ = [
@@ -23,4 +27,5 @@ __all__ = [
     "modes",
     "open_loop",
     "plant",
+    "telling_frequencies",
 ]

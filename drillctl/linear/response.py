@@ -88,6 +88,32 @@ class FrequencyResponse:
         return xarray.Dataset(variables, coords)
 
 
+def telling_frequencies(string: Drillstring) -> Array:
+    """`FREQUENCIES`, and more of them at both sides of each peak and each gap between peaks.
+
+    On a grid alone the height of a narrow peak is chance and a narrow gap is stepped over.
+
+    Parameters
+    ----------
+    string : Drillstring
+        Its undamped modes, with the top free (peaks) and held (gaps at the top), are marked.
+
+    Returns
+    -------
+    ndarray
+        Frequencies (Hz), increasing.
+    """
+    free, _ = string.undamped_modes
+    inner = slice(1, None)
+    stiffness, mass = (m.toarray()[inner, inner] for m in (string.stiffness, string.mass))
+    held = np.sqrt(np.maximum(scipy.linalg.eigvalsh(stiffness, mass), 0.0))
+    marks = np.concatenate([free[1:], held]) / (2.0 * np.pi)
+    low, high = FREQUENCIES[0], FREQUENCIES[-1]
+    marks = marks[(marks > low) & (marks < high)]
+    sides = np.outer(marks, 1.0 + np.array([-3e-3, -1e-3, -3e-4, 3e-4, 1e-3, 3e-3])).ravel()
+    return np.unique(np.concatenate([FREQUENCIES, sides]))
+
+
 def frequency_response(
     string: Drillstring, frequency_hz: ArrayLike = FREQUENCIES
 ) -> FrequencyResponse:

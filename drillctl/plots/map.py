@@ -119,10 +119,10 @@ def _caption(result: Sweep) -> str:
     table = result.design.tables.simulation
     status = result.design.tables.status
     origin = f"string {status}; " if status == "reconstructed" else ""
-    return (
-        f"{origin}{table.duration:g} s, step {result.step * 1e3:g} ms, "
-        f"{result.modes} modes; {checked}"
-    )
+    scheme = "step and modes by the string"
+    if result.step is not None:
+        scheme = f"step {result.step * 1e3:g} ms, {result.modes} modes"
+    return f"{origin}{table.duration:g} s, {scheme}; {checked}"
 
 
 def sweep_line(result: Sweep, ax: Axes | None = None, system: units.System = "si") -> Figure:

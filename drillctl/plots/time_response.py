@@ -9,6 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drillctl import units
+from drillctl.design import parameter
+from drillctl.plots.map import NAMES
 from drillctl.plots.style import BLUE, SMALL, VERMILLION, dress, grid_or_new
 
 if TYPE_CHECKING:
@@ -16,7 +18,9 @@ if TYPE_CHECKING:
 
 
 def time_response(
-    results: Simulation | Sequence[Simulation], ax: Axes | Sequence[Axes] | None = None
+    results: Simulation | Sequence[Simulation],
+    ax: Axes | Sequence[Axes] | None = None,
+    paths: Sequence[str] = (),
 ) -> Figure:
     """Speeds of top drive and bit against time.
 
@@ -26,6 +30,8 @@ def time_response(
         One panel each, in the order given.
     ax : Axes or sequence of Axes, optional
         As many as results.
+    paths : sequence of str, optional
+        Parameters to be named in the titles; by default the drive's numbers.
 
     Returns
     -------
@@ -45,9 +51,12 @@ def time_response(
         given, rows, columns, 4.2 * columns + 1.8, 2.6 * rows + 1.0, share_x=True, share_y=True
     )
     for panel, run in zip(panels, runs, strict=False):
-        _panel(panel, run)
-    for panel in panels[len(runs) :]:
-        panel.set_visible(False)
+        _panel(panel, run, paths)
+    for number in range(len(runs), len(panels)):
+        panels[number].set_visible(False)
+        above = panels[number - columns]
+        above.set_xlabel("time (s)")
+        above.tick_params(labelbottom=True)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="outside lower center", ncols=4, fontsize=SMALL, frameon=False
@@ -55,7 +64,7 @@ def time_response(
     return figure
 
 
-def _panel(ax: Axes, run: Simulation) -> None:
+def _panel(ax: Axes, run: Simulation, paths: Sequence[str]) -> None:
     bit = run.signals["bit_speed"] / units.RPM
     top = run.signals["top_speed"] / units.RPM
     stuck = run.signals["stuck"] > 0.5
@@ -69,11 +78,21 @@ def _panel(ax: Axes, run: Simulation) -> None:
         run.design.speed / units.RPM, color="black", linewidth=0.7, linestyle=":", label="set speed"
     )
     ax.set_xlim(0.0, float(run.time[-1]))
-    dress(ax, "time (s)", "speed (rpm)", _title(run))
+    dress(ax, "time (s)", "speed (rpm)", _title(run, paths))
     ax.label_outer()
 
 
-def _title(run: Simulation) -> str:
-    law = run.design.top_drive
-    numbers = ", ".join(f"{k} {v:g}" for k, v in law._asdict().items())  # type: ignore[attr-defined]
+def _title(run: Simulation, paths: Sequence[str]) -> str:
+    if paths:
+        numbers = ", ".join(_named(run, path) for path in paths)
+    else:
+        law = run.design.top_drive
+        numbers = ", ".join(f"{k} {v:g}" for k, v in law._asdict().items())  # type: ignore[attr-defined]
     return f"J1 {run.measures.j1:.1f} s: {numbers}"
+
+
+def _named(run: Simulation, path: str) -> str:
+    """A parameter of the run's design by its usual name, in the units people read."""
+    found = parameter(run.design, path)
+    value, unit = units.displayed(found.value, found.si_unit)
+    return f"{NAMES.get(path, path.rpartition('.')[2])} {value:g} {unit}".rstrip()

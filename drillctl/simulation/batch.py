@@ -202,7 +202,7 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
             "rop_proxy": row(r.ROP_SUM) / nominal,
             "work_at_bit": row(r.WORK),
             "work_per_turn": _where(turned > 1e-3, row(r.WORK) / turned),
-            "time_outside_table": np.zeros(len(lanes)),
+            "time_outside_table": duration * lanes.outside_table,
         }
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(raw).all(axis=0))
     status = _statuses(finite, row(r.LATE_STUCK), window, values["settling_time_wide"])

@@ -32,6 +32,8 @@ class Lanes:
         Speed of all nodes at time zero of a start that turns (rad/s).
     nominal_weight : ndarray, shape (lanes,)
         Nominal weight on bit (N).
+    outside_table : ndarray, shape (lanes,)
+        1 where that weight lies outside the friction table, else 0.
     start : {'rest', 'turning', 'wound_up'}
         Kind of start.
     """
@@ -43,6 +45,7 @@ class Lanes:
     set_speed: Array
     turning_speed: Array
     nominal_weight: Array
+    outside_table: Array
     start: Kind
 
     def __len__(self) -> int:
@@ -62,6 +65,7 @@ class Lanes:
             set_speed=self.set_speed[chosen],
             turning_speed=self.turning_speed[chosen],
             nominal_weight=self.nominal_weight[chosen],
+            outside_table=self.outside_table[chosen],
             start=self.start,
         )
 
@@ -83,6 +87,7 @@ def lane_numbers(design: Design) -> dict[str, float]:
     numbers["set_speed"] = design.speed
     numbers["turning_speed"] = design.speed if turning is None else turning
     numbers["nominal_weight"] = design.tables.operating_point.weight_on_bit
+    numbers["outside_table"] = float(design.outside_table)
     return numbers
 
 
@@ -108,6 +113,7 @@ def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
         set_speed=numbers["set_speed"],
         turning_speed=numbers["turning_speed"],
         nominal_weight=numbers["nominal_weight"],
+        outside_table=numbers["outside_table"],
         start=design.tables.start.kind,
     )
 

@@ -50,7 +50,7 @@ class Measures:
     mean_weight_on_bit : float
         Time mean (N).
     rop_proxy : float
-        Time mean of weight x bit speed, over nominal weight x set speed.
+        Time mean of weight x abs(bit speed), over nominal weight x set speed.
     work_at_bit : float
         Work done on the rock (J).
     work_per_turn : float or None
@@ -127,5 +127,5 @@ def ssi(low: float, high: float, mean: float) -> float | None:
 
 def per_turn(work: float, mean_speed: float, duration: float) -> float | None:
     """Work (J) over revolutions; None under a thousandth of a turn."""
-    turns = mean_speed * duration / (2.0 * math.pi)
-    return work / turns if abs(turns) > 1e-3 else None
+    turns = abs(mean_speed) * duration / (2.0 * math.pi)
+    return work / turns if turns > 1e-3 else None

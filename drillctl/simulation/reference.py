@@ -115,6 +115,16 @@ class EnergyAudit:
         largest = max(abs(self.drive), abs(self.bit), abs(self.damping), abs(self.stored))
         return abs(self.residual) / largest if largest > 0.0 else 0.0
 
+    def summary(self) -> dict[str, float]:
+        """The terms (J) and the relative residual, by name."""
+        return {
+            "drive": self.drive,
+            "bit": self.bit,
+            "damping": self.damping,
+            "stored": self.stored,
+            "relative_residual": self.relative_residual,
+        }
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:

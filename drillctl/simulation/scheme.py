@@ -14,6 +14,10 @@ STEEPEST = 0.5
 the bit could have more than one root."""
 
 
+FEWEST_STEPS = 20
+"""Fewest steps in a period of the first elastic mode; fewer would not show stick-slip."""
+
+
 @dataclass(frozen=True)
 class Accuracy:
     """What a named accuracy stands for.
@@ -78,19 +82,25 @@ def choose_scheme(
     Raises
     ------
     InputError
-        A given step is too long for the steepness of the friction law.
+        A given step is too long for the steepness of the friction law or for the string.
     """
     accuracy = ACCURACIES[table.accuracy]
     frequency, _ = string.undamped_modes
     # Mobility over a step is about step / inertia: the bit has no time to move the string.
     longest = STEEPEST * bit_inertia / steepest_fall if steepest_fall > 0.0 else math.inf
+    elastic = 2.0 * math.pi / frequency[1]
     if table.step is None:
-        elastic = 2.0 * math.pi / frequency[1]
         step = min(accuracy.step, elastic / accuracy.steps_per_period, longest)
     elif table.step > longest:
         raise InputError(
             f"{table.step:g} s is too long for this friction law: its torque falls by "
             f"{steepest_fall:.4g} N m s/rad, which allows {longest:.3g} s at most",
+            "simulation.step",
+        )
+    elif table.step > elastic / FEWEST_STEPS:
+        raise InputError(
+            f"{table.step:g} s is too long for this string: its first elastic mode has a period "
+            f"of {elastic:.3g} s, which allows {elastic / FEWEST_STEPS:.3g} s at most",
             "simulation.step",
         )
     else:

@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+FINE = 0.01
+"""Interval (s) on which what is not located is measured, whatever the signals' own."""
+FEWEST_SAMPLES = 500
+"""Fewest intervals in a run for that; it is finer in a short run."""
+
 SIGNALS = {
     "top_speed": ("rad/s", "speed of the top drive"),
     "bit_speed": ("rad/s", "speed of the bit"),
@@ -93,13 +98,14 @@ class Simulation:
         return xarray.Dataset(variables, {"time": time})
 
     def summary(self) -> dict[str, Any]:
-        """Measures, status, engine, step and modes; SI units, None where undefined."""
+        """Measures, status, engine, step, modes, energy; SI units, None where undefined."""
         return {
             "measures": self.measures.as_dict(),
             "status": self.status,
             "engine": self.engine,
             "step": self.step,
             "modes": self.modes,
+            "energy": None if self.energy is None else self.energy.summary(),
         }
 
     def save(self, folder: str | Path) -> Path:
@@ -117,21 +123,25 @@ def sample(motion: Motion, interval: float = 0.01) -> Simulation:
     motion : Motion
         As the reference solver left it.
     interval : float
-        Sampling interval (s).
+        Sampling interval of the signals (s), at most: a whole number of them is the duration.
 
     Returns
     -------
     Simulation
-        J1, stuck time and bit speed extremes come from located events, not from samples.
+        J1, stuck time and bit speed extremes come from located events; peak torques, settling
+        times and `rop_proxy` from samples `FINE` apart, whatever `interval` is.
     """
     design = motion.design
     duration = design.tables.simulation.duration
-    time = np.arange(0.0, duration + 0.5 * interval, interval)
-    state, direction = _states(motion.pieces, time)
-    signals = _signals(design, state, direction)
-    measured = _measures(motion, time, signals)
+    fine = _grid(duration, min(FINE, duration / FEWEST_SAMPLES))
+    fine_signals = _signals(design, *_states(motion.pieces, fine))
+    measured = _measures(motion, fine, fine_signals)
+    time = _grid(duration, interval)
+    signals = fine_signals
+    if len(time) != len(fine):
+        signals = _signals(design, *_states(motion.pieces, time))
     status = m.status_of(
-        all(bool(np.isfinite(values).all()) for values in signals.values()),
+        all(bool(np.isfinite(values).all()) for values in fine_signals.values()),
         _stuck_between(motion, duration - min(m.WINDOW, duration), duration),
         min(m.WINDOW, duration),
         measured.settling_time_wide,
@@ -140,6 +150,11 @@ def sample(motion: Motion, interval: float = 0.01) -> Simulation:
         design, time, signals, motion.events, measured, status, "reference", None, None,
         motion.energy,
     )  # fmt: skip
+
+
+def _grid(duration: float, interval: float) -> Array:
+    """Equally spaced times from zero to the very end, at most `interval` apart."""
+    return np.linspace(0.0, duration, max(1, math.ceil(duration / interval * (1 - 1e-9))) + 1)
 
 
 def _states(pieces: tuple[Piece, ...], time: Array) -> tuple[Array, Array]:
@@ -209,7 +224,7 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
         rop_proxy=_rop_proxy(design, time, signals),
         work_at_bit=motion.energy.bit,
         work_per_turn=m.per_turn(motion.energy.bit, mean, duration),
-        time_outside_table=0.0,
+        time_outside_table=duration if design.outside_table else 0.0,
     )
 
 

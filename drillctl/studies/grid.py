@@ -85,18 +85,10 @@ def axis(design: Design, table: AxisTable) -> Axis:
     if not low < high:
         raise InputError(f"min {table.min} must be less than max {table.max}", where)
     values = np.linspace(low, high, table.points)
-    if found.kind is None and np.array_equal(values, np.round(values)) is False:
-        _refuse_fractional_count(design, table, values)
+    if found.whole and not np.array_equal(values, np.round(values)):
+        first = next(v for v in values if v != round(v))
+        raise InputError(f"{first:g} is not a whole number, and it takes no others", where)
     return Axis(table.path, found.si_unit, values)
-
-
-def _refuse_fractional_count(design: Design, table: AxisTable, values: Array) -> None:
-    """A count such as `elements` takes whole numbers only; try the first that is not."""
-    first = next(float(v) for v in values if v != round(v))
-    try:
-        design.replace({table.path: units.SI(first)})
-    except InputError as error:
-        raise InputError(error.problem, f"map.axes {table.path}") from None
 
 
 def axes_of(design: Design, tables: tuple[AxisTable, ...]) -> tuple[Axis, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from pathlib import Path
 
 from drillctl.errors import InputError
 from drillctl.simulation.batch import FLOATS
@@ -28,7 +29,12 @@ def refuse_too_large(points: Sequence[int]) -> None:
 
 
 def _free_memory() -> float:
-    """Memory that is free (bytes); infinite where the system does not tell."""
+    """Memory that can be had (bytes); infinite where the system does not tell."""
+    info = Path("/proc/meminfo")
+    if info.is_file():
+        for line in info.read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024.0 * float(line.split()[1])
     try:
         return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (ValueError, OSError, AttributeError):

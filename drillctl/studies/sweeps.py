@@ -56,8 +56,8 @@ class Sweep:
         Index into `simulation.measures.STATUSES`.
     audit : Audit
         Cells simulated again with the reference solver.
-    step, modes : float, int
-        Scheme of the batch engine; of the first group where the string varies.
+    step, modes : float and int, or None
+        Scheme of the batch engine; None where it differs from string to string.
     seconds, total_seconds : float
         Spent in the lanes alone and from call to return (s).
     provenance : dict of str
@@ -70,8 +70,8 @@ class Sweep:
     measures: dict[str, Array]
     status: NDArray[np.int8]
     audit: auditing.Audit
-    step: float
-    modes: int
+    step: float | None
+    modes: int | None
     seconds: float
     total_seconds: float
     provenance: dict[str, str] = field(default_factory=provenance)
@@ -185,6 +185,7 @@ def sweep(
     count = table.audit_cells if audit_cells is None else audit_cells
     audited = auditing.audit(design, axes, collected.measures["j1"], table.levels, count, progress)
     shape = shape_of(axes)
+    step, modes = collected.scheme
     return Sweep(
         design=design,
         axes=axes,
@@ -192,8 +193,8 @@ def sweep(
         measures={name: values.reshape(shape) for name, values in collected.measures.items()},
         status=collected.status.reshape(shape),
         audit=audited,
-        step=collected.step,
-        modes=collected.modes,
+        step=step,
+        modes=modes,
         seconds=collected.seconds,
         total_seconds=time.perf_counter() - begin,
     )
@@ -228,7 +229,8 @@ class _Collected:
         cells = int(np.prod(shape_of(axes), dtype=int))
         self.measures = {name: np.full(cells, np.nan) for name in FLOATS}
         self.status = np.full(cells, STATUSES.index("failed"), dtype=np.int8)
-        self.step, self.modes, self.seconds = np.nan, 0, 0.0
+        self.schemes: set[tuple[float, int]] = set()
+        self.seconds = 0.0
 
     def run(self, design: Design, progress: Progress, blocks: Blocks) -> None:
         number = done = 0
@@ -236,8 +238,7 @@ class _Collected:
         for index, group in enumerate(groups(design, self.axes)):
             table, lanes = group.design.tables.simulation, group.lanes
             prepared = blocks.prepared(index, partial(prepare, lanes, table))
-            if index == 0:
-                self.step, self.modes = prepared.scheme.step, prepared.scheme.modes
+            self.schemes.add((prepared.scheme.step, prepared.scheme.modes))
             kind = type(prepared.stepper.string)
             if kind not in warm:  # a string of another kind takes another kernel
                 warm.add(kind)
@@ -257,6 +258,11 @@ class _Collected:
                 progress.advance(len(batch.status))
                 done += len(batch.status)
                 number += 1
+
+    @property
+    def scheme(self) -> tuple[float, int] | tuple[None, None]:
+        """Step and modes, if they were the same throughout."""
+        return next(iter(self.schemes)) if len(self.schemes) == 1 else (None, None)
 
     def _put(self, cells: NDArray[np.int64], batch: Batch) -> None:
         for name, values in batch.measures.items():

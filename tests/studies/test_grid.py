@@ -47,7 +47,7 @@ def lane(lanes, index):
         for part, law in laws.items()
         for name, values in law._asdict().items()
     }
-    for name in ("set_speed", "turning_speed", "nominal_weight"):
+    for name in ("set_speed", "turning_speed", "nominal_weight", "outside_table"):
         held[name] = getattr(lanes, name)[index]
     return held
 
@@ -250,3 +250,15 @@ def test_sweep_equals_its_cells_alone(paper, case):
         alone = drillctl.simulate(cell_design(paper, axes, cell), engine="batch")
         assert found.j1.ravel()[cell] == alone.measures.j1
         assert found.measures["peak_pipe_torque"].ravel()[cell] == alone.measures.peak_pipe_torque
+
+
+def test_unitless_axes_that_are_possible_only_together():
+    # No value of a2 on the grid goes with the design's own a1, but each goes with the grid's.
+    tables = (
+        AxisTable(path="bit_rock.a1", min=0.005, max=0.015, points=3),
+        AxisTable(path="bit_rock.a2", min=0.02, max=0.028, points=3),
+    )
+    values = {"bit_rock.a1": 0.03, "bit_rock.a2": 0.07, "bit_rock.beta": 0.09}
+    rig = drillctl.load("monteiro-trindade-140kn", **values)
+    (group,) = groups(rig, axes_of(rig, tables))
+    assert len(group.lanes) == 9

@@ -5,7 +5,8 @@
 - `laws.py`: lets the laws of `bit_rock`, `top_drive` and `weight_on_bit` be called by type.
 - `rows.py`: what each row of a block's working array holds.
 - `string_step.py`: one exact step of the string, for a block of lanes.
-- `lane_step.py`: the scalar inclusion at the bit, and the measures, for a block of lanes.
+- `lane_step.py`: the scalar inclusion at the bit, for a block of lanes.
+- `measure_step.py`: what is measured of each step.
 - `advance.py`: the loop over steps and blocks.
 
 Importing this package imports numba; compiled code is kept on disk.

@@ -151,7 +151,7 @@ def advance_block(
         if measure(work, begin, clock.step, in_j1, in_window) > 0:
             measure_crossings(work, begin, clock.step, in_j1)
         if in_window > 0.0:
-            measure_window(work)
+            measure_window(work, in_window)
     for measured in range(r.MEASURES):
         for lane in range(WIDTH):
             value = work[r.FIRST_MEASURE + measured * WIDTH + lane]

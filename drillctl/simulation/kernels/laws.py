@@ -14,7 +14,7 @@ from numba.extending import overload
 
 from drillctl.simulation.kernels.compiling import inlined
 from drillctl.simulation.kernels.exponential import exp
-from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.rows import LAW_FIELDS, WIDTH
 
 
 def at_lane(law: Any, work: Any, row: int, lane: int) -> Any:
@@ -42,6 +42,8 @@ def load_block(law: Any, work: Any, row: int, first: int) -> None:
 def _load_block(law, work, row, first):
     if not isinstance(law, types.BaseNamedTuple):
         return None
+    if len(law.fields) > LAW_FIELDS:
+        raise TypeError(f"{law.instance_class.__name__} has more than {LAW_FIELDS} numbers")
     lines = [
         f"        work[row + {k * WIDTH} + lane] = law[{k}][first + lane]"
         for k in range(len(law.fields))
@@ -92,15 +94,15 @@ def _torque_and_slope(law, weight, speed):
     return lambda law, weight, speed: method(law, weight, speed, exp)
 
 
-def mean_torque(law: Any, angle: float, step: float) -> tuple[float, float]:
-    """`law.mean_torque(angle, step)`."""
+def mean_torque(law: Any, angle: float, rate: float) -> tuple[float, float]:
+    """`law.mean_torque(angle, rate)`, with `rate` = 1 / step (1/s)."""
     raise NotImplementedError("compiled only")
 
 
 @overload(mean_torque)
-def _mean_torque(law, angle, step):
+def _mean_torque(law, angle, rate):
     method = _method(law, "mean_torque")
-    return lambda law, angle, step: method(law, angle, step)
+    return lambda law, angle, rate: method(law, angle, rate)
 
 
 def weight_at(law: Any, bit_speed: float) -> float:

@@ -90,13 +90,17 @@ def measure_crossings(work: Any, begin: float, step: float, in_j1: float) -> Non
 
 
 @inlined
-def measure_window(work: Any) -> None:
-    """Extremes of the bit speed in the window at the end of the run."""
+def measure_window(work: Any, in_window: float) -> None:
+    """Extremes of the bit speed in the window at the end of the run.
+
+    A step that lies in it as a whole brings its beginning too: the window's first moment.
+    """
     widest_vectors()
     for lane in range(WIDTH):
         speed = work[r.BIT_SPEED + lane]
-        work[r.LATE_LOW + lane] = min(work[r.LATE_LOW + lane], speed)
-        work[r.LATE_HIGH + lane] = max(work[r.LATE_HIGH + lane], speed)
+        before = work[r.SPEED_BEFORE + lane] if in_window >= 1.0 else speed
+        work[r.LATE_LOW + lane] = min(work[r.LATE_LOW + lane], min(before, speed))
+        work[r.LATE_HIGH + lane] = max(work[r.LATE_HIGH + lane], max(before, speed))
 
 
 @inlined

@@ -11,7 +11,10 @@ WIDTH = int(os.environ.get("DRILLCTL_BLOCK_WIDTH", "16"))
 """Lanes in a block: a few vector registers' worth, so that the state of thirty modes stays in
 the first cache. A matter of speed alone: no result depends on it, to the last bit."""
 
-# Law parameters, as many rows as the longest law has fields.
+LAW_FIELDS = 8
+"""Most numbers that a law may have: the rows kept for each."""
+
+# Law parameters.
 FRICTION = 0 * WIDTH
 DRIVE = 8 * WIDTH
 WEIGHT = 16 * WIDTH
