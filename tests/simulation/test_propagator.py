@@ -112,17 +112,13 @@ def test_any_viscous_damping(top, bit, uneven, internal, ground):
 
 
 def critically_damped() -> Drillstring:
-    """Two inertias with a damper on one of them: a double pole, no basis of eigenvectors."""
-    # (s^2 m + c s + k)(s^2 m + k) - k^2 has a double root where its discriminant vanishes.
+    """Two inertias on a unit spring, damped to ground: a double pole, no basis of eigenvectors.
+
+    With inertias 1 and M and damper c the poles but zero solve M s^3 + c M s^2 + (1 + M) s + c
+    = M (s + a)^2 (s + 5 a) = 0 for a^2 = 7/72, M = 72/5, c = 7 a.
+    """
     spring = (Section("spring", 1, 1.0, 0.0),)
-
-    def gap(damper: float) -> float:
-        roots = np.roots([1.0, damper, 2.0, damper])
-        return float(np.abs(roots[:, None] - roots[None, :] + 9.0 * np.eye(3)).min())
-
-    tried = np.linspace(2.0, 3.5, 30001)
-    low = tried[np.argmin([gap(d) for d in tried])]
-    return assemble(spring, 1.0, 1.0, top_damping=low)
+    return assemble(spring, 1.0, 72.0 / 5.0, top_damping=7.0 * np.sqrt(7.0 / 72.0))
 
 
 def test_a_badly_conditioned_basis_is_not_used():
@@ -133,13 +129,7 @@ def test_a_badly_conditioned_basis_is_not_used():
     stepper, seen = by_kernel(string, angle, speed, torques)
     expected = by_exponential(string, angle, speed, torques)
     assert np.abs(seen - expected).max() <= 1e-9 * np.abs(expected).max()
-    poles = np.linalg.eigvals(np.block([
-        [np.zeros((2, 2)), np.eye(2)], [-string.stiffness.toarray(), -string.damping.toarray()]
-    ]))  # fmt: skip
-    conditioned = np.linalg.cond(np.linalg.eig(np.block([
-        [np.zeros((2, 2)), np.eye(2)], [-string.stiffness.toarray(), -string.damping.toarray()]
-    ]))[1])  # fmt: skip
-    assert isinstance(stepper.string, DenseString) == (conditioned > 1e6), poles
+    assert isinstance(stepper.string, DenseString)
 
 
 def test_dense_and_block_steps_agree(monkeypatch):
@@ -180,11 +170,30 @@ def test_a_free_undamped_string_keeps_its_energy(seed, steps):
     assert energy(motion[:n], motion[n:]) == pytest.approx(energy(angle, speed), rel=1e-10)
 
 
-def test_held_torques_do_exactly_the_work_of_the_change_of_angle():
+@pytest.mark.parametrize("seed", range(5))
+def test_held_torques_do_exactly_the_work_of_the_change_of_angle(seed):
     # What makes the discrete controller passive: work over a step = torque x change of angle.
     string = CASES["undamped"]
+    random = np.random.default_rng(seed)
+    before = random.normal(size=2 * string.nodes)
+    top, bit = torques = 1e3 * random.normal(size=2)
     stepper = string_step(string, STEP, 999)
-    s = stepper.string
-    assert s.angle_by_top > 0
-    assert s.speed_by_bit > 0
-    assert s.speed_by_bit == pytest.approx(STEP / 300.0, rel=0.2)
+    n = string.nodes
+    state = np.zeros((2 * len(stepper.angle_to_state), r.WIDTH))
+    to_state = np.hstack([stepper.angle_to_state, stepper.speed_to_state])
+    state[: len(to_state), 0] = to_state @ before
+    flat, work = state.ravel(), np.zeros(r.ROWS * r.WIDTH)
+    _steps(stepper.string, flat, work, np.array([torques]), np.zeros((1, 2)))
+    # The pass has propagated freely; the held torques are the state's `push`.
+    pushed = flat.reshape(-1, r.WIDTH)[: len(to_state), 0] + stepper.string.push.reshape(-1, 2) @ [
+        top,
+        bit,
+    ]
+    after = np.linalg.solve(to_state, pushed)
+
+    def energy(motion):
+        u, v = motion[:n], motion[n:]
+        return 0.5 * (u @ (string.stiffness @ u) + v @ (string.mass @ v))
+
+    done = top * (after[0] - before[0]) - bit * (after[n - 1] - before[n - 1])
+    assert energy(after) - energy(before) == pytest.approx(done, rel=1e-9, abs=1e-7)
