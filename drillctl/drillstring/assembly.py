@@ -17,6 +17,33 @@ from drillctl.drillstring.section import Section
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Parts:
+    """Sections and ends of a string, before they become matrices.
+
+    Attributes
+    ----------
+    sections : tuple of Section
+        From top to bottom.
+    top_inertia, bit_inertia : float
+        Of the top drive and of the BHA with the bit (kg m2).
+    top_damping, bit_damping : float
+        Viscous dampers to ground at the two ends (N m s/rad).
+    modal_damping : float
+        Damping ratio added to every elastic free-free mode.
+    mass : {'consistent', 'lumped'}
+        Mass of an element, m/6 [[2, 1], [1, 2]] or m/2 at each end.
+    """
+
+    sections: tuple[Section, ...]
+    top_inertia: float
+    bit_inertia: float
+    top_damping: float
+    bit_damping: float
+    modal_damping: float
+    mass: Literal["consistent", "lumped"]
+
+
 @dataclass(frozen=True, eq=False)
 class Drillstring:
     """M u'' + C u' + K u = F of the string, its top drive and its BHA.
@@ -38,6 +65,8 @@ class Drillstring:
         True where the undamped modes diagonalise C.
     yield_torque : float
         Torsional yield of the uppermost pipe (N m); infinite when unknown.
+    parts : Parts
+        What the matrices were assembled from.
     """
 
     depth: Array
@@ -50,6 +79,7 @@ class Drillstring:
     element_damping: Array
     classical: bool
     yield_torque: float
+    parts: Parts
 
     @property
     def nodes(self) -> int:
@@ -146,6 +176,9 @@ def assemble(
         element_damping=damping,
         classical=_classical(c.tocsr(), m.tocsr(), k.tocsr()),
         yield_torque=sections[0].yield_torque,
+        parts=Parts(
+            sections, top_inertia, bit_inertia, top_damping, bit_damping, modal_damping, mass
+        ),
     )
     return string if modal_damping == 0.0 else _with_modal_damping(string, modal_damping)
 

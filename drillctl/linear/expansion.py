@@ -1,0 +1,106 @@
+"""A string seen from its ends by summing over its modes, for damping given mode by mode.
+
+Damping that is given mode by mode couples all nodes and has no place in a transmission line.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.drillstring import Drillstring, Parts
+from drillctl.linear.poles import DIAGONAL
+from drillctl.linear.transmission import EndMobility
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+CHUNK = 256
+"""Frequencies solved at a time where the modes are coupled."""
+
+
+class Expansion:
+    """Mobility of a finite-element string from its undamped free-free modes.
+
+    Parameters
+    ----------
+    string : Drillstring
+        With any viscous damping. Where it couples the modes a full system is solved at each
+        frequency, else the modes are summed.
+    """
+
+    def __init__(self, string: Drillstring) -> None:
+        self.string = string
+
+    @property
+    def parts(self) -> Parts:
+        """Sections and ends."""
+        return self.string.parts
+
+    @cached_property
+    def _internal_damping(self) -> Array:
+        """Damping between the modes (1/s), without the dampers at the two ends."""
+        _, shapes = self.string.undamped_modes
+        top, bit = shapes[0], shapes[-1]
+        whole = shapes.T @ (self.string.damping @ shapes)
+        ends = self.parts.top_damping * np.outer(top, top)
+        ends += self.parts.bit_damping * np.outer(bit, bit)
+        return np.asarray(whole - ends)
+
+    def mobility(
+        self, s: ComplexArray, top: ComplexArray | complex = 0.0, bit: ComplexArray | complex = 0.0
+    ) -> EndMobility:
+        """Response to torques on the two ends; see `transmission.Lines.mobility`."""
+        s = np.asarray(s, dtype=complex)
+        free = self._free(s)  # speeds of nodes 0, 1 and last per torque on first and last
+        close = np.zeros((*s.shape, 2, 2), dtype=complex)
+        close[..., 0, 0] = self.parts.top_damping + top
+        close[..., 1, 1] = self.parts.bit_damping + bit
+        ends = free[..., [0, 2], :]
+        shut = np.linalg.inv(np.eye(2) + close @ ends)
+        closed = free @ shut
+        first = self.string.element_stiffness[0] + s * self.string.element_damping[0]
+        pipe = (first / s)[..., None] * (closed[..., 0, :] - closed[..., 1, :])
+        return EndMobility(
+            top=closed[..., 0, 0],
+            bit=closed[..., 2, 1],
+            transfer=closed[..., 2, 0],
+            pipe_from_top=pipe[..., 0],
+            pipe_from_bit=pipe[..., 1],
+        )
+
+    def bit_impedance(self, s: ComplexArray, top: ComplexArray | complex = 0.0) -> ComplexArray:
+        """Torque per speed at the bit (N m s/rad), with `top` added at the drive."""
+        return 1.0 / self.mobility(s, top=top).bit
+
+    def top_impedance(self, s: ComplexArray, bit: ComplexArray | complex = 0.0) -> ComplexArray:
+        """Torque per speed at the top (N m s/rad), with `bit` added at the rock."""
+        return 1.0 / self.mobility(s, bit=bit).top
+
+    def _free(self, s: ComplexArray) -> ComplexArray:
+        """Speeds per torque without anything at the ends, shape (..., 3, 2)."""
+        frequency, shapes = self.string.undamped_modes
+        seen, driven = shapes[[0, 1, -1]], shapes[[0, -1]]
+        damping = self._internal_damping
+        off = damping - np.diag(np.diagonal(damping))
+        flat = s.ravel()
+        if np.abs(off).max() <= DIAGONAL * np.abs(damping).max():
+            each = flat[:, None] / (flat[:, None] ** 2 + flat[:, None] * np.diagonal(damping)
+                                    + frequency**2)  # fmt: skip
+            found = np.einsum("am,fm,bm->fab", seen, each, driven, optimize=True)
+        else:
+            found = np.concatenate(
+                [self._solved(flat[i : i + CHUNK]) for i in range(0, len(flat), CHUNK)]
+            )
+        return np.asarray(found).reshape(*s.shape, 3, 2)
+
+    def _solved(self, s: ComplexArray) -> ComplexArray:
+        frequency, shapes = self.string.undamped_modes
+        matrix = s[:, None, None] * self._internal_damping
+        matrix = matrix + np.eye(len(frequency)) * (s[:, None] ** 2 + frequency**2)[:, None, :]
+        driven = np.broadcast_to(shapes[[0, -1]].T, (len(s), len(frequency), 2))
+        angles = shapes[[0, 1, -1]] @ np.linalg.solve(matrix, driven)
+        return np.asarray(s[:, None, None] * angles)

@@ -1,0 +1,233 @@
+r"""Friction-slope margin: the falling slope at the bit that a loop tolerates.
+
+With the rock's torque falling by D per speed at the operating point the loop is
+:math:`D\,H(s) = 1`, where H is the mobility of the bit (speed per forward torque) with the
+drive closed. Without slope the loop only loses energy. As D grows its poles reach the
+imaginary axis where H, and with it the impedance 1/H, is real; the least such impedance is
+
+.. math:: D^*(K_p, K_i) = \min_\omega \{ \mathrm{Re}\, 1/H(i\omega) :
+          \mathrm{Im}\, 1/H(i\omega) = 0 \},
+
+and the equilibrium is stable while D < D*. No eigenvalue is computed: D* keeps its digits where
+the damping of high modes is below the rounding of a pole, and costs the same for any number of
+elements and for the continuum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from drillctl.linear.ends import Ends, telling_grid
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+CHUNK = 256
+"""Gain pairs looked at together: their signs on the grid fit the second-level cache."""
+CANDIDATES = 3
+"""Crossings of a gain pair that are refined in a map: those that look lowest on the grid."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Slopes at which one pair of poles lies on the imaginary axis.
+
+    Attributes
+    ----------
+    slope : ndarray, shape (crossings,)
+        Falling slope (N m s/rad), lowest first.
+    omega : ndarray, shape (crossings,)
+        Angular frequency of the poles (rad/s); 0 for a real pole.
+    """
+
+    slope: Array
+    omega: Array
+
+
+@dataclass(frozen=True, eq=False)
+class SlopeMargins:
+    """Slope margins of a number of gain pairs.
+
+    Attributes
+    ----------
+    slope : ndarray
+        D* (N m s/rad).
+    omega : ndarray
+        Angular frequency of the poles that decide (rad/s); 0 for a real pole.
+    """
+
+    slope: Array
+    omega: Array
+
+
+def crossings(ends: Ends, kp: float, ki: float) -> Crossings:
+    """All slopes at which poles reach the imaginary axis under PI control.
+
+    Parameters
+    ----------
+    ends : Ends
+        The string; of a continuum, the lowest `ends.WAVE_MODES` modes.
+    kp, ki : float
+        Gains (N m s/rad, N m/rad), not negative.
+
+    Returns
+    -------
+    Crossings
+        Lowest first; the first is D*. Without proportional gain an undamped string crosses at
+        zero.
+    """
+    search = _Search(ends)
+    gains = np.array([[kp, ki]])
+    _, place = search.brackets(gains)
+    omega = search.refined(place, np.broadcast_to(gains[0], (len(place), 2)))
+    slope = search.impedance(omega, kp, ki).real
+    if ki == 0.0:
+        slope, omega = np.append(slope, kp + search.rigid), np.append(omega, 0.0)
+    slope = np.maximum(slope, 0.0)
+    order = np.lexsort([omega, slope])
+    return Crossings(slope[order], omega[order])
+
+
+def slope_margin(ends: Ends, kp: float, ki: float) -> tuple[float, float]:
+    """D* (N m s/rad) and the angular frequency that decides (rad/s); see `crossings`."""
+    found = crossings(ends, kp, ki)
+    return float(found.slope[0]), float(found.omega[0])
+
+
+def slope_margins(ends: Ends, kp: ArrayLike, ki: ArrayLike) -> SlopeMargins:
+    """D* over many gain pairs at once.
+
+    Parameters
+    ----------
+    ends : Ends
+        The string.
+    kp, ki : array_like
+        Gains (N m s/rad, N m/rad), not negative; broadcast against each other.
+
+    Returns
+    -------
+    SlopeMargins
+        In the common shape of the gains. Of each pair the few crossings that look lowest on
+        the grid are refined, so that among high modes of nearly one margin the wrong one may
+        decide: that changes D* by 1e-4 of itself at most, see `docs/linear.md`.
+    """
+    kp, ki = np.broadcast_arrays(np.asarray(kp, dtype=float), np.asarray(ki, dtype=float))
+    gains = np.column_stack([kp.ravel(), ki.ravel()])
+    search = _Search(ends)
+    slope, omega = np.full(len(gains), np.inf), np.zeros(len(gains))
+    for first in range(0, len(gains), CHUNK):
+        part = gains[first : first + CHUNK]
+        pair, place = search.brackets(part)
+        pair, place = search.lowest(part, pair, place)
+        found = search.refined(place, part[pair])
+        level = np.maximum(search.impedance(found, part[pair, 0], part[pair, 1]).real, 0.0)
+        # The last write wins: written from the highest to the lowest.
+        order = np.lexsort([-found, -level])
+        slope[first + pair[order]] = level[order]
+        omega[first + pair[order]] = found[order]
+    at_rest = np.where(gains[:, 1] == 0.0, gains[:, 0] + search.rigid, np.inf)
+    real = at_rest < slope
+    slope, omega = np.where(real, at_rest, slope), np.where(real, 0.0, omega)
+    return SlopeMargins(slope.reshape(kp.shape), omega.reshape(kp.shape))
+
+
+class _Search:
+    """Crossings of many gain pairs on one string.
+
+    With the drive's impedance c added to a resistor r that stands at the top for reference,
+    H = (h + (c - r) d) / (1 + (c - r) t) with t, h the mobilities of top and bit so terminated
+    and d their determinant. The sign of Im 1/H is then that of a quadratic in the gains whose
+    coefficients depend on frequency alone: all pairs times all frequencies are one product of
+    matrices.
+    """
+
+    def __init__(self, ends: Ends) -> None:
+        self.ends = ends
+        self.grid = telling_grid(ends)
+        parts = ends.parts
+        self.rigid = parts.top_damping + parts.bit_damping + sum(
+            x.drag + x.mass_damping * (x.inertia + x.end_inertia) for x in parts.sections
+        )  # fmt: skip
+        s = 1j * self.grid
+        self.lossy = self.rigid > 0.0 or parts.modal_damping > 0.0 or any(
+            x.coupling_damping > 0.0 or x.stiffness_damping > 0.0 for x in parts.sections
+        )  # fmt: skip
+        resistor = max(x.impedance for x in parts.sections) or np.sqrt(
+            parts.sections[0].stiffness * (parts.top_inertia + parts.bit_inertia)
+        )
+        self.scale = resistor
+        seen = ends.mobility(s, top=resistor)
+        determinant = seen.top * seen.bit - seen.transfer**2
+        n0, n1 = seen.bit - resistor * determinant, determinant
+        d0, d1 = 1.0 - resistor * seen.top, seen.top
+        # den * conj(num) over [1, kp, ki, kp^2, ki^2], with c = kp - i ki / w.
+        both = d1 * n0.conj() + d0 * n1.conj()
+        turned = -1j * d1 * n0.conj() + 1j * d0 * n1.conj()
+        square = d1 * n1.conj()
+        self.product = np.stack(
+            [d0 * n0.conj(), both, turned / self.grid, square, square / self.grid**2]
+        )
+        norm = 2.0 * (n1 * n0.conj())
+        self.norm = np.stack(
+            [
+                np.abs(n0) ** 2,
+                norm.real,
+                norm.imag / self.grid,
+                np.abs(n1) ** 2,
+                np.abs(n1) ** 2 / self.grid**2,
+            ]
+        )
+
+    def impedance(self, omega: Array, kp: ArrayLike, ki: ArrayLike) -> ComplexArray:
+        """Impedance of the bit with the drive closed (N m s/rad)."""
+        drive = np.asarray(kp) - 1j * np.asarray(ki) / omega
+        return self.ends.bit_impedance(1j * omega, drive)
+
+    def brackets(self, gains: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Pairs of gains and places on the grid after which the reactance changes sign."""
+        signs = _features(gains) @ self.product.imag > 0.0
+        pair, place = np.nonzero(signs[:, 1:] != signs[:, :-1])
+        # Where nothing takes energy the reactance falls through infinity, not through zero.
+        zero = signs[pair, place + 1] | (gains[pair, 0] > 0.0) | self.lossy
+        return pair[zero], place[zero]
+
+    def lowest(
+        self, gains: Array, pair: NDArray[np.int64], place: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Of each pair's brackets the `CANDIDATES` of least resistance, as seen on the grid."""
+        features = _features(gains)[pair]
+        left, right = self._at(features, place), self._at(features, place + 1)
+        share = left.imag / (left.imag - right.imag)
+        resistance = left.real + np.clip(share, 0.0, 1.0) * (right.real - left.real)
+        resistance = np.where(resistance < 1e-9 * self.scale, 0.0, resistance)
+        order = np.lexsort([place, resistance, pair])
+        pair, place = pair[order], place[order]
+        # Without any loss all are zero to rounding; of these the lowest frequency.
+        rank = np.arange(len(pair)) - np.searchsorted(pair, pair)
+        return pair[rank < CANDIDATES], place[rank < CANDIDATES]
+
+    def _at(self, features: Array, place: NDArray[np.int64]) -> ComplexArray:
+        product = np.einsum("pf,fp->p", features, self.product[:, place])
+        return np.asarray(product / np.einsum("pf,fp->p", features, self.norm[:, place]))
+
+    def refined(self, place: NDArray[np.int64], gains: Array) -> Array:
+        """Frequencies (rad/s) within brackets at which the reactance is zero."""
+        from scipy.optimize import elementwise
+
+        low, high = self.grid[place], self.grid[place + 1]
+
+        def reactance(omega: Array, kp: Array, ki: Array) -> Array:
+            return np.asarray(self.impedance(omega, kp, ki).imag)
+
+        found = elementwise.find_root(reactance, (low, high), args=(gains[:, 0], gains[:, 1]))
+        # A crossing within rounding of a grid point is that point.
+        return np.where(np.isfinite(found.x), found.x, low)
+
+
+def _features(gains: Array) -> Array:
+    kp, ki = gains[:, 0], gains[:, 1]
+    return np.column_stack([np.ones(len(gains)), kp, ki, kp**2, ki**2])

@@ -1,0 +1,248 @@
+"""Sections as transmission lines: the same two numbers for finite elements and the continuum.
+
+Seen from its ends a uniform section is told by its characteristic impedance Z and its
+propagation G, both functions of frequency: an impedance z at one end appears at the other as
+(z cosh G + Z sinh G) / (cosh G + z/Z sinh G). For the continuum, with K the stiffness of the
+whole section and I its inertia (losses make both complex), Z = sqrt(K I) and G = i w sqrt(I/K).
+A chain of n equal elements with dynamic stiffness [[a, b], [b, a]] is a line as well, with
+cosh(G/n) = -a/b and i w Z = -b sinh(G/n): any number of elements costs as much as one, and no
+matrix is solved. After Wittrick & Williams (1971) for the exact elements; the chain is the
+discrete line of Brillouin (1946).
+
+Impedances are torque over speed (N m s/rad), time goes with exp(i w t).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.drillstring import Parts, Section
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+Model = Literal["finite-elements", "wave"]
+"""How a section is described: by its elements, or as the continuum they stand for."""
+
+
+class Line(NamedTuple):
+    """One section at a number of frequencies; each array has their shape.
+
+    Attributes
+    ----------
+    decay : ndarray of complex
+        exp(-G), of magnitude 1 or less.
+    series : ndarray of complex
+        Z (1 - exp(-2 G)) (N m s/rad).
+    shunt : ndarray of complex
+        (1 - exp(-2 G)) / Z (rad/(N m s)).
+    """
+
+    decay: ComplexArray
+    series: ComplexArray
+    shunt: ComplexArray
+
+    def seen_through(self, end: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """What an impedance at one end looks like at the other.
+
+        Parameters
+        ----------
+        end : ndarray of complex
+            Impedance at the far end (N m s/rad).
+
+        Returns
+        -------
+        impedance : ndarray of complex
+            At the near end (N m s/rad).
+        transfer : ndarray of complex
+            Speed of the far end over that of the near end.
+        """
+        both = 1.0 + self.decay**2
+        ratio = both + end * self.shunt
+        return (end * both + self.series) / ratio, 2.0 * self.decay / ratio
+
+
+def element_line(section: Section, s: ComplexArray, mass: Literal["consistent", "lumped"]) -> Line:
+    """The chain of elements of a section at complex frequencies `s` (1/s)."""
+    across, total = element_stiffness(section, s, mass)
+    n = section.elements
+    # cosh(G/n) - 1 = -(a + b)/b, written so that small angles keep their digits.
+    half = np.arcsinh(np.sqrt(-total / (2.0 * across)))
+    half = np.where(half.real < 0.0, -half, half)
+    decay = np.exp(-2.0 * n * half)
+    sinh = 2.0 * np.sinh(half) * np.cosh(half)
+    fall = -np.expm1(-4.0 * n * half)
+    impedance = -across * sinh / s
+    # A massless spring has neither impedance nor propagation, but their ratio is 1 / sinh.
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shunt = np.where(sinh == 0.0, 2.0 * n * s / -across, fall / impedance)
+    return Line(decay, impedance * fall, shunt)
+
+
+def element_stiffness(
+    section: Section, s: ComplexArray, mass: Literal["consistent", "lumped"]
+) -> tuple[ComplexArray, ComplexArray]:
+    """B and a + b of the dynamic stiffness [[a, b], [b, a]] of one element (N m/rad)."""
+    inertia = s * _shunt(section, s) / section.elements
+    share = 1 / 6 if mass == "consistent" else 0.0
+    return share * inertia - section.elements * _spring(section, s), 0.5 * inertia
+
+
+def continuous_line(section: Section, s: ComplexArray) -> Line:
+    """The continuum of a section at complex frequencies `s` (1/s); a lumped spring as it is."""
+    if section.inertia == 0.0 and section.drag == 0.0:
+        return element_line(section, s, "lumped")
+    spring, shunt = _spring(section, s), _shunt(section, s)
+    propagation = np.sqrt(s * shunt / spring)
+    propagation = np.where(propagation.real < 0.0, -propagation, propagation)
+    impedance = propagation * spring / s
+    fall = -np.expm1(-2.0 * propagation)
+    return Line(np.exp(-propagation), impedance * fall, fall / impedance)
+
+
+def _spring(section: Section, s: ComplexArray) -> ComplexArray:
+    """Stiffness of the whole section with its dampers (N m/rad)."""
+    damping = section.coupling_damping + section.stiffness_damping * section.stiffness
+    return section.stiffness + s * damping
+
+
+def _shunt(section: Section, s: ComplexArray) -> ComplexArray:
+    """Impedance to ground of the whole section when it turns as one body (N m s/rad)."""
+    return s * section.inertia + section.mass_damping * section.inertia + section.drag
+
+
+def _lump(section: Section, s: ComplexArray) -> ComplexArray:
+    """Impedance of the inertia at the lower end of a section (N m s/rad)."""
+    return (s + section.mass_damping) * section.end_inertia
+
+
+class EndMobility(NamedTuple):
+    """Speeds at the two ends per torque, and the torque that the pipe carries at its top.
+
+    Attributes
+    ----------
+    top, bit : ndarray of complex
+        Speed of an end per forward torque on it (rad/s per N m).
+    transfer : ndarray of complex
+        Speed of either end per forward torque on the other (rad/s per N m).
+    pipe_from_top, pipe_from_bit : ndarray of complex
+        Pipe torque, positive when the top leads, per torque on either end (1).
+    """
+
+    top: ComplexArray
+    bit: ComplexArray
+    transfer: ComplexArray
+    pipe_from_top: ComplexArray
+    pipe_from_bit: ComplexArray
+
+
+@dataclass(frozen=True)
+class Lines:
+    """A string as transmission lines between inertias.
+
+    Attributes
+    ----------
+    parts : Parts
+        Sections and ends; modal damping has no place in a line and must be zero.
+    model : {'finite-elements', 'wave'}
+        Whether a section is its chain of elements, or the continuum.
+    """
+
+    parts: Parts
+    model: Model
+
+    def mobility(
+        self,
+        s: ComplexArray,
+        top: ComplexArray | complex = 0.0,
+        bit: ComplexArray | complex = 0.0,
+    ) -> EndMobility:
+        """Response to torques on the two ends.
+
+        Parameters
+        ----------
+        s : ndarray of complex
+            Complex frequencies (1/s), not zero; i omega for a frequency response.
+        top, bit : complex or ndarray of complex
+            What the top drive's controller and the rock add at the ends: torque against the
+            motion per speed (N m s/rad). A torque that falls with speed is negative.
+
+        Returns
+        -------
+        EndMobility
+            At each frequency.
+        """
+        s = np.asarray(s, dtype=complex)
+        above, below = self._ends(s, top, bit)
+        down, transfer = self._from_bit(s, below)
+        top_mobility = 1.0 / (above + down)
+        across = transfer * top_mobility
+        near, far = self._pipe_torque(s, down, above)
+        return EndMobility(
+            top=top_mobility,
+            bit=1.0 / (self._from_top(s, above) + below),
+            transfer=across,
+            pipe_from_top=near * top_mobility,
+            pipe_from_bit=far * across,
+        )
+
+    def bit_impedance(self, s: ComplexArray, top: ComplexArray | complex = 0.0) -> ComplexArray:
+        """Torque per speed at the bit (N m s/rad), with `top` added at the drive."""
+        above, below = self._ends(s, top, 0.0)
+        return self._from_top(s, above) + below
+
+    def top_impedance(self, s: ComplexArray, bit: ComplexArray | complex = 0.0) -> ComplexArray:
+        """Torque per speed at the top (N m s/rad), with `bit` added at the rock."""
+        above, below = self._ends(s, 0.0, bit)
+        return above + self._from_bit(s, below)[0]
+
+    def _ends(
+        self, s: ComplexArray, top: ComplexArray | complex, bit: ComplexArray | complex
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Impedance of drive and of BHA with what is added to them."""
+        above = s * self.parts.top_inertia + self.parts.top_damping + top
+        below = s * self.parts.bit_inertia + self.parts.bit_damping + bit
+        return above, below
+
+    def _from_top(self, s: ComplexArray, above: ComplexArray) -> ComplexArray:
+        """Impedance of everything above the BHA, looking up."""
+        for section in self.parts.sections:
+            above = self._line(section, s).seen_through(above)[0] + _lump(section, s)
+        return above
+
+    def _from_bit(self, s: ComplexArray, below: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Impedance of everything under the drive, looking down; bit speed over top speed."""
+        transfer = np.ones_like(s)
+        for section in reversed(self.parts.sections):
+            below, share = self._line(section, s).seen_through(below + _lump(section, s))
+            transfer = transfer * share
+        return below, transfer
+
+    def _line(self, section: Section, s: ComplexArray) -> Line:
+        if self.model == "wave":
+            return continuous_line(section, s)
+        return element_line(section, s, self.parts.mass)
+
+    def _pipe_torque(
+        self, s: ComplexArray, down: ComplexArray, above: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Pipe torque per top speed, for a torque on the top and for one on the bit.
+
+        Of the continuum at the very top; of finite elements what spring and damper of the
+        first element carry, which is the torque at its middle.
+        """
+        if self.model == "wave":
+            return down, -above
+        section = self.parts.sections[0]
+        across, total = element_stiffness(section, s, self.parts.mass)
+        spring = section.elements * _spring(section, s)
+
+        def carried(into: ComplexArray) -> ComplexArray:
+            # into = (a u0 + b u1) / v0 with u0 = v0 / s; wanted is spring (u0 - u1) / v0.
+            return spring * (total / s - into) / across
+
+        return carried(down), carried(-above)
