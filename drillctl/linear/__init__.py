@@ -1,31 +1,80 @@
-"""The linear side: the string as a state-space plant, its loops, modes and frequency response.
+"""The linear side: the string and its loops before any simulation.
 
-- `state_space.py`: state matrices of the string and of its loops; `plant`, `closed_loop`,
-  `open_loop` give them as `control.StateSpace` with named signals.
-- `modal.py`: natural frequencies, damping ratios and shapes, top free and top held.
-- `poles.py`: poles and their shapes in modal coordinates; what `modal.py` computes with.
-- `response.py`: `frequency_response`, solved frequency by frequency from M, C and K.
+From a string to its answers:
+
+- `transmission.py`: sections as transmission lines, of finite elements and of the continuum.
+- `ends.py`: the string seen from its two ends, by lines, by modes (`expansion.py`) or by
+  solving M, C and K (`banded.py`). All frequency-domain results below take this alone.
+- `counting.py`: undamped natural frequencies, none missed.
+- `response.py`: `frequency_response` from any input to any output, open and closed loop.
+- `operating_point.py`: steady drilling and the slope of the rock there.
+- `slope_margin.py`: D*, the falling slope that a loop tolerates.
+- `boundary.py`: the boundary of the stable gains in closed form.
+- `loop_margins.py`: sensitivity, disk margins, delay margin at the top torque.
+- `impedance.py`, `tuning.py`: the top drive as the string feels it; gains from the string.
+
+As a state space:
+
+- `state_space.py`: `plant`, `closed_loop`, `open_loop` as `control.StateSpace`, named signals.
+- `modal.py`, `poles.py`: natural frequencies, damping ratios and shapes.
+- `loop_poles.py`, `root_loci.py`: poles of the loop, and against a parameter.
+- `export.py`: the nonlinear loop as `control.NonlinearIOSystem`; matrices for other programs.
+
+`loop_analysis.py` puts the figures of one design together.
 
 Transfer functions are never formed: their coefficients lose all digits on a string of some
 thirty elements. `control` is imported where a system is made and not before, as it is slow.
 """
 
+from drillctl.linear.boundary import GainBoundary, gain_boundary
+from drillctl.linear.ends import ends_of
+from drillctl.linear.impedance import DriveImpedance, drive_impedance
+from drillctl.linear.loop_analysis import (
+    LoopAnalysis,
+    critical_speed,
+    critical_weight_on_bit,
+    loop,
+)
+from drillctl.linear.loop_margins import Margins, margins
 from drillctl.linear.modal import Mode, Modes, modes
+from drillctl.linear.operating_point import OperatingPoint, equilibria, operating_point
 from drillctl.linear.response import (
     FrequencyResponse,
     frequency_response,
+    response_of,
     telling_frequencies,
 )
+from drillctl.linear.root_loci import RootLocus, root_locus
+from drillctl.linear.slope_margin import slope_margin, slope_margins
 from drillctl.linear.state_space import closed_loop, open_loop, plant
 
 __all__ = [
+    "DriveImpedance",
     "FrequencyResponse",
+    "GainBoundary",
+    "LoopAnalysis",
+    "Margins",
     "Mode",
     "Modes",
+    "OperatingPoint",
+    "RootLocus",
     "closed_loop",
+    "critical_speed",
+    "critical_weight_on_bit",
+    "drive_impedance",
+    "ends_of",
+    "equilibria",
     "frequency_response",
+    "gain_boundary",
+    "loop",
+    "margins",
     "modes",
     "open_loop",
+    "operating_point",
     "plant",
+    "response_of",
+    "root_locus",
+    "slope_margin",
+    "slope_margins",
     "telling_frequencies",
 ]

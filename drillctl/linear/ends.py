@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.drillstring import Drillstring, Parts
-from drillctl.errors import InputError
+from drillctl.errors import InputError, nearest
+from drillctl.linear.banded import Banded
 from drillctl.linear.counting import natural_frequencies
 from drillctl.linear.expansion import Expansion
 from drillctl.linear.transmission import EndMobility, Lines, Model
@@ -45,21 +46,32 @@ class Ends(Protocol):
         ...
 
 
-def ends_of(string: Drillstring, model: Model = "finite-elements") -> Ends:
+Route = Literal["finite-elements", "wave", "matrices"]
+"""How a string is computed: as its elements, as the continuum, or by solving M, C and K."""
+ROUTES = ("finite-elements", "wave", "matrices")
+
+
+def ends_of(string: Drillstring, model: Route = "finite-elements") -> Ends:
     """A string seen from its ends.
 
     Parameters
     ----------
     string : Drillstring
         The assembled string.
-    model : {'finite-elements', 'wave'}
-        Its elements, or the continuum that they stand for.
+    model : {'finite-elements', 'wave', 'matrices'}
+        Its elements, the continuum that they stand for, or the elements again by solving
+        their matrices at each frequency, slowly.
 
     Raises
     ------
     InputError
-        The continuum was asked for of a string whose damping is given mode by mode.
+        Unknown model, or the continuum was asked for of a string whose damping is given mode
+        by mode.
     """
+    if model not in ROUTES:
+        raise InputError(f"no model {model!r}; {nearest(model, ROUTES)}", "model")
+    if model == "matrices":
+        return Banded(string)
     if string.parts.modal_damping == 0.0:
         return Lines(string.parts, model)
     if model == "wave":

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,8 +75,7 @@ def equilibria(design: Design) -> tuple[OperatingPoint, ...]:
         [np.geomspace(1e-6, 0.01, SCAN // 4), np.linspace(0.01, 10.0, SCAN)[1:],
          np.geomspace(10.0, FASTEST, SCAN // 4)[1:]]
     )  # fmt: skip
-    surplus = np.array([_surplus(design, float(speed)) for speed in speeds])
-    signs = surplus > 0.0
+    signs = _surplus(design, speeds) > 0.0
     return tuple(
         at_speed(design, _zero(design, float(speeds[i]), float(speeds[i + 1])))
         for i in np.flatnonzero(signs[1:] != signs[:-1])
@@ -86,23 +85,24 @@ def equilibria(design: Design) -> tuple[OperatingPoint, ...]:
 def at_speed(design: Design, speed: float) -> OperatingPoint:
     """Torque and slope of the rock at a speed (rad/s), be it steady or not."""
     torque, slope = _rock(design, speed)
-    return OperatingPoint(speed, torque, -slope)
+    return OperatingPoint(speed, float(torque), -float(slope))
 
 
-def _rock(design: Design, speed: float) -> tuple[float, float]:
+def _rock(design: Design, speed: float | Array) -> tuple[Any, Any]:
     weight = design.weight_on_bit.weight(speed)
-    torque, slope = design.bit_rock.torque_and_slope(weight, speed, math.exp)
-    return float(torque), float(slope)
+    return design.bit_rock.torque_and_slope(weight, speed, np.exp)
 
 
-def _surplus(design: Design, speed: float) -> float:
+def _surplus(design: Design, speed: float | Array) -> Any:
     """Torque (N m) that drive gives beyond what rock and drag take at a steady speed."""
     drag = float(design.string.ground_damping.sum()) * speed
-    drive = float(design.top_drive.torque(0.0, speed - design.speed))
-    return drive - drag - _rock(design, speed)[0]
+    return design.top_drive.torque(0.0, speed - design.speed) - drag - _rock(design, speed)[0]
 
 
 def _zero(design: Design, low: float, high: float) -> float:
     from scipy.optimize import brentq
 
-    return float(brentq(lambda speed: _surplus(design, speed), low, high, xtol=1e-15, rtol=1e-14))
+    def balance(speed: float) -> float:
+        return float(_surplus(design, speed))
+
+    return float(brentq(balance, low, high, xtol=1e-15, rtol=1e-14))

@@ -1,74 +1,105 @@
-"""Frequency response of a string, solved frequency by frequency."""
+"""Frequency responses by name, of the string alone and of its loops."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError, nearest
-from drillctl.linear.state_space import INPUTS, OUTPUTS
+from drillctl.linear.counting import natural_frequencies
+from drillctl.linear.ends import Route, ends_of
+from drillctl.linear.state_space import INPUTS, LOOP_OUTPUTS, OUTPUTS
+from drillctl.linear.transmission import EndMobility
 
 if TYPE_CHECKING:
+    import control
     import xarray
 
+    from drillctl.design import Design
+
 Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+Loop = Literal["plant", "open_loop", "closed_loop"]
+
+LOOPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "plant": (INPUTS, OUTPUTS),
+    "open_loop": (("speed_error", "bit_torque"), LOOP_OUTPUTS),
+    "closed_loop": (("set_speed", "bit_torque"), LOOP_OUTPUTS),
+}
+"""Inputs and outputs of what can be looked at; those of `state_space.py`."""
 
 FREQUENCIES = tuple(np.geomspace(0.02, 5.0, 1200).tolist())
 """Frequencies (Hz) where none are given: from under the first mode to well above stick-slip."""
 
-UNITS = {
+_PER_TORQUE = {
     "top_speed": "rad/s/(N*m)",
     "bit_speed": "rad/s/(N*m)",
     "pipe_torque": "1",
     "twist": "rad/(N*m)",
+    "top_torque": "1",
 }
-"""Unit of the response of each output to a torque."""
+_PER_SPEED = {
+    "top_speed": "1",
+    "bit_speed": "1",
+    "pipe_torque": "N*m/(rad/s)",
+    "twist": "s",
+    "top_torque": "N*m/(rad/s)",
+}
 
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """Response of the string to torques at its two ends.
+    """Response of a string or a loop to each of its inputs.
 
     Attributes
     ----------
     frequency_hz : ndarray, shape (frequencies,)
         Frequencies (Hz).
     response : ndarray of complex, shape (frequencies, outputs, inputs)
-        Outputs `top_speed`, `bit_speed` (rad/s per N m), `pipe_torque` (1) and `twist` (rad
-        per N m); inputs `top_torque` and `bit_torque`, of which the latter brakes.
+        Unit of the output per unit of the input; positive bit torque brakes.
+    inputs, outputs : tuple of str
+        Names of the signals: torques in N m, speeds in rad/s, twist in rad.
+    title : str
+        What it is a response of, for figures.
     """
 
     frequency_hz: Array
     response: ComplexArray
+    inputs: tuple[str, ...] = INPUTS
+    outputs: tuple[str, ...] = OUTPUTS
+    title: str = "String without control"
 
     def between(self, source: str, target: str) -> ComplexArray:
         """Response of one output to one input.
 
         Parameters
         ----------
-        source : {'top_torque', 'bit_torque'}
-            Input.
-        target : {'top_speed', 'bit_speed', 'pipe_torque', 'twist'}
-            Output.
+        source : str
+            Input: one of `inputs`.
+        target : str
+            Output: one of `outputs`.
 
         Returns
         -------
         ndarray of complex, shape (frequencies,)
-            In the unit of the output per N m.
+            In the unit of the output per unit of the input.
 
         Raises
         ------
         InputError
             There is no such signal.
         """
-        return self.response[:, _index(target, OUTPUTS), _index(source, INPUTS)]
+        return self.response[:, _index(target, self.outputs), _index(source, self.inputs)]
+
+    def unit(self, source: str, target: str) -> str:
+        """Unit of one response; `1` where it has none."""
+        per = _PER_TORQUE if source.endswith("torque") else _PER_SPEED
+        return per.get(target, "")
 
     @property
     def data(self) -> xarray.Dataset:
@@ -79,10 +110,10 @@ class FrequencyResponse:
             f"{target}_per_{source}": (
                 "frequency",
                 self.between(source, target),
-                {"units": UNITS[target]},
+                {"units": self.unit(source, target)},
             )
-            for source in INPUTS
-            for target in OUTPUTS
+            for source in self.inputs
+            for target in self.outputs
         }
         coords = {"frequency": ("frequency", self.frequency_hz, {"units": "Hz"})}
         return xarray.Dataset(variables, coords)
@@ -103,11 +134,9 @@ def telling_frequencies(string: Drillstring) -> Array:
     ndarray
         Frequencies (Hz), increasing.
     """
-    free, _ = string.undamped_modes
-    inner = slice(1, None)
-    stiffness, mass = (m.toarray()[inner, inner] for m in (string.stiffness, string.mass))
-    held = np.sqrt(np.maximum(scipy.linalg.eigvalsh(stiffness, mass), 0.0))
-    marks = np.concatenate([free[1:], held]) / (2.0 * np.pi)
+    marks = np.concatenate(
+        [natural_frequencies(string.parts, "finite-elements", 200, held) for held in (False, True)]
+    ) / (2.0 * np.pi)
     low, high = FREQUENCIES[0], FREQUENCIES[-1]
     marks = marks[(marks > low) & (marks < high)]
     sides = np.outer(marks, 1.0 + np.array([-3e-3, -1e-3, -3e-4, 3e-4, 1e-3, 3e-3])).ravel()
@@ -115,22 +144,95 @@ def telling_frequencies(string: Drillstring) -> Array:
 
 
 def frequency_response(
-    string: Drillstring, frequency_hz: ArrayLike = FREQUENCIES
+    subject: Design | Drillstring,
+    frequency_hz: ArrayLike = FREQUENCIES,
+    loop: Loop = "plant",
+    model: Route = "finite-elements",
+    slope: float = 0.0,
 ) -> FrequencyResponse:
-    """Solve (-w^2 M + i w C + K) u = F for a unit torque at each end.
+    """Response of the string, alone or with its drive, at given frequencies.
 
     Parameters
     ----------
-    string : Drillstring
-        The assembled string, without control.
+    subject : Design or Drillstring
+        The rig; a bare string has no loop but `plant`.
     frequency_hz : array_like, shape (frequencies,)
         Frequencies (Hz), each more than zero: the rigid body has no response at rest. On an
         undamped string the height of a peak tells only how near a frequency is to resonance.
+    loop : {'plant', 'open_loop', 'closed_loop'}
+        The string alone; drive and string in series, from the speed error; or closed, from the
+        set speed. Signals and signs are those of `drillctl.linear.plant`, `open_loop` and
+        `closed_loop`.
+    model : {'finite-elements', 'wave', 'matrices'}
+        Elements; the exact continuum; or the elements by solving their matrices.
+    slope : float
+        Falling slope of the rock (N m s/rad) closed around the bit; `bit_torque` is then what
+        acts beside it.
 
     Returns
     -------
     FrequencyResponse
-        Same signals and signs as `drillctl.linear.plant`.
+        No transfer function is formed.
+
+    Raises
+    ------
+    InputError
+        No frequency, or one that is not finite and more than zero; unknown loop or model.
+    """
+    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
+    refuse_frequencies(frequency)
+    if loop not in LOOPS:
+        raise InputError(f"no loop {loop!r}; {nearest(loop, LOOPS)}", "loop")
+    string = subject if isinstance(subject, Drillstring) else subject.string
+    s = 2j * math.pi * frequency
+    drive = np.zeros_like(s)
+    if loop != "plant":
+        if isinstance(subject, Drillstring):
+            raise InputError(f"a bare string has no {loop}; give a design", "loop")
+        drive = drive + subject.top_drive.impedance(s)
+    closed = drive if loop == "closed_loop" else 0.0
+    seen = ends_of(string, model).mobility(s, closed, -slope)
+    inputs, outputs = LOOPS[loop]
+    columns = _columns(seen, s)
+    response = columns if loop == "plant" else _driven(columns, drive, loop)
+    title = _TITLES[loop] + (" (continuum)" if model == "wave" else "")
+    return FrequencyResponse(frequency, response, inputs, outputs, title)
+
+
+_TITLES = {
+    "plant": "String without control",
+    "open_loop": "Drive and string, loop open",
+    "closed_loop": "String with its drive",
+}
+
+
+def _columns(seen: EndMobility, s: ComplexArray) -> ComplexArray:
+    """Plant outputs per top torque and per braking bit torque, shape (frequencies, 4, 2)."""
+    from_top = [seen.top, seen.transfer, seen.pipe_from_top, (seen.top - seen.transfer) / s]
+    from_bit = [seen.transfer, seen.bit, seen.pipe_from_bit, (seen.transfer - seen.bit) / s]
+    return np.stack([np.stack(from_top, -1), -np.stack(from_bit, -1)], -1)
+
+
+def _driven(columns: ComplexArray, drive: ComplexArray, loop: Loop) -> ComplexArray:
+    """The same per speed into the drive and per bit torque, with the torque of the drive."""
+    into = columns.copy()
+    into[:, :, 0] *= drive[:, None]
+    torque = np.zeros((len(drive), 1, 2), dtype=complex)
+    torque[:, 0, 0] = drive
+    if loop == "closed_loop":
+        torque[:, 0, :] -= drive[:, None] * into[:, 0, :]
+    return np.concatenate([into, torque], axis=1)
+
+
+def response_of(system: control.StateSpace, frequency_hz: ArrayLike) -> FrequencyResponse:
+    """Response of any state-space system with named signals.
+
+    Parameters
+    ----------
+    system : control.StateSpace
+        Continuous; of `Design.plant()`, `Design.loop()` or made by the user.
+    frequency_hz : array_like, shape (frequencies,)
+        Frequencies (Hz), each more than zero.
 
     Raises
     ------
@@ -138,24 +240,14 @@ def frequency_response(
         No frequency, or one that is not finite and more than zero.
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
-    _refuse_frequencies(frequency)
-    omega = 2.0 * math.pi * frequency
-    angle = _angles(string, omega)
-    speed = 1j * omega[:, None, None] * angle
-    first = string.element_stiffness[0] + 1j * omega[:, None] * string.element_damping[0]
-    response = np.stack(
-        [
-            speed[:, 0],
-            speed[:, -1],
-            first * (angle[:, 0] - angle[:, 1]),
-            angle[:, 0] - angle[:, -1],
-        ],
-        axis=1,
-    )
-    return FrequencyResponse(frequency, response)
+    refuse_frequencies(frequency)
+    response = np.asarray(system(2j * math.pi * frequency, squeeze=False)).transpose(2, 0, 1)
+    inputs, outputs = tuple(system.input_labels), tuple(system.output_labels)
+    return FrequencyResponse(frequency, response, inputs, outputs, str(system.name))
 
 
-def _refuse_frequencies(frequency: Array) -> None:
+def refuse_frequencies(frequency: Array) -> None:
+    """Refuse (`InputError`) no frequencies, or one that is not finite and more than zero."""
     if frequency.ndim != 1 or frequency.size == 0:
         raise InputError("needs a list of one frequency or more (Hz)", "frequency_hz")
     wrong = frequency[~(np.isfinite(frequency) & (frequency > 0.0))]
@@ -163,34 +255,6 @@ def _refuse_frequencies(frequency: Array) -> None:
         raise InputError(
             f"frequencies must be finite and more than 0 Hz, got {wrong[0]:g}", "frequency_hz"
         )
-
-
-def _angles(string: Drillstring, omega: Array) -> ComplexArray:
-    """Angles (rad per N m) of all nodes, shape (frequencies, nodes, inputs)."""
-    forces = np.zeros((string.nodes, len(INPUTS)))
-    forces[0, 0] = 1.0
-    forces[-1, 1] = -1.0
-    if _tridiagonal(string.damping.toarray()):
-        m, c, k = (_bands(x.toarray()) for x in (string.mass, string.damping, string.stiffness))
-        return np.array(
-            [scipy.linalg.solve_banded((1, 1), k + w * (1j * c - w * m), forces) for w in omega]
-        )
-    m, c, k = (x.toarray() for x in (string.mass, string.damping, string.stiffness))
-    return np.array([np.linalg.solve(k + w * (1j * c - w * m), forces) for w in omega])
-
-
-def _tridiagonal(matrix: Array) -> bool:
-    """Whether only neighbours are coupled; damping given mode by mode couples all nodes."""
-    return not np.triu(matrix, 2).any()
-
-
-def _bands(matrix: Array) -> Array:
-    """A tridiagonal matrix in the storage of `scipy.linalg.solve_banded`."""
-    bands = np.zeros((3, len(matrix)))
-    bands[0, 1:] = np.diagonal(matrix, 1)
-    bands[1] = np.diagonal(matrix)
-    bands[2, :-1] = np.diagonal(matrix, -1)
-    return bands
 
 
 def _index(name: str, names: tuple[str, ...]) -> int:

@@ -84,7 +84,7 @@ def crossings(ends: Ends, kp: float, ki: float) -> Crossings:
     gains = np.array([[kp, ki]])
     _, place = search.brackets(gains)
     omega = search.refined(place, np.broadcast_to(gains[0], (len(place), 2)))
-    slope = search.impedance(omega, kp, ki).real
+    slope = np.asarray(search.impedance(omega, kp, ki).real, dtype=float)
     if ki == 0.0:
         slope, omega = np.append(slope, kp + search.rigid), np.append(omega, 0.0)
     slope = np.maximum(slope, 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -57,7 +58,7 @@ def bode(result: FrequencyResponse, ax: Sequence[Axes] | None = None) -> Figure:
     return figure
 
 
-def _unbroken(response: NDArray[np.complex128]) -> NDArray[np.float64]:
+def _unbroken(response: NDArray[np.complexfloating[Any, Any]]) -> NDArray[np.float64]:
     """Phase (deg) with a gap where it leaves at one edge and comes back at the other."""
     phase = np.degrees(np.angle(response))
     wraps = np.flatnonzero(np.abs(np.diff(phase)) > 270.0) + 1

@@ -8,6 +8,8 @@ that both are zero in steady drilling.
 - `mean_torque(angle, rate)`: mean torque over a step of length 1 / `rate` that starts at
   `angle`, as the pair (offset, slope) of `offset - slope * angle_at_the_end`; the batch
   engine's form.
+- `impedance(s)`: torque against the motion per speed (N m s/rad) of the linearised law; what
+  the string feels of the drive, its inertia apart.
 """
 
 from drillctl.top_drive.constant_torque import ConstantTorque

@@ -27,3 +27,7 @@ class ConstantTorque(NamedTuple):
     def gains(self) -> tuple[Any, Any]:
         """No speed control: both gains are zero."""
         return 0.0, 0.0
+
+    def impedance(self, s: Any) -> Any:
+        """Torque that the drive takes per speed (N m s/rad) at `s` (1/s): none."""
+        return 0.0 * s

@@ -42,3 +42,7 @@ class PI(NamedTuple):
     def gains(self) -> tuple[Any, Any]:
         """Proportional (N m s/rad) and integral (N m/rad) gain."""
         return self.kp, self.ki
+
+    def impedance(self, s: Any) -> Any:
+        """Torque that the drive takes per speed of the string (N m s/rad) at `s` (1/s)."""
+        return self.kp + self.ki / s

@@ -19,3 +19,7 @@ class TopDriveLaw(Protocol):
     def gains(self) -> tuple[Any, Any]:
         """Proportional (N m s/rad) and integral (N m/rad) gain of the linearised law."""
         ...
+
+    def impedance(self, s: Any) -> Any:
+        """Torque against the motion per speed (N m s/rad) at complex frequencies `s` (1/s)."""
+        ...

@@ -1,0 +1,260 @@
+"""What a control engineer asks of a loop before any simulation, in one result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.linear.ends import ends_of
+from drillctl.linear.loop_margins import Margins, margins
+from drillctl.linear.loop_poles import loop_poles
+from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
+from drillctl.linear.slope_margin import slope_margin
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+SPEEDS = np.geomspace(0.05, 20.0, 241)
+"""Speeds at which a critical one is looked for, over the set speed."""
+WEIGHTS = np.geomspace(0.05, 20.0, 121)
+"""Weights at which a critical one is looked for, over that of the design."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopAnalysis:
+    """Poles, margins and critical operating points of one design.
+
+    Attributes
+    ----------
+    design : Design
+        The rig.
+    operating_point : OperatingPoint
+        Steady drilling about which the loop is linear.
+    poles : ndarray of complex, shape (states,)
+        Of the loop with the slope of the rock (1/s), by magnitude.
+    slope_margin : float
+        D*: falling slope that the loop tolerates (N m s/rad).
+    deciding_frequency_hz : float
+        Frequency of the poles that decide it (Hz); 0 for a real pole.
+    continuum_slope_margin : float or None
+        D* of the exact continuum, as far as its lowest modes; None where it has none.
+    margins : Margins or None
+        Broken at the top torque; None for a loop that is not stable.
+    critical_speed : float or None
+        Speed nearest to the operating one at which stability changes (rad/s).
+    critical_weight_on_bit : float or None
+        Weight nearest to the operating one at which stability changes (N), within the friction
+        table unless the design allows more.
+    """
+
+    design: Design
+    operating_point: OperatingPoint
+    poles: ComplexArray
+    slope_margin: float
+    deciding_frequency_hz: float
+    continuum_slope_margin: float | None
+    margins: Margins | None
+    critical_speed: float | None
+    critical_weight_on_bit: float | None
+
+    @property
+    def stable(self) -> bool:
+        """Whether the equilibrium is stable: the slope is under its margin.
+
+        Not read from the poles: of an undamped string the damping of the highest modes is
+        below their rounding.
+        """
+        return self.operating_point.slope < self.slope_margin
+
+    @property
+    def spectral_abscissa(self) -> float:
+        """Largest real part of the poles (1/s)."""
+        return float(self.poles.real.max())
+
+    @property
+    def oscillations(self) -> list[tuple[float, float]]:
+        """Frequency (Hz) and damping ratio of each pair of complex poles, lowest first."""
+        upper = self.poles[self.poles.imag > 0.0]
+        return [(float(abs(p)) / (2.0 * math.pi), float(-p.real / abs(p))) for p in upper]
+
+    def summary(self) -> dict[str, Any]:
+        """Strict JSON values, SI; None where something is undefined."""
+        found = self.margins
+        return {
+            "stable": self.stable,
+            "spectral_abscissa": self.spectral_abscissa,
+            "slope": self.operating_point.slope,
+            "slope_margin": self.slope_margin,
+            "deciding_frequency_hz": self.deciding_frequency_hz,
+            "disk_margin": None
+            if found is None
+            else {"gain_db": _finite(found.gain_db), "phase_deg": found.phase_deg},
+            "peak_sensitivity": None if found is None else found.peak_sensitivity,
+            "delay_margin": None if found is None else _finite(found.delay),
+            "delay_margin_frequency_hz": None if found is None else found.delay_hz,
+            "continuum_slope_margin": self.continuum_slope_margin,
+            "critical_speed": self.critical_speed,
+            "critical_weight_on_bit": self.critical_weight_on_bit,
+            "operating_speed": self.operating_point.speed,
+            "bit_torque": self.operating_point.bit_torque,
+            "modes": [
+                {"frequency_hz": frequency, "damping_ratio": ratio}
+                for frequency, ratio in self.oscillations[:10]
+            ],
+        }
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """The poles, with the summary's numbers as attributes."""
+        import xarray
+
+        numbers = {
+            "slope": self.operating_point.slope,
+            "slope_margin": self.slope_margin,
+            "deciding_frequency_hz": self.deciding_frequency_hz,
+        }
+        variables = {
+            "pole_real": ("pole", self.poles.real, {"units": "1/s"}),
+            "pole_imag": ("pole", self.poles.imag, {"units": "rad/s"}),
+        }
+        return xarray.Dataset(variables, attrs=numbers)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
+
+
+def loop(design: Design) -> LoopAnalysis:
+    """Analyse the loop of a design about steady drilling.
+
+    Parameters
+    ----------
+    design : Design
+        Rig and control.
+
+    Returns
+    -------
+    LoopAnalysis
+        An unstable loop is an answer: its margins at the top are None.
+
+    Raises
+    ------
+    InputError
+        There is no steady drilling: the drive cannot turn the bit.
+    """
+    point = operating_point(design)
+    kp, ki = design.top_drive.gains()
+    ends = ends_of(design.string)
+    tolerated, omega = slope_margin(ends, kp, ki)
+    poles = loop_poles(design.string, kp, ki, point.slope)
+    stable = point.slope < tolerated
+    return LoopAnalysis(
+        design=design,
+        operating_point=point,
+        poles=poles,
+        slope_margin=tolerated,
+        deciding_frequency_hz=omega / (2.0 * math.pi),
+        continuum_slope_margin=_continuum(design, kp, ki),
+        margins=margins(ends, design.top_drive, point.slope, poles) if stable else None,
+        critical_speed=critical_speed(design, tolerated),
+        critical_weight_on_bit=critical_weight_on_bit(design, tolerated),
+    )
+
+
+def _continuum(design: Design, kp: float, ki: float) -> float | None:
+    if design.string.parts.modal_damping > 0.0:
+        return None
+    return slope_margin(ends_of(design.string, "wave"), kp, ki)[0]
+
+
+def critical_speed(design: Design, tolerated: float | None = None) -> float | None:
+    """Speed at which the slope of the rock equals the slope margin.
+
+    Parameters
+    ----------
+    design : Design
+        Rig and control.
+    tolerated : float, optional
+        Slope margin (N m s/rad) if it is known already.
+
+    Returns
+    -------
+    float or None
+        The one nearest to the set speed in ratio (rad/s); None if there is none from a
+        twentieth to twenty times the set speed.
+    """
+    limit = _margin(design) if tolerated is None else tolerated
+    return _nearest_zero(
+        lambda speed: at_speed(design, speed).slope - limit, design.speed * SPEEDS, design.speed
+    )
+
+
+def critical_weight_on_bit(design: Design, tolerated: float | None = None) -> float | None:
+    """Weight on bit at which the slope of the rock equals the slope margin.
+
+    Parameters
+    ----------
+    design : Design
+        Rig and control.
+    tolerated : float, optional
+        Slope margin (N m s/rad) if it is known already.
+
+    Returns
+    -------
+    float or None
+        The one nearest to the design's weight in ratio (N); None if there is none, or only
+        outside the friction table where the design refuses that.
+    """
+    limit = _margin(design) if tolerated is None else tolerated
+    nominal = design.tables.operating_point.weight_on_bit
+    if nominal == 0.0:
+        return None
+
+    def excess(weight: float) -> float:
+        try:
+            there = design.replace({"operating_point.weight_on_bit": units.SI(weight)})
+            return operating_point(there).slope - limit
+        except InputError:  # outside the friction table, or more than the drive can turn
+            return math.nan
+
+    return _nearest_zero(excess, _weights(design, nominal), nominal)
+
+
+def _weights(design: Design, nominal: float) -> Array:
+    """Weights to look at (N), and the rows of the friction table, where its slope breaks."""
+    rows = getattr(design.tables.bit_rock, "table", None) or ()
+    return np.unique([*(nominal * WEIGHTS), *(row.weight_on_bit for row in rows)])
+
+
+def _margin(design: Design) -> float:
+    return slope_margin(ends_of(design.string), *design.top_drive.gains())[0]
+
+
+def _nearest_zero(function: Callable[[float], float], points: Array, about: float) -> float | None:
+    """Zero of a function nearest to a value in ratio; NaN where it is not defined."""
+    from scipy.optimize import brentq
+
+    values = np.array([function(float(x)) for x in points])
+    changes = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    zeros = [float(brentq(function, points[i], points[i + 1], rtol=1e-13)) for i in changes]
+    zeros += [float(x) for x in points[values == 0.0]]
+    return min(zeros, key=lambda x: abs(math.log(x / about)), default=None)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,233 @@
+r"""Margins of the loop at the top torque, from impedances.
+
+With C the impedance of the drive's controller and Z that of the string at the top, drive
+inertia and slope of the rock included, the loop transfer is L = C/Z, the sensitivity
+S = Z/(Z + C) and its complement T = C/(Z + C): where the string resonates L is without bound,
+and S and T are not. Peaks of an undamped string are as narrow as its poles are near the axis;
+frequencies cluster at each pole, down to a part of its distance.
+
+The disk margin is :math:`\alpha = 1 / \max_\omega |S - T|/2`: gain and phase at the top may
+change together within the disk it spans (Seiler, Packard & Gahinet, IEEE Control Systems 40
+(2020) 78-95, balanced).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.linear.ends import Ends, telling_grid
+from drillctl.top_drive import TopDriveLaw
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+CLUSTER = np.geomspace(0.03, 1e7, 90)
+"""Distances from a pole at which a response is looked at, over that of the pole from the axis."""
+COARSE = np.geomspace(0.1, 1e6, 29)
+"""The same where many loops are looked at."""
+NEAREST = 1e-13
+"""Least distance from the axis that a pole is taken to have, over its frequency."""
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How far a stable loop is from instability, broken at the top torque.
+
+    Attributes
+    ----------
+    peak_sensitivity : float
+        Largest of abs(S).
+    peak_sensitivity_hz : float
+        Where (Hz).
+    disk : float
+        Balanced disk margin alpha.
+    gain_db, phase_deg : float
+        Gain (dB) and phase (degrees) that may change together within the disk.
+    disk_hz : float
+        Where the disk is touched (Hz).
+    delay : float
+        Delay in the loop that makes it unstable (s); infinite if none does.
+    delay_hz : float or None
+        Frequency of that instability (Hz).
+    """
+
+    peak_sensitivity: float
+    peak_sensitivity_hz: float
+    disk: float
+    gain_db: float
+    phase_deg: float
+    disk_hz: float
+    delay: float
+    delay_hz: float | None
+
+
+def margins(ends: Ends, drive: TopDriveLaw, slope: float, poles: ComplexArray) -> Margins:
+    """Margins of a loop that is stable.
+
+    Parameters
+    ----------
+    ends : Ends
+        The string.
+    drive : TopDriveLaw
+        Linearised law of the drive.
+    slope : float
+        Falling slope of the rock (N m s/rad), under the slope margin.
+    poles : ndarray of complex
+        Of the loop (1/s), so that no peak is stepped over.
+    """
+    loop = _Loop(ends, drive, slope)
+    grid = pole_grid(ends, poles)
+    peak, peak_at = _largest(lambda w: np.abs(loop.sensitivity(w)), grid)
+    balance, disk_at = _largest(lambda w: np.abs(loop.balance(w)), grid)
+    # At no or at any frequency a loop without drive has S - T = 1: a disk that touches nothing.
+    disk = 1.0 / balance
+    gain, phase = disk_gain_and_phase(disk)
+    delay, delay_at = _delay_margin(loop, grid)
+    return Margins(
+        peak_sensitivity=peak,
+        peak_sensitivity_hz=peak_at / (2.0 * math.pi),
+        disk=disk,
+        gain_db=gain,
+        phase_deg=phase,
+        disk_hz=disk_at / (2.0 * math.pi),
+        delay=delay,
+        delay_hz=None if delay_at is None else delay_at / (2.0 * math.pi),
+    )
+
+
+def disk_gain_and_phase(disk: float) -> tuple[float, float]:
+    """Gain (dB) and phase (degrees) margin of a balanced disk; infinite and 180 from 2 on."""
+    if disk >= 2.0:
+        return math.inf, 180.0
+    return 20.0 * math.log10((2.0 + disk) / (2.0 - disk)), math.degrees(2.0 * math.atan(disk / 2))
+
+
+def pole_grid(ends: Ends, poles: ComplexArray) -> Array:
+    """Angular frequencies (rad/s) that resolve every pole of a loop, however near the axis.
+
+    Parameters
+    ----------
+    ends : Ends
+        The string, for what lies between the poles.
+    poles : ndarray of complex
+        Poles (1/s).
+
+    Returns
+    -------
+    ndarray
+        Increasing, the first more than zero.
+    """
+    base = telling_grid(ends)
+    return np.unique(np.concatenate([base, _around(poles, CLUSTER, base)]))
+
+
+def _around(poles: ComplexArray, sides: Array, within: Array) -> Array:
+    """Frequencies (rad/s) at both sides of each pole, in units of its distance from the axis."""
+    upper = poles[np.isfinite(poles) & (poles.imag > 0.0)]
+    distance = np.maximum(np.abs(upper.real), NEAREST * upper.imag)
+    both = np.concatenate([-sides[::-1], [0.0], sides])
+    around = (upper.imag[:, None] + distance[:, None] * both).ravel()
+    return np.asarray(around[(around > within[0]) & (around < within[-1])])
+
+
+class _Loop:
+    """Sensitivities of one loop at angular frequencies (rad/s)."""
+
+    def __init__(self, ends: Ends, drive: TopDriveLaw, slope: float) -> None:
+        self.ends, self.drive, self.slope = ends, drive, slope
+
+    def impedances(self, omega: Array) -> tuple[ComplexArray, ComplexArray]:
+        s = 1j * omega
+        return self.ends.top_impedance(s, -self.slope), self.drive.impedance(s)
+
+    def sensitivity(self, omega: Array) -> ComplexArray:
+        string, drive = self.impedances(omega)
+        return string / (string + drive)
+
+    def balance(self, omega: Array) -> ComplexArray:
+        string, drive = self.impedances(omega)
+        return 0.5 * (string - drive) / (string + drive)
+
+    def excess(self, omega: Array) -> Array:
+        """Log abs(L): zero where the loop crosses over."""
+        string, drive = self.impedances(omega)
+        return np.asarray(np.log(np.abs(drive)) - np.log(np.abs(string)))
+
+
+def _largest(function: Callable[[Array], Array], grid: Array) -> tuple[float, float]:
+    """Largest value over frequency and where, refined between the points of a grid."""
+    from scipy.optimize import elementwise
+
+    values = function(grid)
+    inner = values[1:-1]
+    top = 1 + np.flatnonzero((inner > values[:-2]) & (inner >= values[2:]))
+    best = int(np.argmax(values))
+    # What cannot become the largest, within a factor, is not refined.
+    top = top[values[top] > 0.5 * values[best]]
+    if len(top) == 0:
+        return float(values[best]), float(grid[best])
+    found = elementwise.find_minimum(
+        lambda w: -function(w), (grid[top - 1], grid[top], grid[top + 1])
+    )
+    peak = int(np.argmin(found.f_x))
+    if -found.f_x[peak] < values[best]:
+        return float(values[best]), float(grid[best])
+    return float(-found.f_x[peak]), float(found.x[peak])
+
+
+def peak_sensitivities(
+    ends: Ends, kp: Array, ki: Array, slope: Array, poles: ComplexArray
+) -> Array:
+    """Largest sensitivity of many stable loops under PI control.
+
+    Parameters
+    ----------
+    ends : Ends
+        The string they share.
+    kp, ki, slope : ndarray, shape (loops,)
+        Gains (N m s/rad, N m/rad) and falling slope of the rock (N m s/rad).
+    poles : ndarray of complex, shape (loops, states)
+        Of each loop (1/s).
+
+    Returns
+    -------
+    ndarray, shape (loops,)
+        Of each loop its highest peak on a grid that resolves its poles, refined.
+    """
+    from scipy.optimize import elementwise
+
+    def small(omega: Array, kp: Array, ki: Array, slope: Array) -> Array:
+        string = ends.top_impedance(1j * omega, -slope + 0j)
+        return np.asarray(-np.abs(string / (string + kp - 1j * ki / omega)))
+
+    between = telling_grid(ends)[::4]
+    bracket = np.empty((3, len(kp)))
+    for i in range(len(kp)):
+        grid = np.unique(np.concatenate([between, _around(poles[i], COARSE, between)]))
+        best = 1 + int(np.argmin(small(grid, kp[i], ki[i], slope[i])[1:-1]))
+        bracket[:, i] = grid[best - 1 : best + 2]
+    found = elementwise.find_minimum(small, tuple(bracket), args=(kp, ki, slope))
+    level = np.minimum(found.f_x, small(bracket[1], kp, ki, slope))
+    return np.asarray(-level)
+
+
+def _delay_margin(loop: _Loop, grid: Array) -> tuple[float, float | None]:
+    """Shortest delay (s) that turns L to -1 at a crossover, and its angular frequency."""
+    from scipy.optimize import elementwise
+
+    with np.errstate(divide="ignore"):
+        over = loop.excess(grid) > 0.0
+        place = np.flatnonzero(over[1:] != over[:-1])
+        if len(place) == 0:
+            return math.inf, None
+        omega = elementwise.find_root(loop.excess, (grid[place], grid[place + 1])).x
+    string, drive = loop.impedances(omega)
+    turn = np.mod(np.angle(drive / string) + math.pi, 2.0 * math.pi) / omega
+    first = int(np.argmin(turn))
+    return float(turn[first]), float(omega[first])

@@ -1,0 +1,76 @@
+"""Gains of a top drive from the string it turns."""
+
+from __future__ import annotations
+
+import math
+
+from drillctl.drillstring import Drillstring
+from drillctl.errors import InputError
+from drillctl.linear.counting import natural_frequencies
+
+
+def pipe_impedance(string: Drillstring) -> float:
+    """Characteristic impedance of the uppermost pipe (N m s/rad): J sqrt(G rho).
+
+    Raises
+    ------
+    InputError
+        The uppermost section is a lumped spring.
+    """
+    first = string.parts.sections[0]
+    if first.inertia == 0.0:
+        raise InputError(
+            "a lumped spring has no impedance; describe the pipe by its geometry",
+            f"drillstring.sections.{first.name}",
+        )
+    return first.impedance
+
+
+def stick_slip_frequency(string: Drillstring) -> float:
+    """Lowest angular frequency with the top held (rad/s)."""
+    return float(natural_frequencies(string.parts, "finite-elements", 1, top_held=True)[0])
+
+
+def stiff_speed(string: Drillstring) -> tuple[float, float]:
+    """Gains of a stiff speed controller: Kp = 50 zeta, Ki = 5 J_d.
+
+    Parameters
+    ----------
+    string : Drillstring
+        Gives pipe impedance zeta and drive inertia J_d.
+
+    Returns
+    -------
+    tuple of float
+        Kp (N m s/rad) and Ki (N m/rad), the default of a public drilling simulator (NORCE).
+    """
+    return 50.0 * pipe_impedance(string), 5.0 * string.parts.top_inertia
+
+
+def soft_torque(string: Drillstring, share: float = 0.25) -> tuple[float, float]:
+    """Gains of a tuned PI (soft torque): P = zeta / share, I = w_s^2 J_d.
+
+    With this I the drive is a pure resistor at the stick-slip frequency w_s, and reflects
+    (1 - share) / (1 + share) of a wave there.
+
+    Parameters
+    ----------
+    string : Drillstring
+        Gives pipe impedance zeta, drive inertia J_d and w_s.
+    share : float
+        Pipe impedance over that of the drive, above 0 and up to 1; 0.25 is usual.
+
+    Returns
+    -------
+    tuple of float
+        Kp (N m s/rad) and Ki (N m/rad).
+
+    Raises
+    ------
+    InputError
+        A share outside its range, or a lumped string.
+    """
+    if not (0.0 < share <= 1.0 and math.isfinite(share)):
+        raise InputError(f"must be above 0 and at most 1, got {share:g}", "share")
+    inertia = string.parts.top_inertia
+    return pipe_impedance(string) / share, stick_slip_frequency(string) ** 2 * inertia

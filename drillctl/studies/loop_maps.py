@@ -1,0 +1,246 @@
+"""Figures of the loop over any two parameters: slope margin, abscissa, damping, sensitivity."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.linear.counting import natural_frequencies
+from drillctl.linear.ends import ends_of
+from drillctl.linear.loop_margins import peak_sensitivities
+from drillctl.linear.loop_poles import many_loop_poles
+from drillctl.linear.operating_point import operating_point
+from drillctl.linear.slope_margin import slope_margins
+from drillctl.progress import SILENT, Progress
+from drillctl.studies.grid import Axis, Group, axes_of, cell_design, groups, shape_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray
+
+Array = NDArray[np.float64]
+
+QUANTITIES = {
+    "slope_margin": ("N*m*s/rad", "friction-slope margin D*"),
+    "deciding_frequency": ("Hz", "frequency of the poles that decide it"),
+    "slope": ("N*m*s/rad", "falling slope of the rock"),
+    "spectral_abscissa": ("1/s", "largest real part of the poles"),
+    "low_damping": ("1", "least damping ratio of the drive's and the first elastic mode"),
+    "peak_sensitivity": ("1", "largest sensitivity at the top torque"),
+}
+"""Unit and meaning of what is mapped."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopMap:
+    """Loop figures over a grid of parameters.
+
+    Attributes
+    ----------
+    design : Design
+        What was varied.
+    axes : tuple of Axis
+        Parameters and their values.
+    values : dict of ndarray, shape of the grid
+        By the names of `QUANTITIES`. `low_damping` is negative where one of these modes grows;
+        `peak_sensitivity` is NaN where the loop is not stable, and all are where there is no
+        steady drilling.
+    total_seconds : float
+        From call to return (s).
+    """
+
+    design: Design
+    axes: tuple[Axis, ...]
+    values: dict[str, Array]
+    total_seconds: float
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Cells whose slope is under its margin, shape of the grid."""
+        return np.asarray(self.values["slope"] < self.values["slope_margin"])
+
+    @property
+    def best(self) -> tuple[float, dict[str, float]] | None:
+        """Largest slope margin (N m s/rad) and where (SI); None without steady drilling."""
+        found = self.values["slope_margin"]
+        if np.isnan(found).all():
+            return None
+        where = np.unravel_index(int(np.nanargmax(found)), found.shape)
+        at = {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)}
+        return float(found[where]), at
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """The maps, labelled by parameter path, with units."""
+        import xarray
+
+        paths = [a.path for a in self.axes]
+        coords = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
+        variables: dict[str, Any] = {
+            name: (paths, values, dict(zip(("units", "long_name"), QUANTITIES[name], strict=True)))
+            for name, values in self.values.items()
+        }
+        return xarray.Dataset(variables, coords)
+
+    def summary(self) -> dict[str, Any]:
+        """Axes, stable cells, largest slope margin; strict JSON values, SI."""
+        best = self.best
+        return {
+            "axes": {
+                a.path: {"min": float(a.values[0]), "max": float(a.values[-1]), "points": len(a)}
+                for a in self.axes
+            },
+            "stable_cells": int(self.stable.sum()),
+            "cells": int(self.stable.size),
+            "largest_slope_margin": None
+            if best is None
+            else {"slope_margin": best[0], "at": best[1]},
+            "total_seconds": self.total_seconds,
+        }
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
+
+
+def loop_map(
+    design: Design,
+    axes: tuple[Axis, ...] | None = None,
+    quantities: tuple[str, ...] = tuple(QUANTITIES),
+    progress: Progress = SILENT,
+) -> LoopMap:
+    """Map figures of the loop over parameters of a design.
+
+    Parameters
+    ----------
+    design : Design
+        Its `[map]` table gives the axes.
+    axes : tuple of Axis, optional
+        Instead of the design's own.
+    quantities : tuple of str
+        What to map, of `QUANTITIES`; slope and slope margin always are.
+    progress : Progress
+        Told of finished cells.
+
+    Raises
+    ------
+    InputError
+        An axis that does not fit the design, or an unknown quantity.
+    """
+    begin = time.perf_counter()
+    for name in quantities:
+        if name not in QUANTITIES:
+            raise InputError(f"no quantity {name!r}; allowed: {', '.join(QUANTITIES)}")
+    axes = axes_of(design, design.tables.map.axes) if axes is None else axes
+    shape = shape_of(axes)
+    wanted = {"slope", "slope_margin", "deciding_frequency", *quantities}
+    values = {name: np.full(int(np.prod(shape)), np.nan) for name in QUANTITIES if name in wanted}
+    progress.begin("analysing loops", values["slope"].size)
+    for group in groups(design, axes):
+        for name, found in _figures(design, axes, group, wanted).items():
+            values[name][group.cells] = found
+        progress.advance(len(group.cells))
+    seconds = time.perf_counter() - begin
+    return LoopMap(design, axes, {k: v.reshape(shape) for k, v in values.items()}, seconds)
+
+
+def _figures(
+    design: Design, axes: tuple[Axis, ...], group: Group, wanted: set[str]
+) -> dict[str, Array]:
+    """Each wanted figure of the cells that share a string."""
+    lanes, string = group.lanes, group.design.string
+    kp, ki = (np.broadcast_to(np.asarray(g, dtype=float), len(lanes)) for g in lanes.drive.gains())
+    slope = slopes(design, axes, group)
+    ends = ends_of(string)
+    margin = slope_margins(ends, kp, ki)
+    steady = np.isfinite(slope)
+    found = {
+        "slope": slope,
+        "slope_margin": np.where(steady, margin.slope, np.nan),
+        "deciding_frequency": np.where(steady, margin.omega / (2.0 * np.pi), np.nan),
+    }
+    if wanted & {"spectral_abscissa", "low_damping", "peak_sensitivity"}:
+        found |= _of_poles(group, kp, ki, slope, slope < margin.slope, wanted)
+    return found
+
+
+def _of_poles(
+    group: Group, kp: Array, ki: Array, slope: Array, stable: NDArray[np.bool_], wanted: set[str]
+) -> dict[str, Array]:
+    import numba
+
+    string = group.design.string
+    steady = np.isfinite(slope)
+    poles = many_loop_poles(
+        string, kp, ki, np.where(steady, slope, 0.0), threads=numba.get_num_threads()
+    )
+    found: dict[str, Array] = {}
+    if "spectral_abscissa" in wanted:
+        found["spectral_abscissa"] = np.where(steady, np.nanmax(poles.real, axis=1), np.nan)
+    if "low_damping" in wanted:
+        found["low_damping"] = np.where(steady, _low_damping(group, poles), np.nan)
+    if "peak_sensitivity" in wanted:
+        peak = np.full(len(kp), np.nan)
+        if stable.any():
+            peak[stable] = peak_sensitivities(
+                ends_of(string), kp[stable], ki[stable], slope[stable], poles[stable]
+            )
+        found["peak_sensitivity"] = peak
+    return found
+
+
+def _low_damping(group: Group, poles: NDArray[np.complexfloating[Any, Any]]) -> Array:
+    """Least damping ratio of the poles under the middle between first and second mode."""
+    parts = group.design.string.parts
+    held = natural_frequencies(parts, "finite-elements", 2, top_held=True)
+    limit = np.sqrt(held[0] * held[1]) if len(held) > 1 else np.inf
+    size = np.abs(poles)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = -poles.real / size
+        # A real pole that decays is no oscillation; one that grows is the worst.
+        ratio = np.where((poles.imag == 0.0) & (poles.real < 0.0), np.inf, ratio)
+        ratio = np.where(size < limit, ratio, np.inf)
+        least = np.nanmin(ratio, axis=1)
+    return np.where(np.isinf(least), 1.0, least)
+
+
+def slopes(design: Design, axes: tuple[Axis, ...], group: Group) -> Array:
+    """Falling slope at the operating point of each cell of a group (N m s/rad).
+
+    Parameters
+    ----------
+    design : Design
+        Of the grid.
+    axes : tuple of Axis
+        Of the grid.
+    group : Group
+        Cells that share a string.
+
+    Returns
+    -------
+    ndarray, shape (lanes,)
+        NaN where a drive without speed control finds no steady speed.
+    """
+    lanes = group.lanes
+    _, ki = lanes.drive.gains()
+    if np.all(np.asarray(ki) != 0.0):
+        weight = lanes.weight.weight(lanes.set_speed)
+        _, slope = lanes.friction.torque_and_slope(weight, lanes.set_speed, np.exp)
+        return -np.asarray(slope)
+    return np.array([_slope(cell_design(design, axes, int(cell))) for cell in group.cells])
+
+
+def _slope(design: Design) -> float:
+    try:
+        return operating_point(design).slope
+    except InputError:  # the drive cannot turn this bit
+        return np.nan
