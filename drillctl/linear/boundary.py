@@ -25,7 +25,7 @@ from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, Route, ends_of, telling_grid
 from drillctl.linear.operating_point import operating_point
-from drillctl.linear.slope_margin import slope_margins
+from drillctl.linear.slope_margin import slope_margin, slope_margins
 
 if TYPE_CHECKING:
     import shapely
@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 
 FINEST = 1.0 / 800.0
 """Longest piece of a curve, over the window."""
+CLOSE = 1e-3
+"""Faces whose slope margin is as near to the slope as this are asked again, to all digits."""
 HALVINGS = 60
 """Most halvings of an interval of frequency."""
 
@@ -207,6 +209,10 @@ def _region(
     inside = np.array([[p.x, p.y] for p in (face.representative_point() for face in faces)])
     if slope < 0.0:  # a torque that rises with speed only takes energy
         return shapely.MultiPolygon([box])
-    stable = slope_margins(ends, inside[:, 0], inside[:, 1]).slope > slope
+    margin = slope_margins(ends, inside[:, 0], inside[:, 1]).slope
+    # Between the lines of high modes faces are slivers, and the quick margin not sharp enough.
+    for face in np.flatnonzero(np.abs(margin - slope) < CLOSE * slope):
+        margin[face] = slope_margin(ends, *inside[face])[0]
+    stable = margin > slope
     whole = shapely.unary_union([face for face, kept in zip(faces, stable, strict=True) if kept])
     return shapely.MultiPolygon([p for p in shapely.get_parts(whole) if p.area > 0.0])

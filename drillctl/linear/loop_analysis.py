@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -104,7 +104,9 @@ class LoopAnalysis:
             else {"gain_db": _finite(found.gain_db), "phase_deg": found.phase_deg},
             "peak_sensitivity": None if found is None else found.peak_sensitivity,
             "delay_margin": None if found is None else _finite(found.delay),
-            "delay_margin_frequency_hz": None if found is None else found.delay_hz,
+            "margins": None
+            if found is None
+            else {name: _finite(value) for name, value in asdict(found).items()},
             "continuum_slope_margin": self.continuum_slope_margin,
             "critical_speed": self.critical_speed,
             "critical_weight_on_bit": self.critical_weight_on_bit,
@@ -256,5 +258,5 @@ def _nearest_zero(function: Callable[[float], float], points: Array, about: floa
     return min(zeros, key=lambda x: abs(math.log(x / about)), default=None)
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

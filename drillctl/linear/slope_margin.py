@@ -223,9 +223,11 @@ class _Search:
         def reactance(omega: Array, kp: Array, ki: Array) -> Array:
             return np.asarray(self.impedance(omega, kp, ki).imag)
 
-        found = elementwise.find_root(reactance, (low, high), args=(gains[:, 0], gains[:, 1]))
-        # A crossing within rounding of a grid point is that point.
-        return np.where(np.isfinite(found.x), found.x, low)
+        drive = (gains[:, 0], gains[:, 1])
+        found = elementwise.find_root(reactance, (low, high), args=drive)
+        # A crossing within rounding of a grid point may not be bracketed: it is that point.
+        nearer_low = np.abs(reactance(low, *drive)) < np.abs(reactance(high, *drive))
+        return np.where(found.success, found.x, np.where(nearer_low, low, high))
 
 
 def _features(gains: Array) -> Array:

@@ -195,7 +195,7 @@ def open_loop(design: Design) -> control.StateSpace:
         "open_loop",
         inputs,
         LOOP_OUTPUTS,
-        _loop_states(design.string.nodes, ki),
+        state_names(design.string.nodes, ki),
     )
 
 
@@ -225,7 +225,7 @@ def closed_loop(design: Design) -> control.StateSpace:
         "closed_loop",
         inputs,
         LOOP_OUTPUTS,
-        _loop_states(design.string.nodes, ki),
+        state_names(design.string.nodes, ki),
     )
 
 
@@ -234,7 +234,8 @@ def _string_states(nodes: int) -> list[str]:
     return [*twists, *(f"speed_{i}" for i in range(nodes))]
 
 
-def _loop_states(nodes: int, ki: float) -> list[str]:
+def state_names(nodes: int, ki: float) -> list[str]:
+    """Names of a loop's states; without integral action those of the string alone."""
     return [*_string_states(nodes), *(["integral"] if ki != 0.0 else [])]
 
 

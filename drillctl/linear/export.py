@@ -1,0 +1,191 @@
+"""The loop for other programs: a nonlinear python-control system; matrices for MATLAB and NumPy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.linear.loop_poles import with_slope
+from drillctl.linear.operating_point import operating_point
+from drillctl.linear.state_space import (
+    INPUTS,
+    LOOP_OUTPUTS,
+    OUTPUTS,
+    closed_loop_matrices,
+    open_loop_matrices,
+    plant_matrices,
+    state_names,
+)
+
+if TYPE_CHECKING:
+    import control
+
+Array = NDArray[np.float64]
+
+WIDTH = 0.05
+"""Speed (rad/s) over which the regularised friction changes sign."""
+
+
+def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearIOSystem:
+    """The closed loop with REGULARISED friction, for use with python-control.
+
+    python-control integrates smooth systems, and set-valued friction is not one: here the
+    torque of the law is multiplied by tanh(bit speed / width). A bit that should stand still
+    creeps instead, and J1 shifts by several per cent (by up to half of it for wide ones). For
+    answers use `drillctl.simulate`, which regularises nothing.
+
+    Parameters
+    ----------
+    design : Design
+        Rig and control.
+    width : float
+        Speed over which the friction changes sign (rad/s), more than zero.
+
+    Returns
+    -------
+    control.NonlinearIOSystem
+        Inputs `set_speed` (rad/s) and `weight_on_bit` (N; the coefficients of the law stay
+        those of the design's weight). Outputs those of `closed_loop` and `bit_torque` (N m).
+        States of the closed loop: twists (rad), speeds (rad/s), `integral` (rad) where the
+        drive has integral action.
+
+    Raises
+    ------
+    InputError
+        A width that is not more than zero.
+    """
+    import control
+
+    if not (0.0 < width < np.inf):
+        raise InputError(f"must be more than 0 rad/s, got {width:g}", "width")
+    matrices = plant_matrices(design.string)
+    drive, friction = design.top_drive, design.bit_rock
+    strings = len(matrices.a)
+    top, bit = matrices.c[0], matrices.c[1]
+    _, ki = drive.gains()
+
+    def torques(state: Array, inputs: Array) -> tuple[float, float]:
+        speed, weight = float(bit @ state[:strings]), float(inputs[1])
+        torque, _ = friction.torque_and_slope(weight, abs(speed), np.exp)
+        angle = -float(state[-1]) if ki != 0.0 else 0.0
+        error = float(top @ state[:strings]) - float(inputs[0])
+        return float(drive.torque(angle, error)), float(torque) * float(np.tanh(speed / width))
+
+    def update(time: float, state: Array, inputs: Array, parameters: Any) -> Array:
+        rates = matrices.a @ state[:strings] + matrices.b @ np.array(torques(state, inputs))
+        if ki == 0.0:
+            return np.asarray(rates)
+        return np.append(rates, float(inputs[0]) - float(top @ state[:strings]))
+
+    def output(time: float, state: Array, inputs: Array, parameters: Any) -> Array:
+        return np.concatenate([matrices.c @ state[:strings], torques(state, inputs)])
+
+    return control.NonlinearIOSystem(
+        update,
+        output,
+        inputs=["set_speed", "weight_on_bit"],
+        outputs=[*LOOP_OUTPUTS, "bit_torque"],
+        states=state_names(design.string.nodes, ki),
+        name="regularised_loop",
+    )
+
+
+def write_matrices(design: Design, path: str | Path) -> Path:
+    """Write the linear models of a design for MATLAB (`.mat`) or NumPy (`.npz`).
+
+    Parameters
+    ----------
+    design : Design
+        Rig and control.
+    path : str or Path
+        File ending in `.mat` or `.npz`.
+
+    Returns
+    -------
+    Path
+        The file. It holds `plant`, `open_loop` and `closed_loop` as A, B, C, D (the last also
+        with the slope of the rock, `closed_loop_with_slope`), M, C and K of the string, the
+        slope (N m s/rad), names of states, inputs and outputs. SI units, radians. In `.mat`
+        each system is a struct, so that `ss(plant.A, plant.B, plant.C, plant.D)` is the plant;
+        in `.npz` names are joined by a dot, as in `plant.A`.
+
+    Raises
+    ------
+    InputError
+        Another ending, or a file that cannot be written.
+    """
+    path = Path(path)
+    if path.suffix not in (".mat", ".npz"):
+        raise InputError(f"{path.name!r}: a file ends in .mat or .npz", "export")
+    content = _content(design)
+    try:
+        if path.suffix == ".mat":
+            import scipy.io
+
+            scipy.io.savemat(path, content, oned_as="column")
+        else:
+            np.savez_compressed(path, allow_pickle=False, **_flat(content))
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}", str(path)) from None
+    return path
+
+
+def _content(design: Design) -> dict[str, Any]:
+    string = design.string
+    kp, ki = design.top_drive.gains()
+    slope = operating_point(design).slope
+    closed = closed_loop_matrices(string, kp, ki)
+    loop_states = state_names(string.nodes, ki)
+    rows = {
+        "plant": (plant_matrices(string), state_names(string.nodes, 0.0), INPUTS, OUTPUTS),
+        "open_loop": (
+            open_loop_matrices(string, kp, ki),
+            loop_states,
+            ("speed_error", "bit_torque"),
+            LOOP_OUTPUTS,
+        ),
+        "closed_loop": (closed, loop_states, ("set_speed", "bit_torque"), LOOP_OUTPUTS),
+        "closed_loop_with_slope": (
+            with_slope(closed, slope),
+            loop_states,
+            ("set_speed", "bit_torque"),
+            LOOP_OUTPUTS,
+        ),
+    }
+    systems = {
+        name: dict(zip("ABCD", matrices, strict=True))
+        | {"states": _names(states), "inputs": _names(inputs), "outputs": _names(outputs)}
+        for name, (matrices, states, inputs, outputs) in rows.items()
+    }
+    string_matrices = {
+        "M": string.mass.toarray(),
+        "C": string.damping.toarray(),
+        "K": string.stiffness.toarray(),
+    }
+    return {
+        **systems,
+        "string": string_matrices,
+        "slope": slope,
+        "kp": float(kp),
+        "ki": float(ki),
+        "design": design.name,
+    }
+
+
+def _names(names: tuple[str, ...] | list[str]) -> NDArray[np.str_]:
+    return np.array(list(names), dtype=np.str_)
+
+
+def _flat(content: dict[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in content.items():
+        if isinstance(value, dict):
+            flat |= {f"{name}.{key}": part for key, part in value.items()}
+        else:
+            flat[name] = np.asarray(value)
+    return flat
