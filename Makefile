@@ -43,6 +43,7 @@ format: $(BIN)/drillctl
 
 bench: $(BIN)/drillctl
 	$(BIN)/python benchmarks/map_speed.py
+	$(BIN)/python benchmarks/linear_speed.py
 
 clean:
 	rm -rf runs build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
@@ -53,6 +54,8 @@ REPORT := reports/monteiro-trindade-140kn
 reports: $(BIN)/drillctl
 	rm -rf runs/reports
 	$(BIN)/drillctl modes monteiro-trindade-140kn --out runs/reports/modes
+	$(BIN)/drillctl loop monteiro-trindade-140kn --out runs/reports/loop
+	$(BIN)/drillctl regions monteiro-trindade-140kn --out runs/reports/regions
 	$(BIN)/drillctl simulate monteiro-trindade-140kn --out runs/reports/simulate
 	$(BIN)/drillctl map monteiro-trindade-140kn --out runs/reports/map
 	mkdir -p $(REPORT)
