@@ -13,9 +13,10 @@ $(BIN)/drillctl: pyproject.toml
 	$(BIN)/python -m pip install --quiet -e ".[dev]"
 	@touch $(BIN)/drillctl
 
-# The source paper's case: modes, one run, the J1 map; figures, data and summaries.
+# The source paper's case: modes, loop, one run, the J1 map; figures, data and summaries.
 demo: $(BIN)/drillctl
 	$(BIN)/drillctl modes monteiro-trindade-140kn --out $(DEMO)/modes
+	$(BIN)/drillctl loop monteiro-trindade-140kn --out $(DEMO)/loop
 	$(BIN)/drillctl simulate monteiro-trindade-140kn --out $(DEMO)/simulate
 	$(BIN)/drillctl map monteiro-trindade-140kn --out $(DEMO)/map
 	@echo "pictures, data and summaries: $(CURDIR)/$(DEMO)"
@@ -61,3 +62,5 @@ reports: $(BIN)/drillctl
 	mkdir -p $(REPORT)
 	cp runs/reports/*/*.png $(REPORT)/
 	cp runs/reports/map/summary.json runs/reports/map/regions.csv $(REPORT)/
+	cp runs/reports/loop/summary.json $(REPORT)/loop.json
+	cp runs/reports/regions/summary.json $(REPORT)/three-regions.json

@@ -44,9 +44,9 @@ def loop_figures(result: LoopAnalysis) -> dict[str, Figure]:
     Returns
     -------
     dict
-        Bode plot of string and loop, Nyquist, Nichols, sensitivities, mobility at the bit; with
-        a speed controller root locus and boundary in the plane of the gains; on a distributed
-        string impedance and reflection of the drive.
+        Mobility at bit and top, of the elements and of the continuum; with a speed controller
+        Bode plot from the set speed, Nyquist, Nichols, sensitivities, root locus and boundary
+        in the plane of the gains; on a distributed string impedance and reflection of the drive.
     """
     from drillctl import plots
 
@@ -57,11 +57,10 @@ def loop_figures(result: LoopAnalysis) -> dict[str, Figure]:
         models.append("wave")
     strings = [frequency_response(design, frequencies, model=m) for m in models]  # type: ignore[arg-type]
     closed = frequency_response(design, frequencies, "closed_loop")
-    figures = {
-        "bode": plots.bode(strings),
-        "mobility": plots.mobility([*strings, closed]),
-    }
+    figures = {"mobility": plots.mobility([*strings, closed])}
     if any(design.top_drive.gains()):
+        drilling = frequency_response(design, frequencies, "closed_loop", slope=slope)
+        figures["closed-loop"] = plots.bode(drilling)
         grid = pole_grid(ends_of(design.string), result.poles) / (2.0 * math.pi)
         cut = frequency_response(design, grid, "open_loop", slope=slope)
         figures |= {
