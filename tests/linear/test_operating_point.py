@@ -51,11 +51,19 @@ def test_published_equilibria_of_two_inertias():
     assert growth(design, slow.slope) > 0.0 > growth(design, fast.slope)
 
 
-def test_the_steady_state_is_that_nearest_to_the_set_speed():
-    assert operating_point(lumped(6000.0, 50e3)).speed == pytest.approx(4.34501, abs=5.1e-6)
-    slow = lumped(6000.0, 50e3, **{"operating_point.speed": "1 rad/s"})
-    assert operating_point(slow).speed == pytest.approx(0.14967, abs=5.1e-6)
-    assert len(equilibria(slow)) == 2
+def test_at_constant_torque_the_fastest_steady_state_is_drilled_at():
+    for frame in ("5.005 rad/s", "0.2 rad/s"):
+        rig = lumped(6000.0, 50e3, **{"operating_point.speed": frame})
+        assert operating_point(rig).speed == pytest.approx(4.34501, abs=5.1e-6)
+        assert len(equilibria(rig)) == 2
+
+
+def test_without_integral_action_the_steady_state_nearest_to_the_set_speed():
+    gains = {"law": "pi", "kp": 5000.0, "ki": 0.0}
+    rig = lumped(6000.0, 50e3, controller=gains)
+    found = operating_point(rig).speed
+    assert found == min((x.speed for x in equilibria(rig)), key=lambda x: abs(x - rig.speed))
+    assert 3.0 < found < rig.speed  # the droop of proportional control
 
 
 def test_speed_that_ten_thousand_sustain():
