@@ -29,10 +29,7 @@ class NavarroLopezSuarez(NamedTuple):
     a2: Any
     beta: Any
 
-    @property
-    def set_valued(self) -> bool:
-        """A bit can stand still under this law."""
-        return True
+    set_valued = True
 
     def static_torque(self, weight: Any) -> Any:
         """Largest torque of a bit at rest (N m), `a2 W`."""

@@ -176,7 +176,7 @@ def solve(design: Design, tolerance: float = 1e-8, method: Method = "DOP853") ->
     SimulationError
         The integrator failed, or phases followed each other without time advancing.
     """
-    system = _System(design)
+    system = System(design)
     duration = design.tables.simulation.duration
     angle, speed = _start(design)
     state = np.concatenate([angle, speed, np.zeros(3)])
@@ -208,7 +208,7 @@ def _start(design: Design) -> tuple[Array, Array]:
     return angle[:, 0], speed[:, 0]
 
 
-class _System:
+class System:
     """The equations of one design, as SciPy wants them."""
 
     def __init__(self, design: Design) -> None:
@@ -227,20 +227,26 @@ class _System:
         return float(state[2 * self.nodes - 1]) + self.set_speed
 
     def top_torque(self, state: Array) -> float:
+        """Torque of the drive (N m)."""
         return float(self.drive.torque(float(state[0]), float(state[self.nodes])))
 
     def static_torque(self) -> float:
+        """Largest torque on a bit at rest (N m)."""
         return float(self.friction.static_torque(self.weight.weight(0.0)))
 
     def slip_torque(self, state: Array, direction: int) -> float:
-        # Past zero speed the law is continued smoothly, so that the event can be located.
+        """Torque on a bit that turns (N m)."""
         speed = self.bit_speed(state)
+        if not self.friction.set_valued:
+            direction = 1 if speed >= 0.0 else -1
+        # Past zero speed a set-valued law is continued smoothly, so that the event can be located.
         torque, _ = self.friction.torque_and_slope(
             self.weight.weight(speed), direction * speed, _exp
         )
         return direction * float(torque)
 
     def holding_torque(self, state: Array) -> float:
+        """Torque that holds a bit at rest (N m)."""
         return self.reaction.torque(state[: 2 * self.nodes], self.top_torque(state))
 
     def rates(self, phase: Phase, state: Array, bit_torque: float) -> Array:
@@ -258,7 +264,9 @@ class _System:
         return rates
 
     def direction_at(self, state: Array) -> int:
-        """Phase at the very start: +1 or -1 turning, 0 stuck."""
+        """Phase at the very start: +1 or -1 turning, 0 stuck; under a smooth law always +1."""
+        if not self.friction.set_valued:
+            return 1
         speed = self.bit_speed(state)
         if speed != 0.0:
             return 1 if speed > 0.0 else -1
@@ -282,7 +290,7 @@ class _System:
     ) -> tuple[Piece, Array]:
         """Integrate one phase until it ends by itself or time is over."""
         equations = self._sticking() if direction == 0 else self._slipping(direction)
-        result = _integrate(
+        result = integrate(
             equations.rates,
             (begin, end),
             state,
@@ -310,6 +318,8 @@ class _System:
             return self.rates(self.slip, state, self.slip_torque(state, direction))
 
         def comes_to_rest(time: float, state: Array) -> float:
+            if not self.friction.set_valued:
+                return 1.0
             # Exactly zero is the release itself, in a step too short to move the bit.
             return direction * self.bit_speed(state) or 1e-300
 
@@ -319,7 +329,7 @@ class _System:
         def extreme(time: float, state: Array) -> float:
             return float(rates(time, state)[2 * self.nodes - 1])
 
-        return _Equations(rates, _ending(comes_to_rest), [at_set_speed, extreme])
+        return _Equations(rates, ending(comes_to_rest), [at_set_speed, extreme])
 
     def _sticking(self) -> _Equations:
         limit = self.static_torque()
@@ -333,7 +343,7 @@ class _System:
         def never(time: float, state: Array) -> float:
             return 1.0
 
-        return _Equations(rates, _ending(breaks_loose), [never, never])
+        return _Equations(rates, ending(breaks_loose), [never, never])
 
     def audit(self, angle: Array, speed: Array, state: Array) -> EnergyAudit:
         """Energy balance between the start and the final state."""
@@ -349,7 +359,7 @@ def _exp(x: float) -> float:
     return math.exp(min(x, 100.0))
 
 
-def _integrate(*arguments: Any, **options: Any) -> Any:
+def integrate(*arguments: Any, **options: Any) -> Any:
     """`solve_ivp` with steps of at most `LONGEST_STEP`; a little shorter if an event is missed.
 
     SciPy finds events on its dense output, which at the ends of a step may differ from the step
@@ -372,7 +382,7 @@ class _Equations:
         self.events = [end, *others]
 
 
-def _ending(event: Any) -> Any:
+def ending(event: Any) -> Any:
     """Mark an event as the end of its phase, reached from above."""
     event.terminal = True
     event.direction = -1
