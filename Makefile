@@ -13,9 +13,10 @@ $(BIN)/drillctl: pyproject.toml
 	$(BIN)/python -m pip install --quiet -e ".[dev]"
 	@touch $(BIN)/drillctl
 
-# The source paper's case: modes, one run, the J1 map; figures, data and summaries.
+# The source paper's case: modes, loop, one run, the J1 map; figures, data and summaries.
 demo: $(BIN)/drillctl
 	$(BIN)/drillctl modes monteiro-trindade-140kn --out $(DEMO)/modes
+	$(BIN)/drillctl loop monteiro-trindade-140kn --out $(DEMO)/loop
 	$(BIN)/drillctl simulate monteiro-trindade-140kn --out $(DEMO)/simulate
 	$(BIN)/drillctl map monteiro-trindade-140kn --out $(DEMO)/map
 	@echo "pictures, data and summaries: $(CURDIR)/$(DEMO)"
@@ -43,6 +44,7 @@ format: $(BIN)/drillctl
 
 bench: $(BIN)/drillctl
 	$(BIN)/python benchmarks/map_speed.py
+	$(BIN)/python benchmarks/linear_speed.py
 
 clean:
 	rm -rf runs build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
@@ -53,8 +55,12 @@ REPORT := reports/monteiro-trindade-140kn
 reports: $(BIN)/drillctl
 	rm -rf runs/reports
 	$(BIN)/drillctl modes monteiro-trindade-140kn --out runs/reports/modes
+	$(BIN)/drillctl loop monteiro-trindade-140kn --out runs/reports/loop
+	$(BIN)/drillctl regions monteiro-trindade-140kn --out runs/reports/regions
 	$(BIN)/drillctl simulate monteiro-trindade-140kn --out runs/reports/simulate
 	$(BIN)/drillctl map monteiro-trindade-140kn --out runs/reports/map
 	mkdir -p $(REPORT)
 	cp runs/reports/*/*.png $(REPORT)/
 	cp runs/reports/map/summary.json runs/reports/map/regions.csv $(REPORT)/
+	cp runs/reports/loop/summary.json $(REPORT)/loop.json
+	cp runs/reports/regions/summary.json $(REPORT)/three-regions.json

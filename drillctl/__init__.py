@@ -8,7 +8,7 @@ A design flows one way: file -> `Design` -> plant -> simulation -> map -> region
 `bit_rock`              friction laws of the bit, set-valued at rest
 `top_drive`             control laws of the top drive
 `weight_on_bit`         laws of the weight on bit
-`linear`                plant and loop as `control.StateSpace`, modes
+`linear`                plant and loop as `control.StateSpace`, modes, margins, boundaries
 `simulation`            reference solver (located events) and batch engine (lanes)
 `studies`               sweeps, regions, audits
 `plots`                 a result in, a figure out
@@ -31,8 +31,10 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from drillctl.design import Design as Design
     from drillctl.design import load as load
+    from drillctl.linear import loop as loop
     from drillctl.linear import modes as modes
     from drillctl.simulation import simulate as simulate
+    from drillctl.simulation.limit_cycle import limit_cycle as limit_cycle
     from drillctl.store import open as open
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
@@ -41,7 +43,9 @@ _HOME = {
     "Design": "drillctl.design",
     "load": "drillctl.design",
     "modes": "drillctl.linear",
+    "loop": "drillctl.linear",
     "simulate": "drillctl.simulation",
+    "limit_cycle": "drillctl.simulation.limit_cycle",
     "sweep": "drillctl.studies",
     "stability_map": "drillctl.studies",
     "open": "drillctl.store",

@@ -195,6 +195,60 @@ def modes(
 
 
 @app.command()
+def loop(
+    design: DesignName,
+    sets: Sets = None,
+    axis: Axes = None,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """Stability, margins and slope margin of the loop; Bode, Nyquist, impedance, gain maps."""
+    from drillctl import verbs
+
+    _use(threads)
+    verbs.loop(_with_axes(_load(design, sets), axis), Options(out, json, units, verbose))
+
+
+@app.command()
+def cycle(
+    design: DesignName,
+    sets: Sets = None,
+    out: Out = None,
+    json: Json = False,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """The limit cycle: by one harmonic, exact by shooting, and by a long run."""
+    from drillctl import verbs
+
+    verbs.cycle(_load(design, sets), Options(out, json, units, verbose))
+
+
+@app.command()
+def regions(
+    design: DesignName,
+    sets: Sets = None,
+    axis: Axes = None,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """Locally stable, J1 under a level, attracted: three regions over two parameters."""
+    from drillctl import verbs
+
+    _use(threads)
+    verbs.regions(_with_axes(_load(design, sets), axis), Options(out, json, units, verbose))
+
+
+@app.command()
 def simulate(
     design: DesignName,
     sets: Sets = None,
@@ -234,18 +288,18 @@ def map_(
 ) -> None:
     """J1 over one or more parameters, with regions, audit and figures."""
     from drillctl import verbs
-    from drillctl.design.reading import parse_axis
 
     _use(threads)
-    changes: dict[str, Any] = {}
-    if axis:
-        changes["map.axes"] = [parse_axis(text) for text in axis]
+    found = _with_axes(_load(design, sets), axis)
     if audit is not None:
-        changes["map.audit_cells"] = audit
-    found = _load(design, sets)
-    verbs.stability_map(
-        found.replace(changes) if changes else found, Options(out, json, units, verbose)
-    )
+        found = found.replace({"map.audit_cells": audit})
+    verbs.stability_map(found, Options(out, json, units, verbose))
+
+
+def _with_axes(design: Design, axes: list[str] | None) -> Design:
+    from drillctl.design.reading import parse_axis
+
+    return design.replace({"map.axes": [parse_axis(text) for text in axes]}) if axes else design
 
 
 def _use(threads: int | None) -> None:

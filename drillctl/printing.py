@@ -8,8 +8,12 @@ from drillctl import units
 from drillctl.console import line, sized, table
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from drillctl.linear import LoopAnalysis
     from drillctl.simulation import Simulation
-    from drillctl.studies import Axis, Sweep
+    from drillctl.simulation.limit_cycle import LimitCycle
+    from drillctl.studies import Axis, Sweep, ThreeRegions
 
 _MEASURES = {
     "j1": "s", "stuck_time": "s", "sticks": "", "stick_slip_index": "",
@@ -86,6 +90,106 @@ def sweep(result: Sweep, system: units.System) -> None:
     line(
         f"{result.j1.size} cells: {result.seconds:.3f} s in the lanes, "
         f"{result.total_seconds:.1f} s in all"
+    )
+
+
+def loop(result: LoopAnalysis, system: units.System) -> None:
+    """Stability, margins, critical operating points and the first modes of a loop."""
+    found = result.margins
+    rows = [
+        ["stable", "yes" if result.stable else "no", ""],
+        ["spectral abscissa", f"{result.spectral_abscissa:.3g}", "1/s"],
+        ["slope of the rock, -dT/dw", sized(result.operating_point.slope), "N m s/rad"],
+        ["friction-slope margin D*", sized(result.slope_margin), "N m s/rad"],
+        ["  decided at", sized(result.deciding_frequency_hz), "Hz"],
+        ["  of the continuum", sized(result.continuum_slope_margin), "N m s/rad"],
+    ]
+    if found is not None:
+        rows += [
+            ["peak sensitivity", sized(found.peak_sensitivity), ""],
+            ["  at", sized(found.peak_sensitivity_hz), "Hz"],
+            ["disk margin, gain", sized(found.gain_db), "dB"],
+            ["disk margin, phase", sized(found.phase_deg), "deg"],
+            ["delay margin", sized(found.delay), "s"],
+            ["  decided at", sized(found.delay_hz), "Hz"],
+        ]
+    for name, value, unit in (
+        ("operating speed", result.operating_point.speed, "rad/s"),
+        ("critical speed", result.critical_speed, "rad/s"),
+        ("critical weight on bit", result.critical_weight_on_bit, "N"),
+    ):
+        shown, label = (None, "") if value is None else units.displayed(value, unit, system)
+        rows.append([name, sized(shown), label])
+    title = result.design.tables.title or result.design.name
+    table(f"{title}: loop at the top torque, slope of the rock included",
+          ["figure", "value", "unit"], rows)  # fmt: skip
+    modes = [
+        [str(number), f"{frequency:.6f}", sized(ratio)]
+        for number, (frequency, ratio) in enumerate(result.oscillations[:8], start=1)
+    ]
+    table("oscillating poles", ["number", "frequency (Hz)", "damping ratio"], modes)
+
+
+def cycle(result: LimitCycle, system: units.System) -> None:
+    """What each method says of the limit cycle, side by side."""
+    orbit, predicted, run = result.orbit, result.predicted, result.simulated.summary()
+
+    def speed(value: float | None) -> str:
+        return "-" if value is None else f"{units.displayed(value, 'rad/s', system)[0]:.2f}"
+
+    def spread(values: list[float] | None, shown: Callable[[float], str]) -> str:
+        return "-" if values is None else " to ".join(dict.fromkeys(map(shown, values)))
+
+    rows = [
+        [
+            "period (s)",
+            "-" if predicted is None else f"{predicted.period:.3f}",
+            "-" if orbit is None else f"{orbit.period:.6f}",
+            spread(run["period_spread"], lambda x: f"{x:.4f}"),
+        ],
+        [
+            "peak bit speed (rpm)",
+            speed(None if predicted is None else predicted.peak_speed),
+            speed(None if orbit is None else orbit.peak_bit_speed),
+            spread(run["peak_spread"], speed),
+        ],
+        [
+            "stuck in a period (s)",
+            "-",
+            "-" if orbit is None else f"{orbit.stuck_time:.4f}",
+            spread(run["stuck_time_spread"], lambda x: f"{x:.4f}"),
+        ],
+        [
+            "largest multiplier",
+            "-",
+            "-" if orbit is None else f"{abs(orbit.multipliers[0]):.4f}",
+            "-",
+        ],
+    ]
+    heads = ["figure", "one harmonic", "exact (shooting)", "last ten returns of a long run"]
+    title = result.design.tables.title or result.design.name
+    table(f"{title}: {result.status}", heads, rows)
+    for unstable in (x for x in result.harmonic if not x.stable):
+        line(
+            f"unstable cycle by one harmonic: {unstable.period:.3f} s, "
+            f"{speed(unstable.least_speed)} to {speed(unstable.peak_speed)} rpm"
+        )
+    line(f"status: {result.status} (wound up, {result.simulated.duration:.0f} s)")
+
+
+def regions(result: ThreeRegions) -> None:
+    """Cells of the three regions and of where they differ."""
+    summary = result.summary()
+    total = summary["cells"]
+    rows = [
+        [name.replace("_", " "), str(count), f"{count / total:.2%}"]
+        for name, count in summary["counts"].items()
+    ]
+    title = result.design.tables.title or result.design.name
+    table(f"{title}: three regions of {total} cells", ["region", "cells", "share"], rows)
+    line(
+        f"J1 level {result.level:g} s; attracted: within {result.band:.0%} of the operating speed "
+        f"throughout the last {result.window:g} s of {result.horizon:g} s"
     )
 
 

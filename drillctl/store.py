@@ -29,12 +29,15 @@ from drillctl.errors import InputError
 from drillctl.json_files import read_json, write_json, write_text
 from drillctl.linear.modal import Modes
 from drillctl.provenance import provenance
+from drillctl.simulation.limit_cycle import LimitCycle
 from drillctl.simulation.trajectory import Simulation
 from drillctl.store_blocks import FolderBlocks
 from drillctl.store_reading import READERS, stored_name
 from drillctl.studies.audit import choose_cells
 from drillctl.studies.grid import axes_of
+from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.sweeps import Sweep
+from drillctl.studies.three_regions import PAPER_LEVEL, ThreeRegions
 
 RUNS = Path("runs")
 """Where runs go that were given no folder."""
@@ -205,7 +208,15 @@ def write_data(result: Any, folder: Path) -> None:
     part.rename(target)
 
 
-VERBS = {"Sweep": "map", "Simulation": "simulate", "Modes": "modes"}
+VERBS = {
+    "Sweep": "map",
+    "Simulation": "simulate",
+    "Modes": "modes",
+    "LimitCycle": "cycle",
+    "LoopAnalysis": "loop",
+    "LoopMap": "loop-map",
+    "ThreeRegions": "regions",
+}
 
 
 def save(result: Any, folder: str | Path) -> Path:
@@ -213,7 +224,7 @@ def save(result: Any, folder: str | Path) -> Path:
 
     Parameters
     ----------
-    result : Sweep, Simulation or Modes
+    result : Sweep, Simulation, Modes, LoopAnalysis, LoopMap, ...
         Anything with `.design`, `.data` and `.summary()`.
     folder : str or Path
         New, empty, or holding the very same run.
@@ -257,6 +268,19 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["axes"] = axes
         if not np.array_equal(cells, result.audit.cells):
             settings["audited"] = result.audit.cells.tolist()
+    elif isinstance(result, LoopMap):
+        axes = [[a.path, a.values.tolist()] for a in result.axes]
+        settings = {"quantities": list(result.values)} | (
+            {"axes": axes} if axes != _own_axes(design) else {}
+        )
+    elif isinstance(result, ThreeRegions):
+        axes = [[a.path, a.values.tolist()] for a in result.axes]
+        if axes != _own_axes(design):
+            settings["axes"] = axes
+        if result.level != PAPER_LEVEL:
+            settings["level"] = result.level
+    elif isinstance(result, LimitCycle):
+        settings["duration"] = result.simulated.duration
     elif isinstance(result, Modes):
         settings["count"] = max(len(result.free_free), len(result.fixed_top))
     return design, settings

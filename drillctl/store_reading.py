@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from drillctl.design import Design
+from drillctl.linear.loop_analysis import LoopAnalysis
+from drillctl.linear.loop_margins import Margins
 from drillctl.linear.modal import Mode, Modes
+from drillctl.linear.operating_point import OperatingPoint
 from drillctl.simulation.batch import FLOATS
+from drillctl.simulation.limit_cycle import HarmonicCycle, LimitCycle, Orbit
+from drillctl.simulation.limit_cycle.returns import Returns
 from drillctl.simulation.measures import Measures
 from drillctl.simulation.reference import EnergyAudit
 from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.studies.audit import Audit
 from drillctl.studies.grid import Axis
+from drillctl.studies.loop_maps import QUANTITIES, LoopMap
 from drillctl.studies.sweeps import Sweep
+from drillctl.studies.three_regions import FIELDS, MASKS, ThreeRegions
 
 if TYPE_CHECKING:
     import xarray
@@ -92,8 +101,94 @@ def _modes(data: xarray.Dataset, support: str) -> tuple[Mode, ...]:
     )
 
 
+def read_loop(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> LoopAnalysis:
+    """A `LoopAnalysis` as it was saved."""
+    found = summary["margins"]
+    if found is not None:  # what JSON cannot say is infinite
+        found = {
+            key: math.inf if value is None and key in ("gain_db", "delay") else value
+            for key, value in found.items()
+        }
+    return LoopAnalysis(
+        design=design,
+        operating_point=OperatingPoint(
+            summary["operating_speed"], summary["bit_torque"], summary["slope"]
+        ),
+        poles=data["pole_real"].values + 1j * data["pole_imag"].values,
+        slope_margin=summary["slope_margin"],
+        deciding_frequency_hz=summary["deciding_frequency_hz"],
+        continuum_slope_margin=summary["continuum_slope_margin"],
+        margins=None if found is None else Margins(**found),
+        critical_speed=summary["critical_speed"],
+        critical_weight_on_bit=summary["critical_weight_on_bit"],
+    )
+
+
+def read_loop_map(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> LoopMap:
+    """A `LoopMap` as it was saved."""
+    axes = tuple(_axis(path, data[stored_name(path)]) for path in summary["axes"])
+    values = {name: data[name].values for name in QUANTITIES if name in data}
+    return LoopMap(design, axes, values, summary["total_seconds"])
+
+
+def read_three_regions(
+    design: Design, data: xarray.Dataset, summary: dict[str, Any]
+) -> ThreeRegions:
+    """`ThreeRegions` as they were saved."""
+    told = ("level", "horizon", "band", "window", "total_seconds")
+    values: dict[str, Any] = {name: summary[name] for name in told}
+    values |= {name: data[name].values for name in FIELDS}
+    values |= {name: data[name].values.astype(bool) for name in MASKS}
+    axes = tuple(_axis(path, data[stored_name(path)]) for path in summary["axes"])
+    return ThreeRegions(design=design, axes=axes, **values)
+
+
+def read_cycle(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> LimitCycle:
+    """A `LimitCycle` as it was saved."""
+    run = summary["simulated"]
+    simulated = Returns(
+        duration=run["duration"],
+        mean_speed=run["mean_bit_speed"],
+        swing=data["swing"].values,
+        times=data["return_time"].values,
+        points=data["return_point"].values,
+        peaks=data["return_peak"].values,
+        stuck=data["return_stuck"].values,
+        time=data["simulated_time"].values,
+        bit_speed=data["simulated_bit_speed"].values,
+        top_speed=data["simulated_top_speed"].values,
+    )
+    harmonic = tuple(
+        HarmonicCycle(**{f.name: entry[f.name] for f in fields(HarmonicCycle)})
+        for entry in summary["harmonic"]
+    )
+    return LimitCycle(design, summary["status"], harmonic, _orbit(data, summary), simulated)
+
+
+def _orbit(data: xarray.Dataset, summary: dict[str, Any]) -> Orbit | None:
+    found = summary["orbit"]
+    if found is None:
+        return None
+    numbers = (
+        "period", "peak_bit_speed", "min_bit_speed", "mean_bit_speed", "stuck_time", "residual",
+        "iterations",
+    )  # fmt: skip
+    return Orbit(
+        **{name: found[name] for name in numbers},
+        multipliers=data["multiplier"].values,
+        point=data["orbit_point"].values,
+        time=data["time"].values,
+        bit_speed=data["bit_speed"].values,
+        top_speed=data["top_speed"].values,
+    )
+
+
 READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "map": read_sweep,
     "simulate": read_simulation,
     "modes": read_modes,
+    "cycle": read_cycle,
+    "loop": read_loop,
+    "loop-map": read_loop_map,
+    "regions": read_three_regions,
 }

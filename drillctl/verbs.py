@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
     from drillctl.cli import Options
     from drillctl.design import Design
+    from drillctl.progress import Progress
     from drillctl.store import RunFolder
+    from drillctl.studies import LoopMap
 
 DPI = 150
 
@@ -77,6 +79,85 @@ def modes(design: Design, count: int, options: Options) -> None:
     if not options.json:
         printing.modes(summary)
     _conclude(folder, summary, options)
+
+
+def loop(design: Design, options: Options) -> None:
+    """Loop figures, with their pictures, a map over the gains and the linear models."""
+    from drillctl import linear, plots, printing, store, studies
+    from drillctl.linear.export import write_matrices
+    from drillctl.loop_pictures import loop_figures, over_gains
+
+    folder = store.claim("loop", design, options.out)
+    if _shown_again(folder, options, lambda: printing.loop(store.open(folder.path), options.units)):
+        return
+    with _running(folder), console.progress() as bar:
+        result = linear.loop(design)
+        found = _loop_map(design, bar)
+    store.write_data(result, folder.path)
+    for name in ("model.mat", "model.npz"):
+        write_matrices(design, folder.path / name)
+    for name, figure in loop_figures(result).items():
+        _draw(figure, folder.path / f"{name}.png")
+    summary = result.summary()
+    if found is not None:
+        summary["map"] = found.summary()
+        studies.write_loop_table(found, folder.path)
+        boundary = linear.gain_boundary(design) if over_gains(found.axes) else None
+        picture = plots.loop_map(found, boundary=boundary, system=options.units)
+        _draw(picture, folder.path / "slope-margin.png")
+    if not options.json:
+        printing.loop(result, options.units)
+    _conclude(folder, summary, options)
+
+
+def _loop_map(design: Design, bar: Progress) -> LoopMap | None:
+    """The map over the two axes of a design; None where its axes do not make one."""
+    from drillctl import studies
+    from drillctl.studies.grid import axes_of
+
+    try:
+        axes = axes_of(design, design.tables.map.axes)
+    except InputError:
+        if "axes" in design.tree.get("map", {}):
+            raise
+        return None  # the default ones, over gains, do not fit a drive without them
+    return studies.loop_map(design, axes, progress=bar) if len(axes) == 2 else None
+
+
+def cycle(design: Design, options: Options) -> None:
+    """The limit cycle by describing function, shooting and a long run, with its figure."""
+    import drillctl
+    from drillctl import plots, printing, store
+
+    folder = store.claim("cycle", design, options.out)
+    if _shown_again(
+        folder, options, lambda: printing.cycle(store.open(folder.path), options.units)
+    ):
+        return
+    with _running(folder), console.progress() as bar:
+        bar.begin("following the motion", 1)
+        result = drillctl.limit_cycle(design)
+    store.write_data(result, folder.path)
+    _draw(plots.limit_cycle(result), folder.path / "limit-cycle.png")
+    if not options.json:
+        printing.cycle(result, options.units)
+    _conclude(folder, result.summary(), options)
+
+
+def regions(design: Design, options: Options) -> None:
+    """Three regions over the same two parameters, with their figure."""
+    from drillctl import plots, printing, store, studies
+
+    folder = store.claim("regions", design, options.out)
+    if _shown_again(folder, options, lambda: printing.regions(store.open(folder.path))):
+        return
+    with _running(folder), console.progress() as bar:
+        result = studies.three_regions(design, progress=bar)
+    store.write_data(result, folder.path)
+    _draw(plots.three_regions(result, system=options.units), folder.path / "three-regions.png")
+    if not options.json:
+        printing.regions(result)
+    _conclude(folder, result.summary(), options)
 
 
 def simulate(design: Design, options: Options) -> None:

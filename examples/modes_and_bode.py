@@ -21,8 +21,10 @@ def main(folder: Path) -> None:
     for number, mode in enumerate(modes.free_free):
         print(f"free-free mode {number}: {mode.frequency_hz:.4f} Hz")
     drillctl.plots.mode_shapes(modes).savefig(folder / "modes.png")
-    response = frequency_response(design.string, telling_frequencies(design.string))
-    drillctl.plots.bode(response).savefig(folder / "bode.png")
+    frequencies = telling_frequencies(design.string)
+    elements = frequency_response(design, frequencies)
+    continuum = frequency_response(design, frequencies, model="wave")
+    drillctl.plots.bode([elements, continuum]).savefig(folder / "bode.png")
 
 
 if __name__ == "__main__":

@@ -74,7 +74,9 @@ def test_the_page_of_keys_is_up_to_date():
     assert module.page() == (ROOT / "docs" / "design-file.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", ["modes_and_bode", "four_gain_pairs", "own_rig"])
+@pytest.mark.parametrize(
+    "name", ["modes_and_bode", "gains_from_margins", "three_drives", "four_gain_pairs", "own_rig"]
+)
 def test_examples_run(name, tmp_path):
     done = subprocess.run(
         [sys.executable, str(ROOT / "examples" / f"{name}.py"), str(tmp_path)],

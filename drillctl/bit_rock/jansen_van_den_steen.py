@@ -27,7 +27,10 @@ class JansenVanDenSteen(NamedTuple):
     a1: Any
     a2: Any
 
-    set_valued = True
+    @property
+    def set_valued(self) -> bool:
+        """A bit can stand still under this law."""
+        return True
 
     def static_torque(self, weight: Any) -> Any:
         """Largest torque of a bit at rest (N m), `a2 W`."""

@@ -29,7 +29,10 @@ class NavarroLopezSuarez(NamedTuple):
     a2: Any
     beta: Any
 
-    set_valued = True
+    @property
+    def set_valued(self) -> bool:
+        """A bit can stand still under this law."""
+        return True
 
     def static_torque(self, weight: Any) -> Any:
         """Largest torque of a bit at rest (N m), `a2 W`."""

@@ -30,7 +30,10 @@ class Stribeck(NamedTuple):
     decay: Any
     sharpness: Any
 
-    set_valued = False
+    @property
+    def set_valued(self) -> bool:
+        """A bit creeps under this law where it should stand still."""
+        return False
 
     def static_torque(self, weight: Any) -> Any:
         """Torque that a bit at rest can bear (N m): none, it creeps."""

@@ -64,7 +64,10 @@ class Tabulated(NamedTuple):
     c11: Any
     c12: Any
 
-    set_valued = True
+    @property
+    def set_valued(self) -> bool:
+        """A bit can stand still under this law."""
+        return True
 
     def static_torque(self, weight: Any) -> Any:
         """Largest torque of a bit at rest (N m)."""

@@ -1,25 +1,30 @@
-"""Natural frequencies of a string of lines, none missed (Wittrick & Williams 1971).
+"""Natural frequencies of a string of lines, none missed (after Wittrick & Williams 1971).
 
-How many natural frequencies lie under a frequency is the number of those of the sections with
-both their ends held, plus the number of negative pivots of the dynamic stiffness at the joints.
-Bisection on that count finds each, however close to the next, at any number of elements and for
-the continuum alike. All losses are left out: these are undamped frequencies.
+Walk down the string with the dynamic stiffness of all that lies above. How often it passes
+through infinity is how many natural frequencies lie under the one looked at, were the string held
+there; where the end is free, one more if the stiffness there is negative. Along a line the
+stiffness is a tangent whose angle falls by the phase of the wave, so that nothing is lost near
+its poles. Bisection on that count finds each frequency, however close to the next, at any number
+of elements and for the continuum alike. Losses are left out: these are undamped frequencies.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.drillstring import Parts, Section
-from drillctl.linear.transmission import Model, continuous_line, element_line, element_stiffness
+from drillctl.linear.transmission import Model, element_stiffness
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
+TINY = 1e-140
+"""In place of a zero that is divided by."""
+HELD = 1e250
+"""Stiffness of an end that stands still (N m/rad)."""
 BISECTIONS = 80
 """Halvings of a bracket: the last bit of a double."""
 
@@ -71,55 +76,61 @@ class _Lossless:
             replace(x, coupling_damping=0.0, stiffness_damping=0.0, mass_damping=0.0, drag=0.0)
             for x in parts.sections
         ]
-        self.model = model
-        self.mass = parts.mass
-        inertias = [parts.top_inertia, *(x.end_inertia for x in self.sections)]
-        inertias[-1] += parts.bit_inertia
-        self.inertias = inertias
-        self.free = slice(1 if top_held else 0, len(inertias) - (1 if bit_held else 0))
+        self.model, self.mass = model, parts.mass
+        self.top_inertia, self.bit_inertia = parts.top_inertia, parts.bit_inertia
+        self.top_held, self.bit_held = top_held, bit_held
         nodes = 1 + sum(x.elements for x in self.sections) - top_held - bit_held
         self.most = 10**9 if model == "wave" and any(x.inertia for x in self.sections) else nodes
 
     def below(self, omega: Array) -> Counts:
-        """Number of natural frequencies under each frequency (rad/s, more than zero)."""
-        diagonal = [-(omega**2) * inertia for inertia in self.inertias]
-        off = []
-        counts = np.zeros(len(omega), dtype=np.int64)
-        for joint, section in enumerate(self.sections):
-            own, across, inside = self._section(section, omega)
-            diagonal[joint] = diagonal[joint] + own
-            diagonal[joint + 1] = diagonal[joint + 1] + own
-            off.append(across)
-            counts += inside
-        kept, links = diagonal[self.free], off[self.free.start : self.free.stop - 1]
-        pivot = kept[0] if kept else np.ones(len(omega))
-        counts += pivot < 0.0
-        for entry, link in zip(kept[1:], links, strict=True):
-            pivot = entry - link**2 / _not_zero(pivot)
-            counts += pivot < 0.0
-        return counts
+        """Number of natural frequencies under each frequency (rad/s, more than zero).
 
-    def _section(self, section: Section, omega: Array) -> tuple[Array, Array, Counts]:
-        """Dynamic stiffness at the ends (N m/rad) and modes with both ends held."""
-        s = 1j * omega
-        spring = section.inertia == 0.0
-        if self.model == "wave" or spring:
-            line = continuous_line(section, s)
-            angle = np.asarray(omega * (0.0 if spring else section.travel_time))
-            most = 0 if spring else 10**9
-        else:
-            line = element_line(section, s, self.mass)
-            between, total = element_stiffness(section, s, self.mass)
-            sine = np.sqrt(np.clip((total / (2.0 * between)).real, 0.0, 1.0))
-            angle = 2.0 * section.elements * np.arcsin(sine)
-            most = section.elements - 1
-        compliance = line.shunt / s
-        compliance = np.where(compliance == 0.0, 1e-300, compliance)
-        own = ((1.0 + line.decay**2) / compliance).real
-        across = (-2.0 * line.decay / compliance).real
-        return own, across, np.minimum(np.floor(angle / np.pi).astype(np.int64), most)
+        From the top down the dynamic stiffness S that everything above a point has (N m/rad),
+        and how often it has passed through infinity on the way.
+        """
+        above = HELD if self.top_held else -(omega**2) * self.top_inertia
+        stiffness = np.broadcast_to(np.asarray(above, dtype=float), omega.shape)
+        passed = np.zeros(len(omega), dtype=np.int64)
+        for section in self.sections:
+            stiffness, more = self._through(section, omega, stiffness)
+            passed += more
+            stiffness = stiffness - omega**2 * section.end_inertia
+        if self.bit_held:
+            return passed
+        return passed + (stiffness - omega**2 * self.bit_inertia < 0.0)
+
+    def _through(self, section: Section, omega: Array, above: Array) -> tuple[Array, Counts]:
+        """Stiffness below a section from that above it, and its passages through infinity."""
+        if section.inertia == 0.0:
+            spring = np.full(len(omega), section.stiffness)
+            return _across(spring, spring, above)
+        if self.model == "wave":
+            return _travelled(omega * section.impedance, omega * section.travel_time, above)
+        n = section.elements
+        between, total = element_stiffness(section, 1j * omega, self.mass)
+        square = (total / (2.0 * between)).real  # of the sine of half an element's phase
+        half = np.arcsin(np.sqrt(np.minimum(square, 1.0)))
+        scale = np.maximum(-between.real * np.sin(2.0 * half), TINY)
+        stiffness, passed = _travelled(scale, 2.0 * n * half, above)
+        beyond = np.flatnonzero(square >= 1.0)  # above the cut-off of a chain nothing travels
+        fast = 2.0 * np.arccosh(np.sqrt(square[beyond]))
+        scale = np.maximum(-between.real[beyond] * np.sinh(fast), TINY)
+        grown = np.clip(n * fast, 1e-12, 300.0)
+        own, link = -scale / np.tanh(grown), scale / np.sinh(grown)
+        stiffness[beyond], once = _across(own, link, above[beyond])
+        passed[beyond] = n - 1 + once
+        return stiffness, passed
 
 
-def _not_zero(value: Array) -> Array:
-    """A pivot that is exactly zero, moved by less than its rounding."""
-    return cast(Array, np.where(value == 0.0, 1e-300, value))
+def _travelled(scale: Array, phase: Array, above: Array) -> tuple[Array, Counts]:
+    """Behind a line S = scale tan(angle), and on the way the angle falls by the phase."""
+    angle = np.arctan2(above, scale) - phase
+    turns = np.rint(angle / np.pi)
+    return scale * np.tan(angle - np.pi * turns), -turns.astype(np.int64)
+
+
+def _across(own: Array, link: Array, above: Array) -> tuple[Array, Counts]:
+    """Behind a section with stiffness [[own, -link], [-link, own]] in which nothing travels."""
+    pivot = above + own
+    pivot = np.where(pivot == 0.0, TINY, pivot)
+    return own - link * (link / pivot), (pivot < 0.0).astype(np.int64)

@@ -125,5 +125,5 @@ def telling_grid(ends: Ends) -> Array:
     marks = np.append(marks[apart], 3.0 * marks[-1])
     share = 0.5 * (1.0 - np.cos(np.pi * (np.arange(BETWEEN) + 0.5) / BETWEEN))
     inner = (marks[:-1, None] + np.diff(marks)[:, None] * share).ravel()
-    slow = np.geomspace(1e-5 * marks[0], marks[0], 150, endpoint=False)
+    slow = np.geomspace(1e-10 * marks[0], marks[0], 300, endpoint=False)
     return np.unique(np.concatenate([slow, inner]))

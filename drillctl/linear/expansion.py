@@ -55,21 +55,21 @@ class Expansion:
     ) -> EndMobility:
         """Response to torques on the two ends; see `transmission.Lines.mobility`."""
         s = np.asarray(s, dtype=complex)
-        free = self._free(s)  # speeds of nodes 0, 1 and last per torque on first and last
-        close = np.zeros((*s.shape, 2, 2), dtype=complex)
-        close[..., 0, 0] = self.parts.top_damping + top
-        close[..., 1, 1] = self.parts.bit_damping + bit
-        ends = free[..., [0, 2], :]
-        shut = np.linalg.inv(np.eye(2) + close @ ends)
-        closed = free @ shut
+        free, determinant = self._free(s)
+        up, down = self.parts.top_damping + top, self.parts.bit_damping + bit
+        own_top, own_bit, across = free[..., 0, 0], free[..., 2, 1], free[..., 2, 0]
+        closed = 1.0 / (1.0 + up * own_top + down * own_bit + up * down * determinant)
+        # The node under the drive: what the two ends leave of a torque on either of them.
+        below_top = free[..., 1, 0] * (1.0 + down * own_bit) - free[..., 1, 1] * down * across
+        below_bit = free[..., 1, 1] * (1.0 + up * own_top) - free[..., 1, 0] * up * across
         first = self.string.element_stiffness[0] + s * self.string.element_damping[0]
-        pipe = (first / s)[..., None] * (closed[..., 0, :] - closed[..., 1, :])
+        top_mobility = (own_top + down * determinant) * closed
         return EndMobility(
-            top=closed[..., 0, 0],
-            bit=closed[..., 2, 1],
-            transfer=closed[..., 2, 0],
-            pipe_from_top=pipe[..., 0],
-            pipe_from_bit=pipe[..., 1],
+            top=top_mobility,
+            bit=(own_bit + up * determinant) * closed,
+            transfer=across * closed,
+            pipe_from_top=first / s * (top_mobility - below_top * closed),
+            pipe_from_bit=first / s * (across - below_bit) * closed,
         )
 
     def bit_impedance(self, s: ComplexArray, top: ComplexArray | complex = 0.0) -> ComplexArray:
@@ -80,22 +80,34 @@ class Expansion:
         """Torque per speed at the top (N m s/rad), with `bit` added at the rock."""
         return 1.0 / self.mobility(s, bit=bit).top
 
-    def _free(self, s: ComplexArray) -> ComplexArray:
-        """Speeds per torque without anything at the ends, shape (..., 3, 2)."""
+    def _free(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Speeds of nodes 0, 1 and last per torque on first and last, with both ends free.
+
+        Shape (..., 3, 2); and the determinant of what the ends feel of each other.
+        """
         frequency, shapes = self.string.undamped_modes
         seen, driven = shapes[[0, 1, -1]], shapes[[0, -1]]
         damping = self._internal_damping
         off = damping - np.diag(np.diagonal(damping))
         flat = s.ravel()
         if np.abs(off).max() <= DIAGONAL * np.abs(damping).max():
-            each = flat[:, None] / (flat[:, None] ** 2 + flat[:, None] * np.diagonal(damping)
-                                    + frequency**2)  # fmt: skip
-            found = np.einsum("am,fm,bm->fab", seen, each, driven, optimize=True)
+            # The rigid body apart: of slow motion it is nearly all, and the determinant lives
+            # on the rest.
+            rigid = 1.0 / (flat + damping[0, 0])
+            column = flat[:, None]
+            each = column / (column**2 + column * np.diagonal(damping)[1:] + frequency[1:] ** 2)
+            elastic = np.einsum("am,fm,bm->fab", seen[:, 1:], each, driven[:, 1:], optimize=True)
+            found = elastic + rigid[:, None, None] * np.outer(seen[:, 0], driven[:, 0])
+            t, b = driven[:, 0]
+            ends = elastic[:, [0, 2]]
+            mixed = t * t * ends[:, 1, 1] + b * b * ends[:, 0, 0] - 2.0 * t * b * ends[:, 1, 0]
+            determinant = rigid * mixed + np.linalg.det(ends)
         else:
             found = np.concatenate(
                 [self._solved(flat[i : i + CHUNK]) for i in range(0, len(flat), CHUNK)]
             )
-        return np.asarray(found).reshape(*s.shape, 3, 2)
+            determinant = np.linalg.det(found[:, [0, 2]])
+        return np.asarray(found).reshape(*s.shape, 3, 2), np.reshape(determinant, s.shape)
 
     def _solved(self, s: ComplexArray) -> ComplexArray:
         frequency, shapes = self.string.undamped_modes

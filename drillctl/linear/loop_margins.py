@@ -31,6 +31,8 @@ CLUSTER = np.geomspace(0.03, 1e7, 90)
 """Distances from a pole at which a response is looked at, over that of the pole from the axis."""
 COARSE = np.geomspace(0.1, 1e6, 29)
 """The same where many loops are looked at."""
+SLOWEST = 1e-3
+"""Lowest frequency looked at, over the magnitude of the smallest pole."""
 NEAREST = 1e-13
 """Least distance from the axis that a pole is taken to have, over its frequency."""
 
@@ -124,6 +126,8 @@ def pole_grid(ends: Ends, poles: ComplexArray) -> Array:
         Increasing, the first more than zero.
     """
     base = telling_grid(ends)
+    size = np.abs(poles[np.isfinite(poles) & (poles != 0.0)])
+    base = base[base > SLOWEST * size.min()]
     return np.unique(np.concatenate([base, _around(poles, CLUSTER, base)]))
 
 
@@ -206,7 +210,8 @@ def peak_sensitivities(
         string = ends.top_impedance(1j * omega, -slope + 0j)
         return np.asarray(-np.abs(string / (string + kp - 1j * ki / omega)))
 
-    between = telling_grid(ends)[::4]
+    between = telling_grid(ends)
+    between = between[between > SLOWEST * np.nanmin(np.abs(poles))][::4]
     bracket = np.empty((3, len(kp)))
     for i in range(len(kp)):
         grid = np.unique(np.concatenate([between, _around(poles[i], COARSE, between)]))

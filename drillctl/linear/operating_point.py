@@ -14,7 +14,7 @@ from drillctl.errors import InputError
 Array = NDArray[np.float64]
 
 FASTEST = 1e4
-"""Highest speed that is looked at, over the set speed."""
+"""Highest speed that is looked at (rad/s)."""
 SCAN = 4000
 """Speeds at which the balance is looked at before its zeros are located."""
 
@@ -39,12 +39,13 @@ class OperatingPoint:
 
 
 def operating_point(design: Design) -> OperatingPoint:
-    """The steady state nearest to the set speed.
+    """The steady state that a rig drills at.
 
     Parameters
     ----------
     design : Design
-        With integral action that is the set speed itself.
+        With integral action that is the set speed itself; with proportional action alone the
+        steady state nearest to it; at constant torque the fastest.
 
     Raises
     ------
@@ -56,6 +57,8 @@ def operating_point(design: Design) -> OperatingPoint:
         raise InputError(
             "no speed at which the torque of the drive equals that of rock and drag", "controller"
         )
+    if not any(design.top_drive.gains()):  # no set speed to be near to
+        return found[-1]
     return min(found, key=lambda point: abs(point.speed - design.speed))
 
 
@@ -71,15 +74,41 @@ def equilibria(design: Design) -> tuple[OperatingPoint, ...]:
     _, ki = design.top_drive.gains()
     if ki != 0.0:
         return (at_speed(design, design.speed),)
-    speeds = design.speed * np.concatenate(
-        [np.geomspace(1e-6, 0.01, SCAN // 4), np.linspace(0.01, 10.0, SCAN)[1:],
-         np.geomspace(10.0, FASTEST, SCAN // 4)[1:]]
-    )  # fmt: skip
-    signs = _surplus(design, speeds) > 0.0
-    return tuple(
-        at_speed(design, _zero(design, float(speeds[i]), float(speeds[i + 1])))
-        for i in np.flatnonzero(signs[1:] != signs[:-1])
-    )
+    speeds = _speeds(design)
+    surplus = _surplus(design, speeds)
+    signs = surplus > 0.0
+    changes = np.flatnonzero(signs[1:] != signs[:-1])
+    brackets = [(float(speeds[i]), float(speeds[i + 1])) for i in changes]
+    brackets += _folds(design, speeds, surplus)
+    return tuple(at_speed(design, speed) for speed in sorted(_zero(design, *b) for b in brackets))
+
+
+def _speeds(design: Design) -> Array:
+    """Speeds to look at (rad/s): decades from next to rest, and evenly about the set speed."""
+    decades = np.geomspace(1e-6, FASTEST, SCAN)
+    about = design.speed * np.linspace(0.0, 3.0, SCAN)[1:]
+    return np.unique(np.concatenate([decades, about]))
+
+
+def _folds(design: Design, speeds: Array, surplus: Array) -> list[tuple[float, float]]:
+    """Brackets of pairs of steady states so close that no two of the speeds part them."""
+    from scipy.optimize import minimize_scalar
+
+    found = []
+    low, middle, high = surplus[:-2], surplus[1:-1], surplus[2:]
+    for sign in (1.0, -1.0):
+        near = (sign * middle < 0.0) & (sign * middle > sign * low) & (sign * middle >= sign * high)
+        for i in np.flatnonzero(near):
+            begin, end = float(speeds[i]), float(speeds[i + 2])
+
+            def depth(speed: float, sign: float = sign) -> float:
+                return -sign * float(_surplus(design, speed))
+
+            top = minimize_scalar(depth, bounds=(begin, end), method="bounded",
+                                  options={"xatol": 1e-12 * end})  # fmt: skip
+            if top.fun < 0.0:
+                found += [(begin, float(top.x)), (float(top.x), end)]
+    return found
 
 
 def at_speed(design: Design, speed: float) -> OperatingPoint:

@@ -15,12 +15,14 @@ elements and for the continuum.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, telling_grid
 
 Array = NDArray[np.float64]
@@ -28,8 +30,9 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 CHUNK = 256
 """Gain pairs looked at together: their signs on the grid fit the second-level cache."""
-CANDIDATES = 3
-"""Crossings of a gain pair that are refined in a map: those that look lowest on the grid."""
+CANDIDATES = 5
+"""Crossings of a gain pair that are refined in a map: those that look lowest on the grid, and
+the one of lowest frequency."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,20 +84,28 @@ def crossings(ends: Ends, kp: float, ki: float) -> Crossings:
         zero.
     """
     search = _Search(ends)
-    gains = np.array([[kp, ki]])
+    gains = np.array([[kp, ki]], dtype=float)
+    refuse_gains(gains)
     _, place = search.brackets(gains)
     omega = search.refined(place, np.broadcast_to(gains[0], (len(place), 2)))
     slope = np.asarray(search.impedance(omega, kp, ki).real, dtype=float)
     if ki == 0.0:
         slope, omega = np.append(slope, kp + search.rigid), np.append(omega, 0.0)
     slope = np.maximum(slope, 0.0)
+    if kp == 0.0 and not search.lossy:  # exactly, not to rounding
+        slope[:] = 0.0
     order = np.lexsort([omega, slope])
     return Crossings(slope[order], omega[order])
 
 
 def slope_margin(ends: Ends, kp: float, ki: float) -> tuple[float, float]:
-    """D* (N m s/rad) and the angular frequency that decides (rad/s); see `crossings`."""
+    """D* (N m s/rad) and the angular frequency that decides (rad/s); see `crossings`.
+
+    A loop that tolerates any slope has an infinite D*, at no frequency (NaN).
+    """
     found = crossings(ends, kp, ki)
+    if len(found.slope) == 0:
+        return math.inf, math.nan
     return float(found.slope[0]), float(found.omega[0])
 
 
@@ -117,6 +128,7 @@ def slope_margins(ends: Ends, kp: ArrayLike, ki: ArrayLike) -> SlopeMargins:
     """
     kp, ki = np.broadcast_arrays(np.asarray(kp, dtype=float), np.asarray(ki, dtype=float))
     gains = np.column_stack([kp.ravel(), ki.ravel()])
+    refuse_gains(gains)
     search = _Search(ends)
     slope, omega = np.full(len(gains), np.inf), np.zeros(len(gains))
     for first in range(0, len(gains), CHUNK):
@@ -125,6 +137,7 @@ def slope_margins(ends: Ends, kp: ArrayLike, ki: ArrayLike) -> SlopeMargins:
         pair, place = search.lowest(part, pair, place)
         found = search.refined(place, part[pair])
         level = np.maximum(search.impedance(found, part[pair, 0], part[pair, 1]).real, 0.0)
+        level[(part[pair, 0] == 0.0) & (not search.lossy)] = 0.0
         # The last write wins: written from the highest to the lowest.
         order = np.lexsort([-found, -level])
         slope[first + pair[order]] = level[order]
@@ -133,6 +146,13 @@ def slope_margins(ends: Ends, kp: ArrayLike, ki: ArrayLike) -> SlopeMargins:
     real = at_rest < slope
     slope, omega = np.where(real, at_rest, slope), np.where(real, 0.0, omega)
     return SlopeMargins(slope.reshape(kp.shape), omega.reshape(kp.shape))
+
+
+def refuse_gains(gains: Array) -> None:
+    """Refuse (`InputError`) gains that are negative or no numbers: such a drive feeds energy."""
+    wrong = gains[~(np.isfinite(gains) & (gains >= 0.0))]
+    if wrong.size:
+        raise InputError(f"a slope margin needs gains of 0 or more, got {wrong[0]:g}", "controller")
 
 
 class _Search:
@@ -156,10 +176,11 @@ class _Search:
         self.lossy = self.rigid > 0.0 or parts.modal_damping > 0.0 or any(
             x.coupling_damping > 0.0 or x.stiffness_damping > 0.0 for x in parts.sections
         )  # fmt: skip
+        # Without inertia at the bit resonances are so sharp that the grid tells little of them.
+        self.candidates = CANDIDATES if parts.bit_inertia > 0.0 else len(self.grid)
         resistor = max(x.impedance for x in parts.sections) or np.sqrt(
             parts.sections[0].stiffness * (parts.top_inertia + parts.bit_inertia)
         )
-        self.scale = resistor
         seen = ends.mobility(s, top=resistor)
         determinant = seen.top * seen.bit - seen.transfer**2
         n0, n1 = seen.bit - resistor * determinant, determinant
@@ -203,12 +224,14 @@ class _Search:
         left, right = self._at(features, place), self._at(features, place + 1)
         share = left.imag / (left.imag - right.imag)
         resistance = left.real + np.clip(share, 0.0, 1.0) * (right.real - left.real)
-        resistance = np.where(resistance < 1e-9 * self.scale, 0.0, resistance)
         order = np.lexsort([place, resistance, pair])
         pair, place = pair[order], place[order]
-        # Without any loss all are zero to rounding; of these the lowest frequency.
         rank = np.arange(len(pair)) - np.searchsorted(pair, pair)
-        return pair[rank < CANDIDATES], place[rank < CANDIDATES]
+        # High modes of nearly one margin would crowd out the lowest crossing of all.
+        lowest = np.full(len(gains), len(self.grid))
+        np.minimum.at(lowest, pair, place)
+        kept = (rank < self.candidates) | (place == lowest[pair])
+        return pair[kept], place[kept]
 
     def _at(self, features: Array, place: NDArray[np.int64]) -> ComplexArray:
         product = np.einsum("pf,fp->p", features, self.product[:, place])

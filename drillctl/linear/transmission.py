@@ -72,7 +72,6 @@ def element_line(section: Section, s: ComplexArray, mass: Literal["consistent", 
     n = section.elements
     # cosh(G/n) - 1 = -(a + b)/b, written so that small angles keep their digits.
     half = np.arcsinh(np.sqrt(-total / (2.0 * across)))
-    half = np.where(half.real < 0.0, -half, half)
     decay = np.exp(-2.0 * n * half)
     sinh = 2.0 * np.sinh(half) * np.cosh(half)
     fall = -np.expm1(-4.0 * n * half)
@@ -98,7 +97,6 @@ def continuous_line(section: Section, s: ComplexArray) -> Line:
         return element_line(section, s, "lumped")
     spring, shunt = _spring(section, s), _shunt(section, s)
     propagation = np.sqrt(s * shunt / spring)
-    propagation = np.where(propagation.real < 0.0, -propagation, propagation)
     impedance = propagation * spring / s
     fall = -np.expm1(-2.0 * propagation)
     return Line(np.exp(-propagation), impedance * fall, fall / impedance)

@@ -1,9 +1,15 @@
 """Figures of what the other rooms compute.
 
 - `modes.py`: `mode_shapes`, angle and torque of the modes along the string.
-- `frequency.py`: `bode`, response of the speeds to the top torque.
+- `frequency.py`: `bode`, response of any signals to one other, of one system or several.
+- `mobility.py`: `mobility` at bit and top; `impedance.py`: `drive_impedance` and reflection.
+- `loop_shape.py`: `nyquist`, `nichols` and `sensitivity` of the loop at the top torque.
+- `loop_map.py`: `loop_map`, figures of the loop over two parameters; `gain_boundary`.
+- `root_locus.py`: `root_locus`, poles of the loop against a parameter.
 - `friction.py`: `friction_curves`, bit torque against bit speed at each weight on bit.
 - `map.py`: `stability_map` with regions and audit; `sweep_line` for a single parameter.
+- `limit_cycle.py`: `limit_cycle`, one period by each method.
+- `three_regions.py`: `three_regions` over the same two parameters.
 - `time_response.py`: `time_response`, speeds against time with sticks shaded.
 - `style.py`: colours, sizes and the making of figures, shared by all.
 
@@ -14,15 +20,32 @@ the rig floor: rpm, kN, kN m, m.
 
 from drillctl.plots.frequency import bode
 from drillctl.plots.friction import friction_curves
+from drillctl.plots.impedance import drive_impedance
+from drillctl.plots.limit_cycle import limit_cycle
+from drillctl.plots.loop_map import gain_boundary, loop_map
+from drillctl.plots.loop_shape import nichols, nyquist, sensitivity
 from drillctl.plots.map import stability_map, sweep_line
+from drillctl.plots.mobility import mobility
 from drillctl.plots.modes import mode_shapes
+from drillctl.plots.root_locus import root_locus
+from drillctl.plots.three_regions import three_regions
 from drillctl.plots.time_response import time_response
 
 __all__ = [
     "bode",
+    "drive_impedance",
     "friction_curves",
+    "gain_boundary",
+    "limit_cycle",
+    "loop_map",
+    "mobility",
     "mode_shapes",
+    "nichols",
+    "nyquist",
+    "root_locus",
+    "sensitivity",
     "stability_map",
     "sweep_line",
+    "three_regions",
     "time_response",
 ]

@@ -2,7 +2,10 @@
 
 - `grid.py`: axes over a design's parameters, and the lanes they stand for.
 - `sweeps.py`: measures over a grid; the J1 map is one case.
+- `loop_maps.py`: figures of the linear loop over a grid.
 - `regions.py`: cells and outlines at or under a level.
+- `three_regions.py`: locally stable, J1 under a level, attracted: three regions of one map.
+- `attraction.py`: operating points and long runs of its cells.
 - `audit.py`: cells of a map simulated again with the reference solver.
 - `responses.py`, `tables.py`: time responses at cells of a map; maps as CSV.
 - `blocks.py`: finished blocks of a long run.
@@ -10,18 +13,25 @@
 """
 
 from drillctl.studies.grid import Axis
+from drillctl.studies.loop_maps import LoopMap, loop_map
 from drillctl.studies.regions import Region, region
 from drillctl.studies.responses import responses
 from drillctl.studies.sweeps import Sweep, stability_map, sweep
-from drillctl.studies.tables import write_tables
+from drillctl.studies.tables import write_loop_table, write_tables
+from drillctl.studies.three_regions import ThreeRegions, three_regions
 
 __all__ = [
     "Axis",
+    "LoopMap",
     "Region",
     "Sweep",
+    "ThreeRegions",
+    "loop_map",
     "region",
     "responses",
     "stability_map",
     "sweep",
+    "three_regions",
+    "write_loop_table",
     "write_tables",
 ]

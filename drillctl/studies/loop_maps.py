@@ -232,11 +232,12 @@ def slopes(design: Design, axes: tuple[Axis, ...], group: Group) -> Array:
     """
     lanes = group.lanes
     _, ki = lanes.drive.gains()
-    if np.all(np.asarray(ki) != 0.0):
-        weight = lanes.weight.weight(lanes.set_speed)
-        _, slope = lanes.friction.torque_and_slope(weight, lanes.set_speed, np.exp)
-        return -np.asarray(slope)
-    return np.array([_slope(cell_design(design, axes, int(cell))) for cell in group.cells])
+    weight = lanes.weight.weight(lanes.set_speed)
+    _, rise = lanes.friction.torque_and_slope(weight, lanes.set_speed, np.exp)
+    slope = -np.asarray(rise)
+    for lane in np.flatnonzero(np.broadcast_to(np.asarray(ki) == 0.0, slope.shape)):
+        slope[lane] = _slope(cell_design(design, axes, int(group.cells[lane])))
+    return slope
 
 
 def _slope(design: Design) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.measures import STATUSES
+from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.sweeps import Sweep
 
 
@@ -38,3 +39,22 @@ def write_tables(result: Sweep, folder: Path) -> None:
         for level, region in result.regions.items():
             bounds = [value for path in paths for value in region.bounds.get(path, ("", ""))]
             writer.writerow([level, region.cells, region.area_fraction, *bounds])
+
+
+def write_loop_table(result: LoopMap, folder: Path) -> None:
+    """Write `loop-map.csv`, a row a cell; SI units, empty where a figure is undefined.
+
+    Parameters
+    ----------
+    result : LoopMap
+        What was computed.
+    folder : Path
+        Where to.
+    """
+    with (folder / "loop-map.csv").open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow([*(axis.path for axis in result.axes), *result.values])
+        columns = [values.ravel() for values in result.values.values()]
+        points = itertools.product(*(axis.values for axis in result.axes))
+        for point, *row in zip(points, *columns, strict=True):
+            writer.writerow([*map(float, point), *("" if v != v else repr(float(v)) for v in row)])

@@ -141,6 +141,57 @@ def test_modes_json(call):
     assert drillctl.open(folder).summary() == found
 
 
+def test_loop_json(call):
+    code, out, _ = call("loop", DESIGN, "--json", "--set", "controller.kp=200")
+    found = parsed(out)
+    assert code == 0
+    keys = {"stable", "spectral_abscissa", "slope", "slope_margin", "deciding_frequency_hz",
+            "disk_margin", "peak_sensitivity"}  # fmt: skip
+    assert set(found) >= keys
+    assert found["stable"] is False
+    assert found["disk_margin"] is None
+    folder = Path(f"runs/{DESIGN}-loop-1")
+    held = {path.name for path in folder.iterdir()}
+    assert held >= {"model.mat", "model.npz", "loop-map.csv", "summary.json", "data.zarr"}
+    again = drillctl.open(folder).summary()
+    assert {key: found[key] for key in keys} == {key: again[key] for key in keys}
+
+
+def test_loop_with_margins(call):
+    found = parsed(call("loop", DESIGN, "--json")[1])
+    assert found["stable"] is True
+    assert found["disk_margin"]["gain_db"] == pytest.approx(0.898, abs=1e-3)
+    assert found["disk_margin"]["phase_deg"] == pytest.approx(5.911, abs=1e-3)
+    assert found["map"]["stable_cells"] == 111
+
+
+def test_loop_of_a_drive_that_cannot_turn_the_bit(call):
+    code, out, err = call("loop", BISTABLE, "--set", "controller.torque=1 kN*m")
+    assert (code, out) == (2, "")
+    assert "controller: no speed at which the torque of the drive equals" in err
+
+
+def test_cycle_json(call):
+    code, out, _ = call("cycle", BISTABLE, "--json")
+    found = parsed(out)
+    assert code == 0
+    assert found["status"] == "periodic"
+    assert found["period"] == pytest.approx(5.092533, abs=1e-6)
+    back = drillctl.open(f"runs/{BISTABLE}-cycle-1")
+    assert back.summary() == found
+    assert abs(back.orbit.multipliers[0]) == pytest.approx(0.6014, abs=1e-4)
+
+
+def test_regions_json(call):
+    axes = ["--axis", "controller.torque=9 kN*m:11 kN*m:3",
+            "--axis", "operating_point.weight_on_bit=96 kN:98.694 kN:3"]  # fmt: skip
+    code, out, _ = call("regions", BISTABLE, "--json", *axes)
+    found = parsed(out)
+    assert code == 0
+    assert found["counts"]["bistable"] > 0
+    assert drillctl.open(f"runs/{BISTABLE}-regions-1").summary() == found
+
+
 def test_overdamped_poles_are_told(call):
     found = parsed(call("modes", "navarro-lopez-4dof", "--json")[1])
     assert [e["damping_ratio"] for e in found["free_free"] if e.get("overdamped")] == [None]
@@ -228,7 +279,10 @@ def verbs_on(name):
     for axis in drillctl.load(name).tables.map.axes:
         axes += ["--axis", f"{axis.path}={axis.min}:{axis.max}:3"]
     short = ["--set", "simulation.duration=5 s"]
-    return {"modes": [], "simulate": short, "map": [*axes, *short, "--audit", "0"]}
+    verbs = {"modes": [], "loop": axes, "simulate": short}
+    verbs |= {"regions": axes, "map": [*axes, *short, "--audit", "0"]}
+    # A long run of thirty elements takes ten seconds: `cycle` has tests of its own.
+    return verbs | ({"cycle": []} if "2dof" in name else {})
 
 
 # The same rig at other weights on bit tells nothing new in a quick run.
@@ -256,7 +310,8 @@ def test_pictures_of_every_verb(call):
     for verb, options in verbs_on("wob-rpm-chart").items():
         assert call(verb, "wob-rpm-chart", *options, "--out", verb)[0] == 0
         pictures = list(Path(verb).glob("*.png"))
-        assert len(pictures) == {"modes": 3, "simulate": 1, "map": 2}[verb]
+        expected = {"modes": 3, "loop": 9, "simulate": 1, "map": 2, "regions": 1, "cycle": 1}
+        assert len(pictures) == expected[verb]
         assert all(path.stat().st_size > 3000 for path in pictures)
 
 
@@ -532,10 +587,13 @@ def test_out_with_a_foreign_run_json(call, content):
     assert Path("odd/run.json").read_text() == content
 
 
-@pytest.mark.parametrize("verb", ["modes", "simulate", "map"])
+@pytest.mark.parametrize("verb", ["modes", "simulate", "map", "loop", "cycle", "regions"])
 def test_finished_run_is_shown_again_not_computed(call, monkeypatch, verb):
     arguments = [verb, BISTABLE, *(["--audit", "0"] if verb == "map" else []), *SHORT]
     axis = ["--axis", "start.speed=1 rad/s:14 rad/s:3"] if verb == "map" else []
+    if verb in ("loop", "regions"):
+        torque = "controller.torque=8 kN*m:12 kN*m:3"
+        axis = ["--axis", "start.speed=1 rad/s:14 rad/s:3", "--axis", torque]
     arguments += [*axis, "--out", "once"]
     code, first, _ = call(*arguments)
     assert code == 0
@@ -544,7 +602,10 @@ def test_finished_run_is_shown_again_not_computed(call, monkeypatch, verb):
     def fail(*arguments, **options):
         raise AssertionError("computed again")
 
-    for place in ("linear.modes", "simulate", "studies.sweep"):
+    for place in (
+        "linear.modes", "linear.loop", "limit_cycle", "simulate", "studies.sweep",
+        "studies.three_regions",
+    ):  # fmt: skip
         monkeypatch.setattr(f"drillctl.{place}", fail, raising=False)
     code, again, err = call(*arguments)
     assert code == 0

@@ -31,7 +31,8 @@ def meet_rock(friction: Any, work: Any) -> None:
 
 @overload(meet_rock)
 def _meet_rock(friction, work):
-    if friction.instance_class.set_valued:
+    # A property of the class: it reads no number of the law.
+    if friction.instance_class.set_valued.fget(None):
         return lambda friction, work: _stick_or_slip(friction, work)
     return lambda friction, work: _creep(friction, work)
 

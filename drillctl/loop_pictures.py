@@ -1,0 +1,88 @@
+"""The pictures that `drillctl loop` writes: which responses are computed for which figure."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from drillctl.linear import (
+    LoopAnalysis,
+    drive_impedance,
+    ends_of,
+    frequency_response,
+    gain_boundary,
+    root_locus,
+    telling_frequencies,
+)
+from drillctl.linear.loop_margins import pole_grid
+from drillctl.linear.tuning import stick_slip_frequency
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from drillctl.design import Design
+    from drillctl.studies import Axis
+
+GAINS = ("controller.kp", "controller.ki")
+
+
+def over_gains(axes: tuple[Axis, ...]) -> bool:
+    """Whether a map runs over the two gains, so that the boundary can be laid over it."""
+    return tuple(axis.path for axis in axes) == GAINS
+
+
+def loop_figures(result: LoopAnalysis) -> dict[str, Figure]:
+    """Figures of a loop by the name of their file.
+
+    Parameters
+    ----------
+    result : LoopAnalysis
+        Of one design.
+
+    Returns
+    -------
+    dict
+        Mobility at bit and top, of the elements and of the continuum; with a speed controller
+        Bode plot from the set speed, Nyquist, Nichols, sensitivities, root locus and boundary
+        in the plane of the gains; on a distributed string impedance and reflection of the drive.
+    """
+    from drillctl import plots
+
+    design, slope = result.design, result.operating_point.slope
+    frequencies = telling_frequencies(design.string)
+    models = ["finite-elements"]
+    if design.string.parts.modal_damping == 0.0:
+        models.append("wave")
+    strings = [frequency_response(design, frequencies, model=m) for m in models]  # type: ignore[arg-type]
+    closed = frequency_response(design, frequencies, "closed_loop")
+    figures = {"mobility": plots.mobility([*strings, closed])}
+    if any(design.top_drive.gains()):
+        drilling = frequency_response(design, frequencies, "closed_loop", slope=slope)
+        figures["closed-loop"] = plots.bode(drilling)
+        grid = pole_grid(ends_of(design.string), result.poles) / (2.0 * math.pi)
+        cut = frequency_response(design, grid, "open_loop", slope=slope)
+        figures |= {
+            "nyquist": plots.nyquist(cut, analysis=result),
+            "nichols": plots.nichols(cut, analysis=result),
+            "sensitivity": plots.sensitivity(cut, analysis=result),
+        }
+        figures |= _over_gains(design, slope)
+    first = design.string.parts.sections[0]
+    if first.inertia > 0.0:
+        mark = stick_slip_frequency(design.string) / (2.0 * math.pi)
+        figures["impedance"] = plots.drive_impedance(drive_impedance(design), marks=(mark,))
+    return figures
+
+
+def _over_gains(design: Design, slope: float) -> dict[str, Figure]:
+    """Root locus over the proportional gain and the boundary of the stable gains."""
+    from drillctl import plots
+
+    kp, _ = design.top_drive.gains()
+    locus = root_locus(design, GAINS[0], np.linspace(0.25, 2.0, 141) * (kp or 500.0))
+    return {
+        "root-locus": plots.root_locus(locus),
+        "boundary": plots.gain_boundary(gain_boundary(design, slope=slope)),
+    }

@@ -1,0 +1,170 @@
+"""Poles of the loop in the complex plane as one parameter changes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.errors import InputError
+from drillctl.linear.root_loci import RootLocus
+from drillctl.plots import style
+from drillctl.plots.loop_map import colours, named_values
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+LINE_APART = 0.035
+"""Least distance between two lines of text, over the height of the window."""
+TELLING = 0.02
+"""A track is looked at if it goes this far from the imaginary axis, over the farthest."""
+
+
+def root_locus(result: RootLocus, ax: Axes | None = None, system: units.System = "si") -> Figure:
+    """Draw the tracks of the poles, upper half of the plane.
+
+    Parameters
+    ----------
+    result : RootLocus
+        From `drillctl.linear.root_locus`.
+    ax : Axes, optional
+        Axes to draw on.
+    system : {'si', 'field'}
+        Units of the parameter.
+
+    Returns
+    -------
+    Figure
+        Real part in 1/s, frequency in Hz. Tracks that hug the imaginary axis, high modes of
+        an undamped string, are left out of the window and counted below it. Poles right of
+        the axis grow; numbers beside it are the parameter's values where a track crosses.
+
+    Raises
+    ------
+    InputError
+        No poles to draw.
+    """
+    tracks = mirrored(result.poles)
+    if not np.isfinite(tracks.real).any():
+        raise InputError("no poles to draw")
+    values, label = named_values(result.path, result.unit, result.values, system)
+    figure, ax = style.axes_or_new(ax, 7.5, 6.0)
+    norm = Normalize(float(np.min(values)), float(np.max(values)))
+    lines = [_track(ax, column, values, norm) for column in tracks.T]
+    _ends(ax, tracks)
+    bar = figure.colorbar(lines[0], ax=ax, pad=0.02)
+    bar.set_label(label, fontsize=style.LABEL)
+    bar.ax.tick_params(labelsize=style.SMALL)
+    left, right, top = _window(tracks)
+    ax.axvspan(0.0, max(right, 0.0), color="#F2F2F2", zorder=0)
+    ax.axvline(0.0, color=style.BLACK, linewidth=1.2)
+    ax.set_xlim(left, right)
+    ax.set_ylim(-0.02 * top, top)
+    title = result.design.tables.title or result.design.name
+    style.dress(ax, "real part (1/s), growing to the right", "frequency (Hz)", title)
+    _crossings(ax, tracks, values, top)
+    ax.legend(
+        loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3, fontsize=style.SMALL, frameon=False
+    )
+    figure.supxlabel(_left_out(tracks, left, right, top), fontsize=style.SMALL)
+    return figure
+
+
+def mirrored(poles: ComplexArray) -> ComplexArray:
+    """Tracks in the upper half plane, each pair once.
+
+    Parameters
+    ----------
+    poles : ndarray of complex, shape (values, tracks)
+        Poles (1/s).
+
+    Returns
+    -------
+    ndarray of complex, shape (values, tracks or fewer)
+        Poles of the lower half mirrored; of two tracks that then are one, the first.
+    """
+    folded = poles.real + 1j * np.abs(poles.imag)
+    kept: list[ComplexArray] = []
+    for track in folded.T:
+        if not any(np.allclose(track, k, rtol=1e-7, atol=1e-9, equal_nan=True) for k in kept):
+            kept.append(track)
+    return np.stack(kept, axis=1)
+
+
+def _track(ax: Axes, poles: ComplexArray, values: Array, norm: Normalize) -> LineCollection:
+    points = np.column_stack([poles.real, poles.imag / (2.0 * np.pi)])
+    pieces = np.stack([points[:-1], points[1:]], axis=1)
+    lines = LineCollection(
+        list(pieces), cmap=colours(0.0, 0.88), norm=norm, linewidths=2.2, zorder=3
+    )
+    lines.set_array(0.5 * (values[:-1] + values[1:]))
+    ax.add_collection(lines)
+    return lines
+
+
+def _ends(ax: Axes, tracks: ComplexArray) -> None:
+    for row, marker, face, label in (
+        (0, "o", "white", "first value"), (-1, "s", style.BLACK, "last value"),
+    ):  # fmt: skip
+        ax.plot(
+            tracks[row].real, tracks[row].imag / (2.0 * np.pi), marker, markersize=6,
+            markerfacecolor=face, markeredgecolor=style.BLACK, linestyle="none", label=label,
+            zorder=4,
+        )  # fmt: skip
+
+
+def _crossings(ax: Axes, tracks: ComplexArray, values: Array, top: float) -> None:
+    """The parameter's value where a track in the window crosses the imaginary axis."""
+    written = -np.inf
+    for frequency, value in sorted(_crossed(tracks, values)):
+        if frequency > top:
+            break
+        written = max(frequency, written + LINE_APART * top)  # close ones are not overwritten
+        ax.plot(0.0, frequency, "_", color=style.BLACK, markersize=10, zorder=5)
+        ax.annotate(
+            f"{value:.4g}", (0.0, written), xytext=(7, 3), textcoords="offset points",
+            fontsize=style.SMALL, zorder=6,
+        )  # fmt: skip
+
+
+def _crossed(tracks: ComplexArray, values: Array) -> list[tuple[float, float]]:
+    """Frequency (Hz) and value of the parameter of each crossing, linear between values."""
+    found: dict[str, tuple[float, float]] = {}  # two tracks that part later cross as one
+    for track in tracks.T:
+        for i in np.flatnonzero(track.real[:-1] * track.real[1:] < 0.0):
+            share = track.real[i] / (track.real[i] - track.real[i + 1])
+            omega = track.imag[i] + share * (track.imag[i + 1] - track.imag[i])
+            value = values[i] + share * (values[i + 1] - values[i])
+            found[f"{omega:.6g} {value:.6g}"] = (float(omega) / (2.0 * np.pi), float(value))
+    return list(found.values())
+
+
+def _window(tracks: ComplexArray) -> tuple[float, float, float]:
+    """Lowest and highest real part (1/s) and highest frequency (Hz) of the tracks that tell."""
+    turning = np.where(tracks.imag > 0.0, tracks, np.nan)
+    if not np.isfinite(turning).any():
+        turning = tracks
+    with np.errstate(invalid="ignore"):
+        reach = np.nanmax(np.abs(np.nan_to_num(turning.real)), axis=0)
+    told = turning[:, reach >= TELLING * reach.max()]
+    left, right = float(np.nanmin(told.real)), max(float(np.nanmax(told.real)), 0.0)
+    room = 0.08 * max(right - left, 1e-12)
+    top = float(np.nanmax(told.imag)) / (2.0 * np.pi)
+    return left - room, right + max(room, 0.05 * (right - left)), 1.08 * top or 1.0
+
+
+def _left_out(tracks: ComplexArray, left: float, right: float, top: float) -> str:
+    frequency = tracks.imag / (2.0 * np.pi)
+    seen = (tracks.real >= left) & (tracks.real <= right) & (frequency <= top)
+    hidden = np.isfinite(tracks.real).any(axis=0) & ~seen.any(axis=0)
+    if not hidden.any():
+        return ""
+    noun = "track" if hidden.sum() == 1 else "tracks"
+    far = float(np.nanmax(frequency[:, hidden]))
+    return f"{int(hidden.sum())} more {noun} outside the window, up to {far:.3g} Hz"

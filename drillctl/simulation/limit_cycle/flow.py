@@ -1,0 +1,264 @@
+r"""Motion of the string through slip and stick, and what a small change of its start becomes.
+
+Within a phase the monodromy matrix obeys the linearised equations; it is integrated together
+with the state. At a change of phase a neighbour changes a little sooner or later, so that it
+jumps by the saltation matrix
+
+.. math:: S = I + \frac{(f_2 - f_1)\, n^T}{n^T f_1}
+
+with the rates before and after, and n the gradient of what ends the phase. Sticking loses one
+direction, the bit's own, for good.
+
+Where the drive does not act on the angle, nothing does: all angles may turn together. The
+motion is then told by the twists of the elements instead of the angles of the nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.errors import SimulationError
+from drillctl.simulation.reference import System, ending, integrate
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-10
+"""Relative and absolute tolerance of the integrator (rad, rad/s)."""
+MOST_PHASES = 2000
+"""Give up beyond this many phases within one flight."""
+SPEED_STEP = 1e-5
+"""Step (rad/s) of the difference that gives the rock's slope, weight law included."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """One phase of a flight.
+
+    Attributes
+    ----------
+    begin, end : float
+        Times (s).
+    direction : int
+        +1 or -1 in slip; 0 in stick.
+    solution : callable or None
+        Time (s), shape (n,), to angles and speeds in the frame, shape (2 nodes, n), where asked
+        for.
+    extremes : ndarray
+        Times at which the bit speed has an extreme (s).
+    """
+
+    begin: float
+    end: float
+    direction: int
+    solution: Callable[[Any], Array] | None
+    extremes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """Where a motion has come to.
+
+    Attributes
+    ----------
+    point : ndarray, shape (coordinates,)
+        At the end.
+    rates : ndarray, shape (coordinates,)
+        Its rate of change there (1/s).
+    matrix : ndarray, shape (coordinates, coordinates) or None
+        Change of the end per change of the start, where asked for.
+    legs : tuple of Leg
+        The phases on the way.
+    """
+
+    point: Array
+    rates: Array
+    matrix: Array | None
+    legs: tuple[Leg, ...]
+
+
+class Flow:
+    """The motion of one design as a map of its coordinates.
+
+    A point is [angles, speeds] in the frame (rad, rad/s), 2 nodes numbers; or [twists, speeds],
+    one less, where the drive does not act on the angle.
+    """
+
+    def __init__(self, design: Design, tolerance: float = TOLERANCE) -> None:
+        self.system = System(design)
+        self.tolerance = tolerance
+        self.nodes = design.string.nodes
+        kp, ki = (float(gain) for gain in design.top_drive.gains())
+        self.told, self.lifted = _coordinates(self.nodes, free=ki == 0.0)
+        drive = np.zeros(2 * self.nodes)
+        drive[0], drive[self.nodes] = -ki, -kp
+        self.slip_jacobian = _jacobian(self.system.slip.first_order, drive)
+        self.stick_jacobian = _jacobian(self.system.stick.first_order, drive)
+        self.holding = self.system.reaction.motion + self.system.reaction.top * drive
+
+    def point(self, state: Array) -> Array:
+        """Coordinates of angles and speeds; anything behind these is left out."""
+        return np.asarray(self.told @ state[: 2 * self.nodes])
+
+    def state(self, point: Array) -> Array:
+        """Angles and speeds; the top drive is at angle zero where no angle matters."""
+        return np.asarray(self.lifted @ point)
+
+    def rates(self, state: Array, direction: int) -> Array:
+        """Rates of angles and speeds in a phase."""
+        system = self.system
+        phase = system.slip if direction else system.stick
+        rock = system.slip_torque(state, direction) if direction else 0.0
+        inputs = np.concatenate([state, [system.top_torque(state), rock, 1.0]])
+        return np.asarray(phase.first_order @ inputs)
+
+    def tangents(self, state: Array, matrix: Array, direction: int) -> Array:
+        """Rates of neighbours, one a column."""
+        if direction == 0:
+            return np.asarray(self.stick_jacobian @ matrix)
+        grown = self.slip_jacobian @ matrix
+        grown[self.nodes :] -= np.outer(
+            self.system.slip.bit * self._rock_slope(state, direction), matrix[-1]
+        )
+        return np.asarray(grown)
+
+    def follow(
+        self, point: Array, duration: float, matrix: bool = True, dense: bool = False
+    ) -> Flight:
+        """Follow a motion for a given time.
+
+        Parameters
+        ----------
+        point : ndarray, shape (coordinates,)
+            Where it starts.
+        duration : float
+            For how long (s).
+        matrix : bool
+            Whether neighbours are followed too.
+        dense : bool
+            Whether the legs keep their solutions.
+
+        Raises
+        ------
+        SimulationError
+            The integrator failed, a change of phase is met at a tangent, or there is no end
+            of them.
+        """
+        state = self.state(point)
+        near = self.lifted.copy() if matrix else None
+        direction, time = self.system.direction_at(state), 0.0
+        legs: list[Leg] = []
+        while True:
+            leg, state, near = self._leg(time, duration, direction, state, near, dense)
+            legs.append(leg)
+            time = leg.end
+            if time >= duration:
+                break
+            if len(legs) >= MOST_PHASES:
+                raise SimulationError(f"{MOST_PHASES} changes of phase by {time:g} s: chattering")
+            after = self.system.next_direction(direction, state)
+            if near is not None:
+                near = self._salted(state, near, direction, after)
+            direction = after
+        rates = self.told @ self.rates(state, direction)
+        ended = None if near is None else self.told @ near
+        return Flight(self.told @ state, rates, ended, tuple(legs))
+
+    def _leg(
+        self,
+        begin: float,
+        end: float,
+        direction: int,
+        state: Array,
+        near: Array | None,
+        dense: bool,
+    ) -> tuple[Leg, Array, Array | None]:
+        size = 2 * self.nodes
+
+        def rates(time: float, both: Array) -> Array:
+            own = self.rates(both[:size], direction)
+            if near is None:
+                return own
+            grown = self.tangents(both[:size], both[size:].reshape(near.shape), direction)
+            return np.concatenate([own, grown.ravel()])
+
+        both = state if near is None else np.concatenate([state, near.ravel()])
+        result = integrate(
+            rates,
+            (begin, end),
+            both,
+            method="DOP853",
+            rtol=self.tolerance,
+            atol=self.tolerance,
+            events=self._events(direction),
+            dense_output=dense,
+        )
+        if result.status < 0 or not np.isfinite(result.y[:, -1]).all():
+            raise SimulationError(f"the integrator failed at {result.t[-1]:g} s: {result.message}")
+        final = result.y[:size, -1].copy()
+        if result.status == 1:  # at rest exactly, not to the locator's rounding
+            final[-1] = -self.system.set_speed
+        extremes = np.asarray(result.t_events[1]) if direction else np.zeros(0)
+        leg = Leg(begin, float(result.t[-1]), direction, result.sol, extremes)
+        return leg, final, None if near is None else result.y[size:, -1].reshape(near.shape)
+
+    def _events(self, direction: int) -> list[Any]:
+        system, size = self.system, 2 * self.nodes
+        limit = system.static_torque()
+
+        def comes_to_rest(time: float, both: Array) -> float:
+            # Exactly zero is the release itself, in a step too short to move the bit.
+            return direction * system.bit_speed(both[:size]) or 1e-300
+
+        def breaks_loose(time: float, both: Array) -> float:
+            return limit - abs(system.holding_torque(both[:size]))
+
+        def extreme(time: float, both: Array) -> float:
+            return float(self.rates(both[:size], direction)[-1])
+
+        return [ending(comes_to_rest), extreme] if direction else [ending(breaks_loose)]
+
+    def _salted(self, state: Array, near: Array, before: int, after: int) -> Array:
+        """Neighbours after a change of phase."""
+        normal = self.holding
+        if before != 0:
+            normal = np.zeros(2 * self.nodes)
+            normal[-1] = 1.0
+        first, second = self.rates(state, before), self.rates(state, after)
+        approach = float(normal @ first)
+        if approach == 0.0:
+            raise SimulationError("a change of phase at a tangent: neighbours do not change alike")
+        return near + np.outer(second - first, normal @ near) / approach
+
+    def _rock_slope(self, state: Array, direction: int) -> float:
+        """Slope of the bit torque against bit speed (N m s/rad)."""
+        ahead, behind = state.copy(), state.copy()
+        ahead[-1] += SPEED_STEP
+        behind[-1] -= SPEED_STEP
+        torque = self.system.slip_torque
+        return (torque(ahead, direction) - torque(behind, direction)) / (2.0 * SPEED_STEP)
+
+
+def _jacobian(first_order: Array, drive: Array) -> Array:
+    """Rates per angles and speeds with the drive closed, the rock apart."""
+    size = len(drive)
+    return np.asarray(first_order[:, :size] + np.outer(first_order[:, size], drive))
+
+
+def _coordinates(nodes: int, free: bool) -> tuple[Array, Array]:
+    """Matrices from [angles, speeds] to coordinates and back."""
+    if not free:
+        return np.eye(2 * nodes), np.eye(2 * nodes)
+    told = np.zeros((2 * nodes - 1, 2 * nodes))
+    lifted = np.zeros((2 * nodes, 2 * nodes - 1))
+    for element in range(nodes - 1):
+        told[element, element : element + 2] = 1.0, -1.0
+        lifted[element + 1 : nodes, element] = -1.0
+    told[nodes - 1 :, nodes:] = np.eye(nodes)
+    lifted[nodes:, nodes - 1 :] = np.eye(nodes)
+    return told, lifted

@@ -1,0 +1,182 @@
+"""Both methods beside the long simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.simulation.limit_cycle.describing import (
+    MODES,
+    HarmonicCycle,
+    harmonic_cycles,
+    rising_crossings,
+)
+from drillctl.simulation.limit_cycle.returns import Returns, judge, long_run
+from drillctl.simulation.limit_cycle.shooting import Orbit
+from drillctl.simulation.start import Kind
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray
+
+Array = NDArray[np.float64]
+
+PERIODS = 40
+"""Length of the long simulation in expected periods."""
+FEWEST_PERIODS = 16
+"""Fewest of them: half are thrown away, and some are needed to see whether they repeat."""
+
+
+@dataclass(frozen=True, eq=False)
+class LimitCycle:
+    """What a design does in the long run, by three methods.
+
+    Attributes
+    ----------
+    design : Design
+        What was computed.
+    status : str
+        One of `returns.STATUSES`.
+    harmonic : tuple of HarmonicCycle
+        By harmonic balance, lowest frequency first.
+    orbit : Orbit or None
+        The exact periodic motion; None unless the status is `periodic`.
+    simulated : Returns
+        The long simulation.
+    """
+
+    design: Design
+    status: str
+    harmonic: tuple[HarmonicCycle, ...]
+    orbit: Orbit | None
+    simulated: Returns
+
+    @property
+    def predicted(self) -> HarmonicCycle | None:
+        """The stable harmonic cycle of lowest frequency; None if there is none."""
+        return next((cycle for cycle in self.harmonic if cycle.stable), None)
+
+    def summary(self) -> dict[str, Any]:
+        """Status and numbers of each method; SI units, None where undefined."""
+        return {
+            "status": self.status,
+            "period": None if self.orbit is None else self.orbit.period,
+            "harmonic": [cycle.summary() for cycle in self.harmonic],
+            "orbit": None if self.orbit is None else self.orbit.summary(),
+            "simulated": self.simulated.summary(),
+        }
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """One cycle as a labelled dataset, from the moment the bit speeds up through its mean.
+
+        Over `time` the orbit and the harmonic prediction, or the latter alone; over
+        `simulated_time` the last simulated cycle.
+        """
+        import xarray
+
+        run = self.simulated
+        variables: dict[str, Any] = {
+            "simulated_bit_speed": _speed("simulated_time", run.bit_speed, "simulated bit speed"),
+            "simulated_top_speed": _speed("simulated_time", run.top_speed, "simulated top speed"),
+        }
+        time = run.time
+        if self.orbit is not None:
+            time = self.orbit.time
+            variables["bit_speed"] = _speed("time", self.orbit.bit_speed, "bit speed of the orbit")
+            variables["top_speed"] = _speed("time", self.orbit.top_speed, "top speed of the orbit")
+        if self.predicted is not None:
+            turning = self.predicted.bit_speed(time)
+            variables["harmonic_bit_speed"] = _speed("time", turning, "bit speed, one harmonic")
+        variables |= {
+            "return_time": ("return", run.times, {"units": "s"}),
+            "return_point": (("return", "coordinate"), run.points, {"units": "rad, rad/s"}),
+            "return_peak": ("interval", run.peaks, {"units": "rad/s"}),
+            "return_stuck": ("interval", run.stuck, {"units": "s"}),
+            "swing": ("window", run.swing, {"units": "rad/s"}),
+        }
+        if self.orbit is not None:
+            variables["orbit_point"] = ("coordinate", self.orbit.point, {"units": "rad, rad/s"})
+            variables["multiplier"] = ("multiplier", self.orbit.multipliers, {"units": "1"})
+        coordinates = {
+            "time": ("time", time, {"units": "s"}),
+            "simulated_time": ("simulated_time", run.time, {"units": "s"}),
+        }
+        return xarray.Dataset(variables, coordinates, {"status": self.status})
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
+
+
+def _speed(over: str, values: Array, name: str) -> tuple[str, Array, dict[str, str]]:
+    return over, values, {"units": "rad/s", "long_name": name}
+
+
+def limit_cycle(
+    design: Design,
+    periods: int = PERIODS,
+    start: Kind | None = "wound_up",
+    modes: int = MODES,
+    tolerance: float = 1e-8,
+) -> LimitCycle:
+    """The stick-slip cycle of a design: by one harmonic, exactly, and by a long simulation.
+
+    Parameters
+    ----------
+    design : Design
+        Rig and control; its own duration is not used.
+    periods : int
+        Length of the simulation in expected periods: those of the lowest harmonic cycle.
+    start : {'wound_up', 'rest', 'turning'} or None
+        Where the simulation starts; None for the design's own start.
+    modes : int
+        Crossings that harmonic balance looks at, from the lowest frequency on.
+    tolerance : float
+        Of the reference solver in the long simulation.
+
+    Returns
+    -------
+    LimitCycle
+        A motion that does not repeat is a status, not an error.
+
+    Raises
+    ------
+    InputError
+        Too few periods, or an unknown start.
+    SimulationError
+        The reference solver could not finish.
+    """
+    if periods < FEWEST_PERIODS:
+        raise InputError(f"at least {FEWEST_PERIODS} periods, not {periods}", "periods")
+    harmonic = harmonic_cycles(design, modes)
+    simulated = long_run(design, expected_period(design, harmonic), periods, start, tolerance)
+    status, orbit = judge(design, simulated)
+    return LimitCycle(design, status, harmonic, orbit, simulated)
+
+
+def expected_period(design: Design, harmonic: tuple[HarmonicCycle, ...]) -> float:
+    """A period to measure time by (s): of the lowest cycle, else of the lowest oscillation.
+
+    Parameters
+    ----------
+    design : Design
+        Rig and control.
+    harmonic : tuple of HarmonicCycle
+        Its cycles by harmonic balance.
+    """
+    if harmonic:
+        return harmonic[0].period
+    lowest = rising_crossings(design)
+    if lowest:
+        return 2.0 * np.pi / lowest[0][0]
+    frequency, _ = design.string.undamped_modes
+    return float(2.0 * np.pi / frequency[1])

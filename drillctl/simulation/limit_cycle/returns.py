@@ -1,0 +1,332 @@
+"""A long simulation and what its returns say: it settles, repeats, or does neither.
+
+A return is the moment at which the bit speeds up through its mean speed, after it has been
+below half of the way from its mean down to its least speed. Releases would count every
+micro-slip, and bare crossings of the mean every ripple on a fast stretch; a return counts
+neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from drillctl.design import Design
+from drillctl.errors import SimulationError
+from drillctl.simulation.limit_cycle.flow import Flow
+from drillctl.simulation.limit_cycle.shooting import Orbit, find_orbit
+from drillctl.simulation.reference import Motion, Piece, solve
+from drillctl.simulation.start import Kind
+
+Array = NDArray[np.float64]
+
+LAST = 10
+"""Returns that are reported."""
+PER_CYCLE = 4
+"""A motion may repeat with every return, or with every second, third or fourth."""
+FINE = 400
+"""Samples in an expected period."""
+LARGEST = 0.02
+"""Largest swing of the bit speed, as a share of its mean, of a motion that has settled."""
+CLOSE = 0.1
+"""Largest distance of the last returns, over the swing, from which an orbit is looked for."""
+STEPS = 6
+"""Newton steps from the last return: it lies near the orbit, or there is none to be found."""
+NOISE = 1e-6
+"""Distance over the swing below which returns are the same to the integrator's error."""
+
+STATUSES = ("equilibrium", "settling", "stalled", "periodic", "not periodic")
+"""What a long motion does.
+
+`equilibrium`: the bit turns evenly; `settling`: its swing shrinks, but has not died out;
+`stalled`: it stands still; `periodic`: its returns contract to an orbit that is stable; and
+`not periodic`: it swings for ever, or for as long as was looked, and nothing repeats.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Returns:
+    """Returns of one long simulation.
+
+    Attributes
+    ----------
+    duration : float
+        Length of the simulation (s).
+    mean_speed : float
+        Mean bit speed between the first and the last return; without returns over the second
+        half (rad/s).
+    swing : ndarray, shape (windows,)
+        Largest less smallest bit speed (rad/s) in each expected period of the second half.
+    times : ndarray, shape (returns,)
+        Times of the returns in the second half (s).
+    points : ndarray, shape (returns, coordinates)
+        Where the motion was: coordinates of `flow.Flow`.
+    peaks : ndarray, shape (returns - 1,)
+        Highest bit speed (rad/s) between returns.
+    stuck : ndarray, shape (returns - 1,)
+        Time at rest between returns (s).
+    time, bit_speed, top_speed : ndarray, shape (samples,)
+        The stretch between the last two returns, or the last expected period where there are
+        none (s from its begin, rad/s, rad/s).
+    """
+
+    duration: float
+    mean_speed: float
+    swing: Array
+    times: Array
+    points: Array
+    peaks: Array
+    stuck: Array
+    time: Array
+    bit_speed: Array
+    top_speed: Array
+
+    @property
+    def periods(self) -> Array:
+        """Times between the last returns (s), `LAST` at most."""
+        return np.diff(self.times)[-LAST:]
+
+    @property
+    def last_peaks(self) -> Array:
+        """Highest bit speeds between the last returns (rad/s), `LAST` at most."""
+        return self.peaks[-LAST:]
+
+    @property
+    def settled(self) -> bool:
+        """Whether the bit turns evenly, ever more so."""
+        return bool(
+            self.mean_speed > 0.0
+            and self.swing[-1] <= LARGEST * self.mean_speed
+            and self.swing[-1] <= self.swing[0]
+        )
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the bit stood still throughout."""
+        return bool(self.swing.max() == 0.0 and self.mean_speed == 0.0)
+
+    def distances(self, apart: int = 1) -> Array:
+        """Distance of each return from the one `apart` before, over the swing of bit speed."""
+        gaps = np.abs(self.points[apart:] - self.points[:-apart]).max(axis=1, initial=0.0)
+        return np.asarray(gaps / max(float(self.swing[-1]), 1e-300))
+
+    def summary(self) -> dict[str, Any]:
+        """Spread of the last returns, SI units; None where there are none."""
+        some = len(self.times) > 1
+
+        def spread(values: Array) -> list[float] | None:
+            return [float(values.min()), float(values.max())] if some else None
+
+        return {
+            "duration": self.duration,
+            "mean_bit_speed": self.mean_speed,
+            "returns": len(self.times),
+            "period_spread": spread(self.periods),
+            "peak_spread": spread(self.last_peaks),
+            "stuck_time_spread": spread(self.stuck[-LAST:]),
+            "last_distance": float(self.distances()[-1]) if some else None,
+        }
+
+
+def long_run(
+    design: Design, period: float, periods: int, start: Kind | None, tolerance: float
+) -> Returns:
+    """Simulate for many expected periods and take the returns of the second half.
+
+    Parameters
+    ----------
+    design : Design
+        Rig and control.
+    period : float
+        Expected period (s).
+    periods : int
+        Length of the run, in expected periods.
+    start : {'rest', 'turning', 'wound_up'} or None
+        Where it starts; None for the design's own start.
+    tolerance : float
+        Of the reference solver.
+
+    Raises
+    ------
+    SimulationError
+        The reference solver could not finish.
+    """
+    values: dict[str, Any] = {
+        "simulation.duration": f"{period * periods!r} s",
+        "simulation.j1_from": "0 s",
+    }
+    if start is not None:
+        values["start.kind"] = start
+    motion = solve(design.replace(values), tolerance)
+    return take_returns(motion, period)
+
+
+def take_returns(motion: Motion, period: float, level: float | None = None) -> Returns:
+    """The returns in the second half of a run.
+
+    Parameters
+    ----------
+    motion : Motion
+        As the reference solver left it.
+    period : float
+        Expected period (s).
+    level : float, optional
+        Bit speed (rad/s) through which a return rises, instead of the mean.
+    """
+    trace = _Trace(motion)
+    duration = motion.pieces[-1].end
+    begin = 0.5 * duration
+    time = np.linspace(begin, duration, max(2, int(FINE * (duration - begin) / period)))
+    speed = trace.bit_speed(time)
+    mean = float(speed.mean())
+    level = mean if level is None else level
+    half_down = 0.5 * (level + float(speed.min()))
+    rises = _rises(time, speed, level, half_down)
+    moments = np.array([trace.crossing(*pair, level) for pair in rises])
+    flow = Flow(motion.design)
+    points = [flow.point(trace.state(moment)) for moment in moments]
+    if len(moments) > 1:  # whole cycles have the mean, any other stretch has it nearly
+        mean = trace.mean(float(moments[0]), float(moments[-1]))
+    windows = np.array_split(speed, max(2, int((duration - begin) / period)))
+    last = moments[-2:] if len(moments) > 1 else np.array([duration - period, duration])
+    shown = np.linspace(last[0], last[1], FINE + 1)
+    return Returns(
+        duration=duration,
+        mean_speed=mean,
+        swing=np.array([np.ptp(part) for part in windows]),
+        times=moments,
+        points=np.array(points).reshape(len(points), flow.told.shape[0]),
+        peaks=np.array([trace.peak(*pair) for pair in pairwise(moments)]),
+        stuck=np.array([trace.stuck(*pair) for pair in pairwise(moments)]),
+        time=shown - shown[0],
+        bit_speed=trace.bit_speed(shown),
+        top_speed=trace.top_speed(shown),
+    )
+
+
+def judge(design: Design, returns: Returns) -> tuple[str, Orbit | None]:
+    """What a long run comes to.
+
+    Parameters
+    ----------
+    design : Design
+        What was simulated.
+    returns : Returns
+        Of its second half.
+
+    Returns
+    -------
+    status : str
+        One of `STATUSES`.
+    orbit : Orbit or None
+        Where it is periodic.
+    """
+    if returns.stalled:
+        return "stalled", None
+    if returns.settled:
+        return "equilibrium", None
+    for apart in range(1, PER_CYCLE + 1):
+        orbit = _orbit_after(design, returns, apart)
+        if orbit is not None:
+            return "periodic", orbit
+    shrinks = returns.swing[-1] < 0.5 * returns.swing[0] and not returns.stuck.any()
+    return ("settling" if shrinks else "not periodic"), None
+
+
+def _orbit_after(design: Design, returns: Returns, apart: int) -> Orbit | None:
+    """The stable orbit to which every `apart`-th return contracts, if there is one."""
+    if len(returns.times) < apart + 6:
+        return None
+    distances = returns.distances(apart)
+    third = len(distances) // 3
+    shrinks = np.median(distances[-third:]) < 0.5 * np.median(distances[:third])
+    if distances[-1] > CLOSE or not (shrinks or distances[-1] < NOISE):
+        return None
+    last, period = returns.points[-1], float(returns.times[-1] - returns.times[-1 - apart])
+    try:
+        orbit = find_orbit(design, last, period, steps=STEPS)
+    except SimulationError:
+        return None
+    if not orbit.stable:
+        return None
+    # Steps that shrink by the multiplier each time add up to this much at most, and a bit.
+    still = 2.0 * distances[-1] / (1.0 - abs(orbit.multipliers[0])) + NOISE
+    away = np.abs(orbit.point - last).max() / returns.swing[-1]
+    return orbit if away <= still else None
+
+
+def _rises(time: Array, speed: Array, level: float, low: float) -> list[tuple[float, float]]:
+    """Pairs of times between which the speed rises through a level, coming from `low`."""
+    found: list[tuple[float, float]] = []
+    armed = False
+    for i in range(len(time) - 1):
+        armed = armed or bool(speed[i] < low)
+        if armed and speed[i] < level <= speed[i + 1]:
+            found.append((float(time[i]), float(time[i + 1])))
+            armed = False
+    return found
+
+
+class _Trace:
+    """States and speeds of a run at any time."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.pieces = motion.pieces
+        self.ends = np.array([piece.end for piece in motion.pieces])
+        self.set_speed = motion.design.speed
+        self.nodes = motion.design.string.nodes
+
+    def piece(self, time: float) -> Piece:
+        return self.pieces[min(int(np.searchsorted(self.ends, time)), len(self.pieces) - 1)]
+
+    def state(self, time: float) -> Array:
+        return np.asarray(self.piece(time).solution(time))
+
+    def bit_speed(self, time: Array) -> Array:
+        return self._each(time, lambda state: state[2 * self.nodes - 1], stuck=-self.set_speed)
+
+    def top_speed(self, time: Array) -> Array:
+        return self._each(time, lambda state: state[self.nodes], stuck=None)
+
+    def _each(self, time: Array, row: Callable[[Array], Array], stuck: float | None) -> Array:
+        """Absolute speed (rad/s); `stuck` stands for it in the frame while the bit is at rest."""
+        which = np.minimum(np.searchsorted(self.ends, time), len(self.pieces) - 1)
+        speed = np.zeros(len(time))
+        for index in np.unique(which):
+            mine, piece = which == index, self.pieces[index]
+            held = stuck is not None and piece.direction == 0
+            speed[mine] = stuck if held else row(piece.solution(time[mine]))
+        return speed + self.set_speed
+
+    def crossing(self, low: float, high: float, level: float) -> float:
+        """Time between two at which the bit speed is `level`."""
+
+        def excess(time: float) -> float:
+            return float(self.bit_speed(np.array([time]))[0]) - level
+
+        return float(brentq(excess, low, high, xtol=1e-12, rtol=1e-14))
+
+    def mean(self, begin: float, end: float) -> float:
+        """Mean bit speed between two times (rad/s)."""
+        turned = self.state(end)[self.nodes - 1] - self.state(begin)[self.nodes - 1]
+        return float(turned) / (end - begin) + self.set_speed
+
+    def peak(self, begin: float, end: float) -> float:
+        """Highest bit speed between two times, at a located extreme."""
+        moments = np.concatenate([piece.extremes for piece in self.pieces])
+        inside = moments[(moments > begin) & (moments < end)]
+        return float(self.bit_speed(np.append(inside, [begin, end])).max())
+
+    def stuck(self, begin: float, end: float) -> float:
+        """Time at rest between two times (s)."""
+        return sum(
+            max(0.0, min(piece.end, end) - max(piece.begin, begin))
+            for piece in self.pieces
+            if piece.direction == 0
+        )
