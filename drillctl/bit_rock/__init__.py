@@ -11,11 +11,26 @@ calls them with symbols; hence the exponential comes in as an argument.
 - `torque_and_slope(weight, speed, exp)`: torque (N m) of a bit turning at `speed` (rad/s, not
   negative) and its derivative (N m s/rad). For a bit turning backwards the torque changes
   sign. A set-valued law takes, at zero speed, any value between minus and plus the static
-  torque; nothing is ever regularised.
+  torque.
+- `set_valued`: whether it is one. The smooth laws of the literature are not: a bit creeps under
+  them where it should stand still. They are here to be compared.
 """
 
+from drillctl.bit_rock.jansen_van_den_steen import JansenVanDenSteen
 from drillctl.bit_rock.navarro_lopez_suarez import NavarroLopezSuarez
 from drillctl.bit_rock.protocol import BitRockLaw
+from drillctl.bit_rock.stribeck import Stribeck
+from drillctl.bit_rock.tabulated import Tabulated, tabulated
+from drillctl.bit_rock.tucker_wang import TuckerWang
 from drillctl.bit_rock.weight_table import WeightTable
 
-__all__ = ["BitRockLaw", "NavarroLopezSuarez", "WeightTable"]
+__all__ = [
+    "BitRockLaw",
+    "JansenVanDenSteen",
+    "NavarroLopezSuarez",
+    "Stribeck",
+    "Tabulated",
+    "TuckerWang",
+    "WeightTable",
+    "tabulated",
+]

@@ -4,13 +4,27 @@ from __future__ import annotations
 
 import math
 
-from drillctl.bit_rock import BitRockLaw, NavarroLopezSuarez, WeightTable
+from drillctl.bit_rock import (
+    BitRockLaw,
+    JansenVanDenSteen,
+    NavarroLopezSuarez,
+    Stribeck,
+    TuckerWang,
+    WeightTable,
+    tabulated,
+)
 from drillctl.design.tables import (
+    BitRadiusFrictionTable,
     ConstantTorqueTable,
+    CoulombTable,
     DesignTables,
     FrictionRow,
+    JansenVanDenSteenTable,
     NavarroLopezSuarezTable,
     SectionTable,
+    StribeckTable,
+    TabulatedFrictionTable,
+    TuckerWangTable,
 )
 from drillctl.drillstring import GRADES, PIPES, Drillstring, Section, assemble, polar_moment
 from drillctl.drillstring.section import torsional_yield
@@ -152,17 +166,46 @@ def bit_rock(tables: DesignTables) -> BitRockLaw:
         The weight lies outside the table and `outside_table` is `refuse`, or factors or
         extrapolation give coefficients that no friction has.
     """
+    law = _friction(tables)
+    _refuse_impossible_friction(law, tables)
+    over = getattr(tables.bit_rock, "regularised_over", None)
+    if over is not None and isinstance(law, NavarroLopezSuarez):
+        return Stribeck(static=law.a2, sliding=law.a1, decay=law.beta, sharpness=1.0 / over)
+    return law
+
+
+def _friction(tables: DesignTables) -> BitRockLaw:
     table = tables.bit_rock
-    if not isinstance(table, NavarroLopezSuarezTable):
-        radius = table.bit_radius
-        law = NavarroLopezSuarez(
-            a1=radius * table.sliding_coefficient,
-            a2=radius * table.static_coefficient,
-            beta=table.decay / table.reference_speed,
-        )
-        _refuse_impossible_friction(law, tables)
-        return law
-    law = _coefficients(table, tables.operating_point.weight_on_bit)
+    match table:
+        case NavarroLopezSuarezTable():
+            return _navarro_lopez_suarez(table, tables.operating_point.weight_on_bit)
+        case BitRadiusFrictionTable():
+            return NavarroLopezSuarez(
+                a1=table.bit_radius * table.sliding_coefficient,
+                a2=table.bit_radius * table.static_coefficient,
+                beta=table.decay / table.reference_speed,
+            )
+        case JansenVanDenSteenTable():
+            return JansenVanDenSteen(table.a1, table.a2)
+        case CoulombTable():
+            return JansenVanDenSteen(table.a, table.a)
+        case TuckerWangTable():
+            return TuckerWang(table.a, table.b1, table.b2, table.b3)
+        case StribeckTable():
+            return Stribeck(
+                static=table.bit_radius * table.static_coefficient,
+                sliding=table.bit_radius * table.sliding_coefficient,
+                decay=1.0 / table.stribeck_speed,
+                sharpness=1.0 / table.regularised_over,
+            )
+        case TabulatedFrictionTable():
+            arms = tuple(point.a for point in table.points)
+            static = arms[0] if table.static is None else table.static
+            return tabulated(static, tuple(point.speed for point in table.points), arms)
+
+
+def _navarro_lopez_suarez(table: NavarroLopezSuarezTable, weight: float) -> NavarroLopezSuarez:
+    law = _coefficients(table, weight)
     law = NavarroLopezSuarez(
         law.a1 * table.a1_factor, law.a2 * table.a2_factor, law.beta * table.beta_factor
     )
@@ -170,14 +213,14 @@ def bit_rock(tables: DesignTables) -> BitRockLaw:
         raise InputError(
             f"the factors give a2 = {law.a2:g}, less than a1 = {law.a1:g}", "bit_rock.a2_factor"
         )
-    _refuse_impossible_friction(law, tables)
     return law
 
 
-def _refuse_impossible_friction(law: NavarroLopezSuarez, tables: DesignTables) -> None:
+def _refuse_impossible_friction(law: BitRockLaw, tables: DesignTables) -> None:
     """Refuse coefficients that overflow, or turn negative far outside a table."""
     weight = tables.operating_point.weight_on_bit
-    for name, value in (*law._asdict().items(), ("static torque", law.static_torque(weight))):
+    numbers = law._asdict() if isinstance(law, NavarroLopezSuarez) else {}
+    for name, value in (*numbers.items(), ("static torque", law.static_torque(weight))):
         if not 0.0 <= value < math.inf:
             raise InputError(
                 f"its numbers give {name} = {value:g} at {weight / 1e3:g} kN", "bit_rock"

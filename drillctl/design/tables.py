@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from drillctl import units
+from drillctl.bit_rock.tabulated import KNOTS
 from drillctl.design import quantities as q
 from drillctl.drillstring import GRADES, PIPES
 from drillctl.errors import InputError, nearest, shown
@@ -190,6 +191,7 @@ class NavarroLopezSuarezTable(Table):
     a1_factor: q.PositiveNumber = 1.0
     a2_factor: q.PositiveNumber = 1.0
     beta_factor: q.PositiveNumber = 1.0
+    regularised_over: q.PositiveSpeed | None = None
     outside_table: Literal["refuse", "extrapolate"] = "refuse"
 
     @field_validator("table")
@@ -231,6 +233,7 @@ class BitRadiusFrictionTable(Table):
     sliding_coefficient: q.NonNegativeNumber
     decay: q.NonNegativeNumber
     reference_speed: q.PositiveSpeed = 1.0
+    regularised_over: q.PositiveSpeed | None = None
 
     @model_validator(mode="after")
     def _falling(self) -> BitRadiusFrictionTable:
@@ -238,6 +241,84 @@ class BitRadiusFrictionTable(Table):
             raise InputError(
                 f"static_coefficient = {self.static_coefficient:g} must not be less than "
                 f"sliding_coefficient = {self.sliding_coefficient:g}"
+            )
+        return self
+
+
+class JansenVanDenSteenTable(Table):
+    """A static peak over a constant sliding torque (after Jansen & van den Steen 1995)."""
+
+    law: Literal["jansen-van-den-steen"]
+    a1: q.NonNegativeNumber
+    a2: q.NonNegativeNumber
+
+    @model_validator(mode="after")
+    def _peak(self) -> JansenVanDenSteenTable:
+        _refuse_rising(self.a1, self.a2)
+        return self
+
+
+class CoulombTable(Table):
+    """The same torque at rest and at any speed: a x weight on bit."""
+
+    law: Literal["coulomb"]
+    a: q.NonNegativeNumber
+
+
+class TuckerWangTable(Table):
+    """Smooth friction with a hump (Tucker & Wang family); defaults of a public model."""
+
+    law: Literal["tucker-wang"]
+    a: q.NonNegativeNumber = 0.0239
+    b1: q.PositiveNumber = 1.91
+    b2: q.NonNegativeNumber = 8.5
+    b3: q.NonNegativeNumber = 5.47
+
+
+class StribeckTable(Table):
+    """Stribeck friction regularised by tanh, smooth; defaults of a public simulator."""
+
+    law: Literal["stribeck"]
+    bit_radius: q.Diameter
+    static_coefficient: q.NonNegativeNumber = 0.8
+    sliding_coefficient: q.NonNegativeNumber = 0.5
+    stribeck_speed: q.PositiveSpeed = 1.0
+    regularised_over: q.PositiveSpeed = 0.05
+
+    @model_validator(mode="after")
+    def _falling(self) -> StribeckTable:
+        if self.static_coefficient < self.sliding_coefficient:
+            raise InputError(
+                f"static_coefficient = {self.static_coefficient:g} must not be less than "
+                f"sliding_coefficient = {self.sliding_coefficient:g}"
+            )
+        return self
+
+
+class FrictionPoint(Table):
+    """Torque over weight on bit at one speed."""
+
+    speed: q.Speed
+    a: q.NonNegativeNumber
+
+
+class TabulatedFrictionTable(Table):
+    """Measured points of torque over weight, straight lines between them."""
+
+    law: Literal["tabulated"]
+    points: tuple[FrictionPoint, ...]
+    static: q.NonNegativeNumber | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> TabulatedFrictionTable:
+        if not 2 <= len(self.points) <= KNOTS + 1:
+            raise InputError(f"needs 2 to {KNOTS + 1} points, got {len(self.points)}")
+        speeds = [point.speed for point in self.points]
+        if speeds[0] != 0.0 or any(b <= a for a, b in pairwise(speeds)):
+            raise InputError("speeds of the points must begin at 0 and increase")
+        if self.static is not None and self.static < self.points[0].a:
+            raise InputError(
+                f"static = {self.static:g} must not be less than the first a = {self.points[0].a:g}"
             )
         return self
 
@@ -355,7 +436,14 @@ class MapTable(Table):
 
 
 BitRockTable = Annotated[
-    NavarroLopezSuarezTable | BitRadiusFrictionTable, Field(discriminator="law")
+    NavarroLopezSuarezTable
+    | BitRadiusFrictionTable
+    | JansenVanDenSteenTable
+    | CoulombTable
+    | TuckerWangTable
+    | StribeckTable
+    | TabulatedFrictionTable,
+    Field(discriminator="law"),
 ]
 ControllerTable = Annotated[PITable | ConstantTorqueTable, Field(discriminator="law")]
 

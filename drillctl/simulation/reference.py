@@ -236,8 +236,10 @@ class System:
 
     def slip_torque(self, state: Array, direction: int) -> float:
         """Torque on a bit that turns (N m)."""
-        # Past zero speed the law is continued smoothly, so that the event can be located.
         speed = self.bit_speed(state)
+        if not self.friction.set_valued:
+            direction = 1 if speed >= 0.0 else -1
+        # Past zero speed a set-valued law is continued smoothly, so that the event can be located.
         torque, _ = self.friction.torque_and_slope(
             self.weight.weight(speed), direction * speed, _exp
         )
@@ -262,7 +264,9 @@ class System:
         return rates
 
     def direction_at(self, state: Array) -> int:
-        """Phase at the very start: +1 or -1 turning, 0 stuck."""
+        """Phase at the very start: +1 or -1 turning, 0 stuck; under a smooth law always +1."""
+        if not self.friction.set_valued:
+            return 1
         speed = self.bit_speed(state)
         if speed != 0.0:
             return 1 if speed > 0.0 else -1
@@ -314,6 +318,8 @@ class System:
             return self.rates(self.slip, state, self.slip_torque(state, direction))
 
         def comes_to_rest(time: float, state: Array) -> float:
+            if not self.friction.set_valued:
+                return 1.0
             # Exactly zero is the release itself, in a step too short to move the bit.
             return direction * self.bit_speed(state) or 1e-300
 

@@ -177,6 +177,7 @@ def _signals(design: Design, state: Array, direction: Array) -> dict[str, Array]
     top_torque = np.asarray(design.top_drive.torque(angle[0], speed[0])) + 0.0 * angle[0]
     weight = np.broadcast_to(design.weight_on_bit.weight(bit_speed), bit_speed.shape)
     friction, _ = design.bit_rock.torque_and_slope(weight, np.abs(bit_speed), np.exp)
+    turning = direction if design.bit_rock.set_valued else np.sign(bit_speed)
     _, reaction = stick_phase(design.string, design.speed)
     holding = reaction.motion @ state[: 2 * nodes] + reaction.load + reaction.top * top_torque
     stiffness, damping = design.string.element_stiffness[0], design.string.element_damping[0]
@@ -188,7 +189,7 @@ def _signals(design: Design, state: Array, direction: Array) -> dict[str, Array]
         "bit_angle": angle[-1],
         "top_torque": top_torque,
         "pipe_torque": stiffness * (angle[0] - angle[1]) + damping * (speed[0] - speed[1]),
-        "bit_torque": np.where(direction == 0.0, holding, direction * friction),
+        "bit_torque": np.where(direction == 0.0, holding, turning * friction),
         "weight_on_bit": np.array(weight),
         "stuck": (direction == 0.0).astype(float),
     }

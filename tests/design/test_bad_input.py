@@ -517,7 +517,8 @@ def test_sections_named_twice_in_the_model(tmp_path):
          "controller.law: no law a list; allowed: constant-torque, pi"),
         (rig(friction=FRICTION.replace("lopez-suarez", "lopes-suarez")),
          "bit_rock.law: no law 'navarro-lopes-suarez'; did you mean 'navarro-lopez-suarez'? "
-         "allowed: bit-radius-friction, navarro-lopez-suarez"),
+         "allowed: bit-radius-friction, coulomb, jansen-van-den-steen, navarro-lopez-suarez, "
+         "stribeck, tabulated, tucker-wang"),
         (rig(controller="[controller]\nkp = 1\n"),
          "controller: law is missing; allowed: constant-torque, pi"),
         (rig(friction=""), "bit_rock: is missing"),

@@ -11,14 +11,7 @@ from numba import njit, prange
 
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined, widest_vectors
-from drillctl.simulation.kernels.lane_step import (
-    conclude,
-    decide,
-    eliminate,
-    solve_inclusion,
-    time_releases,
-    time_stops,
-)
+from drillctl.simulation.kernels.lane_step import conclude, eliminate
 from drillctl.simulation.kernels.laws import at_lane, load_block, torque_and_slope, weight_at
 from drillctl.simulation.kernels.measure_step import (
     begin_measures,
@@ -27,6 +20,7 @@ from drillctl.simulation.kernels.measure_step import (
     measure_pipe,
     measure_window,
 )
+from drillctl.simulation.kernels.rock_step import meet_rock
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.kernels.string_step import complete_and_propagate, look
 
@@ -138,13 +132,8 @@ def advance_block(
         if n == clock.steps:
             break
         begin = n * clock.step
-        # What takes divisions and happens rarely is done when some lane needs it; it leaves
-        # the other lanes as they are.
-        if eliminate(string, drive, weight, friction, work, rate) > 0:
-            time_releases(friction, work)
-        solve_inclusion(friction, work)
-        if decide(friction, work) > 0:
-            time_stops(friction, work)
+        eliminate(string, drive, weight, work, rate)
+        meet_rock(friction, work)
         conclude(string, work)
         in_j1 = _share_after(begin, clock.step, clock.j1_from)
         in_window = _share_after(begin, clock.step, clock.window_from)

@@ -39,13 +39,9 @@ NEWTON_LIMIT = 30
 
 
 @inlined
-def eliminate(string: Any, drive: Any, weight: Any, friction: Any, work: Any, rate: float) -> int:
-    """Reduce string and control to free and gain, and set the inclusion up; `rate` is 1 / step.
-
-    Returns how many lanes break loose.
-    """
+def eliminate(string: Any, drive: Any, weight: Any, work: Any, rate: float) -> None:
+    """Reduce string and control to free and gain; `rate` is 1 / step."""
     widest_vectors()
-    releases = 0
     for lane in range(WIDTH):
         drag = work[r.DRAG + lane]
         offset, slope = mean_torque(at_lane(drive, work, r.DRIVE, lane), work[r.ANGLE + lane], rate)
@@ -65,6 +61,16 @@ def eliminate(string: Any, drive: Any, weight: Any, friction: Any, work: Any, ra
         work[r.PER_GAIN + lane] = 1.0 / gain
 
         load = weight_at(at_lane(weight, work, r.WEIGHT, lane), work[r.BIT_SPEED + lane])
+        work[r.LOAD + lane] = load
+
+
+@inlined
+def set_up(friction: Any, work: Any) -> int:
+    """Set the inclusion at the bit up; returns how many lanes break loose."""
+    widest_vectors()
+    releases = 0
+    for lane in range(WIDTH):
+        free, gain, load = work[r.FREE + lane], work[r.GAIN + lane], work[r.LOAD + lane]
         law = at_lane(friction, work, r.FRICTION, lane)
         kinetic = kinetic_torque_at_rest(law, load)
         direction = work[r.DIRECTION + lane]
@@ -80,7 +86,6 @@ def eliminate(string: Any, drive: Any, weight: Any, friction: Any, work: Any, ra
         last = abs(work[r.BIT_SPEED + lane])
         flat = right - 0.5 * gain * previous
         guess = flat + fall * (flat + fall * (flat - last) - last)
-        work[r.LOAD + lane] = load
         work[r.SIGN + lane] = sign
         work[r.OWN + lane] = 1.0 if own else 0.0
         work[r.RIGHT + lane] = right

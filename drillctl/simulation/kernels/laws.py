@@ -14,7 +14,7 @@ from numba.extending import overload
 
 from drillctl.simulation.kernels.compiling import inlined
 from drillctl.simulation.kernels.exponential import exp
-from drillctl.simulation.kernels.rows import LAW_FIELDS, WIDTH
+from drillctl.simulation.kernels.rows import MOST_FIELDS, WIDTH
 
 
 def at_lane(law: Any, work: Any, row: int, lane: int) -> Any:
@@ -42,8 +42,8 @@ def load_block(law: Any, work: Any, row: int, first: int) -> None:
 def _load_block(law, work, row, first):
     if not isinstance(law, types.BaseNamedTuple):
         return None
-    if len(law.fields) > LAW_FIELDS:
-        raise TypeError(f"{law.instance_class.__name__} has more than {LAW_FIELDS} numbers")
+    if len(law.fields) > MOST_FIELDS:
+        raise TypeError(f"{law.instance_class.__name__} has more than {MOST_FIELDS} numbers")
     lines = [
         f"        work[row + {k * WIDTH} + lane] = law[{k}][first + lane]"
         for k in range(len(law.fields))
