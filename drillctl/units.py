@@ -58,6 +58,7 @@ DAMPING = Kind("torsional damping", "N*m*s/rad", ("N*m*s/rad",))
 DRAG = Kind("drag per length", "N*s/rad", ("N*s/rad",))
 SLOWNESS = Kind("time per angle", "s/rad", ("s/rad",))
 PROPORTIONAL_GAIN = Kind("gain", "N*m*s/rad", ("N*m*s/rad",))
+WEIGHT_GAIN = Kind("weight per speed", "N*s/rad", ("kN*s/rad", "N*s/rad"))
 INTEGRAL_GAIN = Kind("gain", "N*m/rad", ("N*m/rad",))
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

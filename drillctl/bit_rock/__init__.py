@@ -16,8 +16,10 @@ calls them with symbols; hence the exponential comes in as an argument.
   them where it should stand still. They are here to be compared.
 """
 
+from drillctl.bit_rock.contact import contact
 from drillctl.bit_rock.jansen_van_den_steen import JansenVanDenSteen
 from drillctl.bit_rock.navarro_lopez_suarez import NavarroLopezSuarez
+from drillctl.bit_rock.over_weight import OverWeight, over_weight
 from drillctl.bit_rock.protocol import BitRockLaw
 from drillctl.bit_rock.stribeck import Stribeck
 from drillctl.bit_rock.tabulated import Tabulated, tabulated
@@ -28,9 +30,12 @@ __all__ = [
     "BitRockLaw",
     "JansenVanDenSteen",
     "NavarroLopezSuarez",
+    "OverWeight",
     "Stribeck",
     "Tabulated",
     "TuckerWang",
     "WeightTable",
+    "contact",
+    "over_weight",
     "tabulated",
 ]

@@ -92,9 +92,9 @@ class Design:
         return parts.weight_on_bit(self.tables)
 
     @property
-    def outside_table(self) -> bool:
-        """Whether the weight on bit lies outside the friction table, if there is one."""
-        return parts.outside_table(self.tables)
+    def table_range(self) -> tuple[float, float]:
+        """Lowest and highest weight (N) of the friction table; any weight without a table."""
+        return parts.table_range(self.tables)
 
     def plant(self) -> control.StateSpace:
         """The string without control, see `drillctl.linear.plant`."""

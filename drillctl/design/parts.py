@@ -11,11 +11,13 @@ from drillctl.bit_rock import (
     Stribeck,
     TuckerWang,
     WeightTable,
+    over_weight,
     tabulated,
 )
 from drillctl.design.tables import (
     BitRadiusFrictionTable,
     ConstantTorqueTable,
+    ConstantWeightTable,
     CoulombTable,
     DesignTables,
     FrictionRow,
@@ -30,10 +32,12 @@ from drillctl.drillstring import GRADES, PIPES, Drillstring, Section, assemble, 
 from drillctl.drillstring.section import torsional_yield
 from drillctl.errors import InputError
 from drillctl.top_drive import PI, ConstantTorque, TopDriveLaw
-from drillctl.weight_on_bit import ConstantWeight, WeightLaw
+from drillctl.weight_on_bit import ConstantWeight, FollowingSpeed, WeightLaw
 
 STEEL_SHEAR_MODULUS = 79.3e9
 """Shear modulus (Pa) where a design gives none: drill-pipe steel."""
+HEAVIEST = 1e12
+"""Weight on bit (N) where a law has no upper limit."""
 STEEL_DENSITY = 7850.0
 """Density (kg/m3) where a design gives none."""
 STEEL_POISSON_RATIO = 0.3
@@ -178,7 +182,11 @@ def _friction(tables: DesignTables) -> BitRockLaw:
     table = tables.bit_rock
     match table:
         case NavarroLopezSuarezTable():
-            return _navarro_lopez_suarez(table, tables.operating_point.weight_on_bit)
+            fixed = _navarro_lopez_suarez(table, tables.operating_point.weight_on_bit)
+            if table.table is None or isinstance(tables.weight_on_bit, ConstantWeightTable):
+                return fixed
+            factors = (table.a1_factor, table.a2_factor, table.beta_factor)
+            return over_weight(_rows(table.table), *factors)
         case BitRadiusFrictionTable():
             return NavarroLopezSuarez(
                 a1=table.bit_radius * table.sliding_coefficient,
@@ -227,12 +235,12 @@ def _refuse_impossible_friction(law: BitRockLaw, tables: DesignTables) -> None:
             )
 
 
-def outside_table(tables: DesignTables) -> bool:
-    """Whether the operating weight lies outside the friction table; False without a table."""
+def table_range(tables: DesignTables) -> tuple[float, float]:
+    """Lowest and highest weight (N) of the friction table; any weight without a table."""
     table = tables.bit_rock
     if not isinstance(table, NavarroLopezSuarezTable) or table.table is None:
-        return False
-    return not _rows(table.table).covers(tables.operating_point.weight_on_bit)
+        return 0.0, HEAVIEST
+    return table.table[0].weight_on_bit, table.table[-1].weight_on_bit
 
 
 def _rows(table: tuple[FrictionRow, ...]) -> WeightTable:
@@ -267,5 +275,28 @@ def top_drive(tables: DesignTables) -> TopDriveLaw:
 
 
 def weight_on_bit(tables: DesignTables) -> WeightLaw:
-    """Weight-on-bit law with its numbers."""
-    return ConstantWeight(tables.operating_point.weight_on_bit)
+    """Weight-on-bit law with its numbers.
+
+    Raises
+    ------
+    InputError
+        The nominal weight lies outside the limits of the law.
+    """
+    table, point = tables.weight_on_bit, tables.operating_point
+    if isinstance(table, ConstantWeightTable):
+        return ConstantWeight(point.weight_on_bit)
+    most = math.inf if table.maximum is None else table.maximum
+    if not table.minimum <= point.weight_on_bit <= most:
+        raise InputError(
+            f"{point.weight_on_bit / 1e3:g} kN lies outside the limits of the weight-on-bit law, "
+            f"{table.minimum / 1e3:g} to {most / 1e3:g} kN",
+            "operating_point.weight_on_bit",
+        )
+    return FollowingSpeed(
+        nominal=point.weight_on_bit,
+        gain=table.gain,
+        set_speed=point.speed,
+        least=table.minimum,
+        # A number that no weight reaches: infinity times zero would be none.
+        most=min(most, HEAVIEST),
+    )

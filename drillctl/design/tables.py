@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from drillctl import units
+from drillctl.bit_rock.over_weight import KNOTS as KNOTS_OVER_WEIGHT
 from drillctl.bit_rock.tabulated import KNOTS
 from drillctl.design import quantities as q
 from drillctl.drillstring import GRADES, PIPES
@@ -175,6 +176,10 @@ class FrictionRow(Table):
         return self
 
 
+MOST_ROWS = KNOTS_OVER_WEIGHT + 1
+"""Most rows of a friction table over the weight on bit."""
+
+
 def _refuse_rising(a1: float, a2: float) -> None:
     if a2 < a1:
         raise InputError(f"a2 = {a2:g} must not be less than a1 = {a1:g}")
@@ -200,7 +205,11 @@ class NavarroLopezSuarezTable(Table):
         if table is not None:
             if len(table) < 2:
                 raise InputError("a table needs two rows or more; give a1, a2 and beta instead")
+            if len(table) > MOST_ROWS:
+                raise InputError(f"a table has at most {MOST_ROWS} rows, got {len(table)}")
             weights = [row.weight_on_bit for row in table]
+            if weights[0] <= 0.0:
+                raise InputError("weight_on_bit of the first row must be more than 0")
             if any(b <= a for a, b in pairwise(weights)):
                 raise InputError("weight_on_bit must increase from row to row")
         return table
@@ -344,6 +353,24 @@ class ConstantWeightTable(Table):
     law: Literal["constant"] = "constant"
 
 
+class FollowingSpeedTable(Table):
+    """Weight on bit W = W_n + gain (|bit speed| - set speed) within limits, ideal."""
+
+    law: Literal["navarro-lopez-suarez"]
+    gain: q.WeightGain
+    minimum: q.Weight = 0.0
+    maximum: q.Weight | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> FollowingSpeedTable:
+        if self.maximum is not None and self.maximum <= self.minimum:
+            raise InputError(
+                f"maximum {self.maximum / 1e3:g} kN must be more than minimum "
+                f"{self.minimum / 1e3:g} kN"
+            )
+        return self
+
+
 class StartTable(Table):
     """State of the string at time zero.
 
@@ -445,6 +472,7 @@ BitRockTable = Annotated[
     | TabulatedFrictionTable,
     Field(discriminator="law"),
 ]
+WeightOnBitTable = Annotated[ConstantWeightTable | FollowingSpeedTable, Field(discriminator="law")]
 ControllerTable = Annotated[PITable | ConstantTorqueTable, Field(discriminator="law")]
 
 
@@ -462,7 +490,7 @@ class DesignTables(Table):
     bha: BhaTable = BhaTable()
     bit_rock: BitRockTable
     controller: ControllerTable = PITable(law="pi", kp=200.0, ki=100.0)
-    weight_on_bit: ConstantWeightTable = ConstantWeightTable()
+    weight_on_bit: WeightOnBitTable = ConstantWeightTable()
     start: StartTable = StartTable()
     simulation: SimulationTable = SimulationTable()
     map: MapTable = MapTable()

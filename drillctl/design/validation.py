@@ -7,10 +7,10 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from drillctl.design.merging import Tree
-from drillctl.design.tables import BitRockTable, ControllerTable, DesignTables
+from drillctl.design.tables import BitRockTable, ControllerTable, DesignTables, WeightOnBitTable
 from drillctl.errors import InputError, nearest, shown
 
-_LAWS = {"bit_rock": BitRockTable, "controller": ControllerTable}
+_LAWS = {"bit_rock": BitRockTable, "controller": ControllerTable, "weight_on_bit": WeightOnBitTable}
 
 _TYPES = {
     "tuple_type": "it must be a list",

@@ -37,7 +37,12 @@ from drillctl.linear.loop_analysis import (
 )
 from drillctl.linear.loop_margins import Margins, margins
 from drillctl.linear.modal import Mode, Modes, modes
-from drillctl.linear.operating_point import OperatingPoint, equilibria, operating_point
+from drillctl.linear.operating_point import (
+    OperatingPoint,
+    cancelling_weight_gain,
+    equilibria,
+    operating_point,
+)
 from drillctl.linear.response import (
     FrequencyResponse,
     frequency_response,
@@ -58,6 +63,7 @@ __all__ = [
     "Modes",
     "OperatingPoint",
     "RootLocus",
+    "cancelling_weight_gain",
     "closed_loop",
     "critical_speed",
     "critical_weight_on_bit",

@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl import units
+from drillctl.bit_rock import contact
+from drillctl.bit_rock.contact import by_weight
 from drillctl.design import Design
 from drillctl.errors import InputError
 
@@ -117,9 +120,31 @@ def at_speed(design: Design, speed: float) -> OperatingPoint:
     return OperatingPoint(speed, float(torque), -float(slope))
 
 
+def cancelling_weight_gain(design: Design) -> float:
+    """Gain K_w of weight on bit over bit speed that cancels the falling slope of the rock.
+
+    Parameters
+    ----------
+    design : Design
+        Its own weight law does not matter: only torque, speed and weight of the operating point.
+
+    Returns
+    -------
+    float
+        K_w* = (-dT/dw) / (dT/dW) (N s/rad) at constant weight; at a row of a friction table
+        dT/dW is the mean of both sides.
+    """
+    point = operating_point(design)
+    weight = design.tables.operating_point.weight_on_bit
+    moving = design.replace(
+        {"weight_on_bit": {"law": "navarro-lopez-suarez", "gain": units.SI(1.0)}}
+    )
+    _, slope = moving.bit_rock.torque_and_slope(weight, point.speed, np.exp)
+    return float(-slope / by_weight(moving.bit_rock, weight, point.speed, np.exp))
+
+
 def _rock(design: Design, speed: float | Array) -> tuple[Any, Any]:
-    weight = design.weight_on_bit.weight(speed)
-    return design.bit_rock.torque_and_slope(weight, speed, np.exp)
+    return contact(design.bit_rock, design.weight_on_bit, speed, np.exp)
 
 
 def _surplus(design: Design, speed: float | Array) -> Any:

@@ -162,10 +162,12 @@ def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
     traces = np.empty((samples, len(padded), len(TRACED)))
     window = min(m.WINDOW, duration)
     ticks = Clock(scheme.step, scheme.steps, prepared.j1_from, duration - window, every)
-    speeds = np.stack([padded.set_speed, speed[-1] + padded.set_speed])
+    numbers = np.stack(
+        [padded.set_speed, speed[-1] + padded.set_speed, padded.table_low, padded.table_high]
+    )
     run(
         prepared.stepper.string, padded.friction, padded.drive, padded.weight,
-        speeds, np.ascontiguousarray(state), ticks, measures, traces,
+        numbers, np.ascontiguousarray(state), ticks, measures, traces,
     )  # fmt: skip
     return measures[:, :count], traces[:, :count]
 
@@ -202,7 +204,7 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
             "rop_proxy": row(r.ROP_SUM) / nominal,
             "work_at_bit": row(r.WORK),
             "work_per_turn": _where(turned > 1e-3, row(r.WORK) / turned),
-            "time_outside_table": duration * lanes.outside_table,
+            "time_outside_table": row(r.OUTSIDE_TABLE),
         }
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(raw).all(axis=0))
     status = _statuses(finite, row(r.LATE_STUCK), window, values["settling_time_wide"])

@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.bit_rock import contact
 from drillctl.design import Design
 from drillctl.drillstring import Drillstring
 from drillctl.simulation.start import Kind
 
 Array = NDArray[np.float64]
+
+SPEEDS = 161
+"""Speeds at which a slope is looked for, from rest to eight times the set speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +36,8 @@ class Lanes:
         Speed of all nodes at time zero of a start that turns (rad/s).
     nominal_weight : ndarray, shape (lanes,)
         Nominal weight on bit (N).
-    outside_table : ndarray, shape (lanes,)
-        1 where that weight lies outside the friction table, else 0.
+    table_low, table_high : ndarray, shape (lanes,)
+        Range of the friction table (N).
     start : {'rest', 'turning', 'wound_up'}
         Kind of start.
     """
@@ -45,7 +49,8 @@ class Lanes:
     set_speed: Array
     turning_speed: Array
     nominal_weight: Array
-    outside_table: Array
+    table_low: Array
+    table_high: Array
     start: Kind
 
     def __len__(self) -> int:
@@ -65,14 +70,20 @@ class Lanes:
             set_speed=self.set_speed[chosen],
             turning_speed=self.turning_speed[chosen],
             nominal_weight=self.nominal_weight[chosen],
-            outside_table=self.outside_table[chosen],
+            table_low=self.table_low[chosen],
+            table_high=self.table_high[chosen],
             start=self.start,
         )
 
     @cached_property
     def steepest_fall(self) -> float:
-        """Steepest falling slope of the friction in any lane (N m s/rad)."""
-        return float(np.max(self.friction.steepest_fall(self.weight.weight(0.0))))
+        """Steepest falling slope of the rock in any lane (N m s/rad)."""
+        if not self.weight.moves:
+            return float(np.max(self.friction.steepest_fall(self.weight.weight(0.0))))
+        # The weight moves with the speed: looked for, up to far beyond any stick-slip.
+        speeds = self.set_speed * np.linspace(0.0, 8.0, SPEEDS)[:, None]
+        _, slope = contact(self.friction, self.weight, speeds, np.exp)
+        return float(max(0.0, np.max(-slope)))
 
 
 def lane_numbers(design: Design) -> dict[str, float]:
@@ -87,7 +98,7 @@ def lane_numbers(design: Design) -> dict[str, float]:
     numbers["set_speed"] = design.speed
     numbers["turning_speed"] = design.speed if turning is None else turning
     numbers["nominal_weight"] = design.tables.operating_point.weight_on_bit
-    numbers["outside_table"] = float(design.outside_table)
+    numbers["table_low"], numbers["table_high"] = design.table_range
     return numbers
 
 
@@ -113,7 +124,8 @@ def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
         set_speed=numbers["set_speed"],
         turning_speed=numbers["turning_speed"],
         nominal_weight=numbers["nominal_weight"],
-        outside_table=numbers["outside_table"],
+        table_low=numbers["table_low"],
+        table_high=numbers["table_high"],
         start=design.tables.start.kind,
     )
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from drillctl.bit_rock import contact
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.simulation.phases import (
@@ -240,9 +241,7 @@ class System:
         if not self.friction.set_valued:
             direction = 1 if speed >= 0.0 else -1
         # Past zero speed a set-valued law is continued smoothly, so that the event can be located.
-        torque, _ = self.friction.torque_and_slope(
-            self.weight.weight(speed), direction * speed, _exp
-        )
+        torque, _ = contact(self.friction, self.weight, direction * speed, _exp)
         return direction * float(torque)
 
     def holding_torque(self, state: Array) -> float:

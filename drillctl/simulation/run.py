@@ -81,7 +81,7 @@ def _signals(design: Design, traced: dict[str, Array]) -> dict[str, Array]:
     """The signals of a `Simulation` from those of a trace."""
     top_angle, top_speed = traced["top_angle"], traced["top_speed"]
     torque = design.top_drive.torque(top_angle, top_speed - design.speed)
-    weight = design.weight_on_bit.weight(traced["bit_speed"])
+    weight = design.weight_on_bit.weight(np.abs(traced["bit_speed"]))
     return {
         "top_speed": top_speed,
         "bit_speed": traced["bit_speed"],

@@ -175,7 +175,7 @@ def _signals(design: Design, state: Array, direction: Array) -> dict[str, Array]
     angle, speed = state[:nodes], state[nodes : 2 * nodes]
     bit_speed = np.where(direction == 0.0, 0.0, speed[-1] + design.speed)
     top_torque = np.asarray(design.top_drive.torque(angle[0], speed[0])) + 0.0 * angle[0]
-    weight = np.broadcast_to(design.weight_on_bit.weight(bit_speed), bit_speed.shape)
+    weight = np.broadcast_to(design.weight_on_bit.weight(np.abs(bit_speed)), bit_speed.shape)
     friction, _ = design.bit_rock.torque_and_slope(weight, np.abs(bit_speed), np.exp)
     turning = direction if design.bit_rock.set_valued else np.sign(bit_speed)
     _, reaction = stick_phase(design.string, design.speed)
@@ -225,8 +225,15 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
         rop_proxy=_rop_proxy(design, time, signals),
         work_at_bit=motion.energy.bit,
         work_per_turn=m.per_turn(motion.energy.bit, mean, duration),
-        time_outside_table=duration if design.outside_table else 0.0,
+        time_outside_table=_outside_table(design, time, signals["weight_on_bit"]),
     )
+
+
+def _outside_table(design: Design, time: Array, weight: Array) -> float:
+    """Time (s) with the weight outside the friction table, from samples."""
+    low, high = design.table_range
+    outside = (weight < low) | (weight > high)
+    return float(np.trapezoid(outside.astype(float), time))
 
 
 def _rop_proxy(design: Design, time: Array, signals: dict[str, Array]) -> float:

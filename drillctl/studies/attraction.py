@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.bit_rock import contact
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.operating_point import operating_point
@@ -87,8 +88,7 @@ def steady_drilling(design: Design, axes: tuple[Axis, ...], group: Group) -> Ste
             speed[lane] = operating_point(cell).speed
         except InputError:  # there is none
             speed[lane] = np.nan
-    weight = lanes.weight.weight(speed)
-    _, slope = lanes.friction.torque_and_slope(weight, speed, np.exp)
+    _, slope = contact(lanes.friction, lanes.weight, speed, np.exp)
     return Steady(speed, np.where(np.isnan(speed), np.nan, -slope))
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.bit_rock import contact
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.counting import natural_frequencies
@@ -232,8 +233,7 @@ def slopes(design: Design, axes: tuple[Axis, ...], group: Group) -> Array:
     """
     lanes = group.lanes
     _, ki = lanes.drive.gains()
-    weight = lanes.weight.weight(lanes.set_speed)
-    _, rise = lanes.friction.torque_and_slope(weight, lanes.set_speed, np.exp)
+    _, rise = contact(lanes.friction, lanes.weight, lanes.set_speed, np.exp)
     slope = -np.asarray(rise)
     for lane in np.flatnonzero(np.broadcast_to(np.asarray(ki) == 0.0, slope.shape)):
         slope[lane] = _slope(cell_design(design, axes, int(group.cells[lane])))

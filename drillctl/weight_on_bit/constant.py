@@ -16,6 +16,15 @@ class ConstantWeight(NamedTuple):
 
     level: Any
 
-    def weight(self, bit_speed: Any) -> Any:
-        """Weight on bit (N); the same at any `bit_speed` (rad/s)."""
+    @property
+    def moves(self) -> bool:
+        """Whether the weight changes with the bit speed."""
+        return False
+
+    def weight(self, speed: Any) -> Any:
+        """Weight on bit (N); the same at any bit speed `speed` (rad/s)."""
         return self.level
+
+    def slope(self, speed: Any) -> Any:
+        """Weight per bit speed (N s/rad): none."""
+        return 0.0 * speed

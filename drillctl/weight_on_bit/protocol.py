@@ -8,6 +8,15 @@ from typing import Any, Protocol
 class WeightLaw(Protocol):
     """Weight on bit against bit speed."""
 
-    def weight(self, bit_speed: Any) -> Any:
-        """Weight on bit (N) at `bit_speed` (rad/s)."""
+    @property
+    def moves(self) -> bool:
+        """Whether the weight changes with the bit speed."""
+        ...
+
+    def weight(self, speed: Any) -> Any:
+        """Weight on bit (N) at bit speed `speed` >= 0 (rad/s)."""
+        ...
+
+    def slope(self, speed: Any) -> Any:
+        """Weight per bit speed (N s/rad) there."""
         ...

@@ -523,7 +523,8 @@ def test_sections_named_twice_in_the_model(tmp_path):
          "controller: law is missing; allowed: constant-torque, pi"),
         (rig(friction=""), "bit_rock: is missing"),
         (rig(more='[weight_on_bit]\nlaw = "konstant"\n'),
-         "weight_on_bit.law: got 'konstant'; did you mean 'constant'? allowed: constant"),
+         "weight_on_bit.law: no law 'konstant'; did you mean 'constant'? "
+         "allowed: constant, navarro-lopez-suarez"),
         (rig(more='[start]\nkind = "turn"\n'),
          "start.kind: got 'turn'; did you mean 'turning'? allowed: rest, turning, wound_up"),
         (rig(more='[simulation]\naccuracy = "finer"\n'),

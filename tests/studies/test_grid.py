@@ -47,7 +47,7 @@ def lane(lanes, index):
         for part, law in laws.items()
         for name, values in law._asdict().items()
     }
-    for name in ("set_speed", "turning_speed", "nominal_weight", "outside_table"):
+    for name in ("set_speed", "turning_speed", "nominal_weight", "table_low", "table_high"):
         held[name] = getattr(lanes, name)[index]
     return held
 

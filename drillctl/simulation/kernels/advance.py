@@ -12,7 +12,7 @@ from numba import njit, prange
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined, widest_vectors
 from drillctl.simulation.kernels.lane_step import conclude, eliminate
-from drillctl.simulation.kernels.laws import at_lane, load_block, torque_and_slope, weight_at
+from drillctl.simulation.kernels.laws import at_lane, contact, load_block, weight_at
 from drillctl.simulation.kernels.measure_step import (
     begin_measures,
     measure,
@@ -55,9 +55,10 @@ def _begin(friction: Any, weight: Any, work: Any) -> None:
     """State of the laws at time zero."""
     for lane in range(WIDTH):
         speed = work[r.BIT_SPEED + lane]
-        load = weight_at(at_lane(weight, work, r.WEIGHT, lane), speed)
-        law = at_lane(friction, work, r.FRICTION, lane)
-        torque, slope = torque_and_slope(law, load, abs(speed))
+        load = at_lane(weight, work, r.WEIGHT, lane)
+        work[r.REST_LOAD + lane] = weight_at(load, 0.0)
+        work[r.LOAD + lane] = weight_at(load, abs(speed))
+        torque, slope = contact(at_lane(friction, work, r.FRICTION, lane), load, abs(speed))
         work[r.SLOPE + lane] = slope
         direction = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
         work[r.DIRECTION + lane] = direction
@@ -114,6 +115,8 @@ def advance_block(
         set_speed = speed[0, first + lane]
         work[r.SET_SPEED + lane] = set_speed
         work[r.BIT_SPEED + lane] = speed[1, first + lane]
+        work[r.TABLE_LOW + lane] = speed[2, first + lane]
+        work[r.TABLE_HIGH + lane] = speed[3, first + lane]
         work[r.DRAG + lane] = string.drag * set_speed
         work[r.PIPE_OFFSET + lane] = string.pipe_offset * set_speed
         for i in range(start.shape[0]):
@@ -132,9 +135,9 @@ def advance_block(
         if n == clock.steps:
             break
         begin = n * clock.step
-        eliminate(string, drive, weight, work, rate)
-        meet_rock(friction, work)
-        conclude(string, work)
+        eliminate(string, drive, work, rate)
+        meet_rock(friction, weight, work)
+        conclude(string, weight, work)
         in_j1 = _share_after(begin, clock.step, clock.j1_from)
         in_window = _share_after(begin, clock.step, clock.window_from)
         if measure(work, begin, clock.step, in_j1, in_window) > 0:
@@ -188,7 +191,8 @@ clock, measures, traces)`.
 
 - `string`: `BlockString` or `DenseString`.
 - `friction`, `drive`, `weight`: laws with an array, shape (lanes,), for each number.
-- `speed`, shape (2, lanes): set speed and bit speed at time zero (rad/s).
+- `speed`, shape (4, lanes): set speed and bit speed at time zero (rad/s), lowest and highest
+  weight of the friction table (N).
 - `start`, shape (states, lanes): the string at time zero.
 - `clock`: `Clock`.
 - `measures`, shape (MEASURES, lanes): written; the rows from `rows.FIRST_MEASURE` on.

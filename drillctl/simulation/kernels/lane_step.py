@@ -23,10 +23,10 @@ from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.compiling import inlined, widest_vectors
 from drillctl.simulation.kernels.laws import (
     at_lane,
+    contact,
     kinetic_torque_at_rest,
     mean_torque,
     static_torque,
-    torque_and_slope,
     weight_at,
 )
 from drillctl.simulation.kernels.rows import WIDTH
@@ -39,7 +39,7 @@ NEWTON_LIMIT = 30
 
 
 @inlined
-def eliminate(string: Any, drive: Any, weight: Any, work: Any, rate: float) -> None:
+def eliminate(string: Any, drive: Any, work: Any, rate: float) -> None:
     """Reduce string and control to free and gain; `rate` is 1 / step."""
     widest_vectors()
     for lane in range(WIDTH):
@@ -60,9 +60,6 @@ def eliminate(string: Any, drive: Any, weight: Any, work: Any, rate: float) -> N
         work[r.GAIN + lane] = gain
         work[r.PER_GAIN + lane] = 1.0 / gain
 
-        load = weight_at(at_lane(weight, work, r.WEIGHT, lane), work[r.BIT_SPEED + lane])
-        work[r.LOAD + lane] = load
-
 
 @inlined
 def set_up(friction: Any, work: Any) -> int:
@@ -70,7 +67,7 @@ def set_up(friction: Any, work: Any) -> int:
     widest_vectors()
     releases = 0
     for lane in range(WIDTH):
-        free, gain, load = work[r.FREE + lane], work[r.GAIN + lane], work[r.LOAD + lane]
+        free, gain, load = work[r.FREE + lane], work[r.GAIN + lane], work[r.REST_LOAD + lane]
         law = at_lane(friction, work, r.FRICTION, lane)
         kinetic = kinetic_torque_at_rest(law, load)
         direction = work[r.DIRECTION + lane]
@@ -111,7 +108,7 @@ def time_releases(friction: Any, work: Any) -> None:
     widest_vectors()
     for lane in range(WIDTH):
         law = at_lane(friction, work, r.FRICTION, lane)
-        load = work[r.LOAD + lane]
+        load = work[r.REST_LOAD + lane]
         static, kinetic = static_torque(law, load), kinetic_torque_at_rest(law, load)
         holding, last = work[r.NEW_HOLDING + lane], work[r.HOLDING + lane]
         rise = holding - last
@@ -125,7 +122,7 @@ def time_releases(friction: Any, work: Any) -> None:
 
 
 @inlined
-def solve_inclusion(friction: Any, work: Any) -> None:
+def solve_inclusion(friction: Any, weight: Any, work: Any) -> None:
     """Newton's method on u + (gain/2) T(u) = right, u >= 0, in every lane that is open."""
     widest_vectors()
     for _ in range(NEWTON_LIMIT):
@@ -134,7 +131,7 @@ def solve_inclusion(friction: Any, work: Any) -> None:
             law = at_lane(friction, work, r.FRICTION, lane)
             u = work[r.SPEED + lane]
             half = 0.5 * work[r.GAIN + lane]
-            torque, slope = torque_and_slope(law, work[r.LOAD + lane], u)
+            torque, slope = contact(law, at_lane(weight, work, r.WEIGHT, lane), u)
             move = (work[r.RIGHT + lane] - u - half * torque) / (1.0 + half * slope)
             new = u + move
             new = new if new > 0.0 else 0.0
@@ -155,7 +152,7 @@ def decide(friction: Any, work: Any) -> int:
     stops = 0
     for lane in range(WIDTH):
         law = at_lane(friction, work, r.FRICTION, lane)
-        static = static_torque(law, work[r.LOAD + lane])
+        static = static_torque(law, work[r.REST_LOAD + lane])
         free, per_gain = work[r.FREE + lane], work[r.PER_GAIN + lane]
         holding = work[r.NEW_HOLDING + lane]
         sticks = holding <= static and not work[r.OWN + lane] > 0.0
@@ -186,7 +183,7 @@ def time_stops(friction: Any, work: Any) -> None:
         half = 0.5 * work[r.GAIN + lane]
         direction = work[r.DIRECTION + lane]
         past_zero = direction * (work[r.FREE + lane] - half * work[r.KINETIC + lane])
-        past_zero -= half * kinetic_torque_at_rest(law, work[r.LOAD + lane])
+        past_zero -= half * kinetic_torque_at_rest(law, work[r.REST_LOAD + lane])
         stuck = past_zero / (past_zero - abs(work[r.BIT_SPEED + lane]))
         stops = direction != 0.0 and work[r.NEW_DIRECTION + lane] == 0.0
         work[r.STUCK_SHARE + lane] = stuck if stops else work[r.STUCK_SHARE + lane]
@@ -194,7 +191,7 @@ def time_stops(friction: Any, work: Any) -> None:
 
 
 @inlined
-def conclude(string: Any, work: Any) -> None:
+def conclude(string: Any, weight: Any, work: Any) -> None:
     """Top torque of the step, and the state at its end."""
     widest_vectors()
     for lane in range(WIDTH):
@@ -212,4 +209,7 @@ def conclude(string: Any, work: Any) -> None:
         work[r.DIRECTION + lane] = work[r.NEW_DIRECTION + lane]
         work[r.KINETIC + lane] = work[r.NEW_KINETIC + lane]
         work[r.SPEED_BEFORE + lane] = work[r.BIT_SPEED + lane]
-        work[r.BIT_SPEED + lane] = work[r.NEW_SPEED + lane]
+        speed = work[r.NEW_SPEED + lane]
+        work[r.BIT_SPEED + lane] = speed
+        work[r.LOAD_BEFORE + lane] = work[r.LOAD + lane]
+        work[r.LOAD + lane] = weight_at(at_lane(weight, work, r.WEIGHT, lane), abs(speed))

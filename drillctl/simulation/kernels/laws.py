@@ -105,12 +105,43 @@ def _mean_torque(law, angle, rate):
     return lambda law, angle, rate: method(law, angle, rate)
 
 
-def weight_at(law: Any, bit_speed: float) -> float:
-    """`law.weight(bit_speed)`."""
+def weight_at(law: Any, speed: float) -> float:
+    """`law.weight(speed)`."""
     raise NotImplementedError("compiled only")
 
 
 @overload(weight_at)
-def _weight_at(law, bit_speed):
+def _weight_at(law, speed):
     method = _method(law, "weight")
-    return lambda law, bit_speed: method(law, bit_speed)
+    return lambda law, speed: method(law, speed)
+
+
+def contact(friction: Any, weight: Any, speed: float) -> tuple[float, float]:
+    """`bit_rock.contact.contact(friction, weight, speed, exp)`."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(contact)
+def _contact(friction, weight, speed):
+    load_at = _method(weight, "weight")
+    torque_at = _method(friction, "torque_and_slope")
+    if not weight.instance_class.moves.fget(None):  # a property of the class
+        return lambda friction, weight, speed: torque_at(
+            friction, load_at(weight, speed), speed, exp
+        )
+    load_slope = _method(weight, "slope")
+    by_weight = _torque_by_weight(friction, torque_at)
+
+    def moving(friction, weight, speed):
+        load = load_at(weight, speed)
+        torque, slope = torque_at(friction, load, speed, exp)
+        return torque, slope + by_weight(friction, load, speed) * load_slope(weight, speed)
+
+    return moving
+
+
+def _torque_by_weight(friction: Any, torque_at: Any) -> Any:
+    if hasattr(friction.instance_class, "torque_by_weight"):
+        method = _method(friction, "torque_by_weight")
+        return inlined(lambda friction, load, speed: method(friction, load, speed, exp))
+    return inlined(lambda friction, load, speed: torque_at(friction, 1.0, speed, exp)[0])

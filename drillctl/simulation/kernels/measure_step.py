@@ -38,6 +38,7 @@ def measure(work: Any, begin: float, step: float, in_j1: float, in_window: float
     for lane in range(WIDTH):
         before, speed = work[r.SPEED_BEFORE + lane], work[r.BIT_SPEED + lane]
         set_speed, load = work[r.SET_SPEED + lane], work[r.LOAD + lane]
+        load_before = work[r.LOAD_BEFORE + lane]
         error_before, error = before - set_speed, speed - set_speed
         size_before, size = abs(error_before), abs(error)
         work[r.J1 + lane] += in_j1 * step * 0.5 * (size_before + size)
@@ -53,8 +54,11 @@ def measure(work: Any, begin: float, step: float, in_j1: float, in_window: float
         work[r.BIT_ANGLE + lane] += angle
         work[r.LATE_ANGLE + lane] += in_window * angle
         work[r.WORK + lane] += work[r.BIT_TORQUE + lane] * angle
-        work[r.WEIGHT_SUM + lane] += load * step
-        work[r.ROP_SUM + lane] += load * 0.5 * step * (abs(before) + abs(speed))
+        outside = load < work[r.TABLE_LOW + lane] or load > work[r.TABLE_HIGH + lane]
+        work[r.OUTSIDE_TABLE + lane] += step if outside else 0.0
+        work[r.WEIGHT_SUM + lane] += 0.5 * step * (load_before + load)
+        drilled = load_before * abs(before) + load * abs(speed)
+        work[r.ROP_SUM + lane] += 0.5 * step * drilled
 
         stuck = step * work[r.STUCK_SHARE + lane]
         work[r.STUCK_TIME + lane] += stuck

@@ -15,7 +15,7 @@ from drillctl.simulation.kernels.lane_step import (
     time_releases,
     time_stops,
 )
-from drillctl.simulation.kernels.laws import at_lane, torque_and_slope
+from drillctl.simulation.kernels.laws import at_lane, contact
 from drillctl.simulation.kernels.rows import WIDTH
 
 BISECTIONS = 60
@@ -24,32 +24,32 @@ CLOSE = 1e-13
 """It has converged when it moves less than this (rad/s, relative over 1 rad/s)."""
 
 
-def meet_rock(friction: Any, work: Any) -> None:
+def meet_rock(friction: Any, weight: Any, work: Any) -> None:
     """Bit speed and bit torque of the step from what string and drive leave free."""
     raise NotImplementedError("compiled only")
 
 
 @overload(meet_rock)
-def _meet_rock(friction, work):
+def _meet_rock(friction, weight, work):
     # A property of the class: it reads no number of the law.
     if friction.instance_class.set_valued.fget(None):
-        return lambda friction, work: _stick_or_slip(friction, work)
-    return lambda friction, work: _creep(friction, work)
+        return lambda friction, weight, work: _stick_or_slip(friction, weight, work)
+    return lambda friction, weight, work: _creep(friction, weight, work)
 
 
 @inlined
-def _stick_or_slip(friction: Any, work: Any) -> None:
+def _stick_or_slip(friction: Any, weight: Any, work: Any) -> None:
     # What takes divisions and happens rarely is done when some lane needs it; it leaves the
     # other lanes as they are.
     if set_up(friction, work) > 0:
         time_releases(friction, work)
-    solve_inclusion(friction, work)
+    solve_inclusion(friction, weight, work)
     if decide(friction, work) > 0:
         time_stops(friction, work)
 
 
 @inlined
-def _creep(friction: Any, work: Any) -> None:
+def _creep(friction: Any, weight: Any, work: Any) -> None:
     """The step of a smooth law: w + theta gain T(w) = free - (1 - theta) gain T(before).
 
     The mean torque is the trapezoid's, theta = 1/2, while the bit's own time constant under the
@@ -74,12 +74,12 @@ def _creep(friction: Any, work: Any) -> None:
         work[r.SPEED + lane] = guess if guess < sign * right else sign * right
         work[r.OPEN + lane] = 1.0
     for _ in range(BISECTIONS):
-        if _safeguarded_newton(friction, work) == 0:
+        if _safeguarded_newton(friction, weight, work) == 0:
             break
     for lane in range(WIDTH):
         sign, u = work[r.SIGN + lane], work[r.SPEED + lane]
         law = at_lane(friction, work, r.FRICTION, lane)
-        torque, slope = torque_and_slope(law, work[r.LOAD + lane], u)
+        torque, slope = contact(law, at_lane(weight, work, r.WEIGHT, lane), u)
         work[r.NEW_SPEED + lane] = sign * u
         work[r.NEW_DIRECTION + lane] = sign
         work[r.NEW_KINETIC + lane] = sign * torque
@@ -89,14 +89,14 @@ def _creep(friction: Any, work: Any) -> None:
 
 
 @inlined
-def _safeguarded_newton(friction: Any, work: Any) -> int:
+def _safeguarded_newton(friction: Any, weight: Any, work: Any) -> int:
     """One step of Newton's method, or a bisection where it would leave the bracket."""
     widest_vectors()
     still_open = 0
     for lane in range(WIDTH):
         law = at_lane(friction, work, r.FRICTION, lane)
         u, share = work[r.SPEED + lane], work[r.SHARE_NEW + lane]
-        torque, slope = torque_and_slope(law, work[r.LOAD + lane], u)
+        torque, slope = contact(law, at_lane(weight, work, r.WEIGHT, lane), u)
         excess = u + share * torque - work[r.RIGHT + lane]
         low = u if excess < 0.0 else work[r.LOW_BOUND + lane]
         high = u if excess >= 0.0 else work[r.HIGH_BOUND + lane]

@@ -139,7 +139,7 @@ def mean_torque_and_slope(
         half = 0.5 * (high - low)
         cosine = np.cos(low + half * (nodes + 1.0))
         speed = mean[..., None] + amplitude[..., None] * cosine
-        weight = design.weight_on_bit.weight(speed)
+        weight = design.weight_on_bit.weight(np.abs(speed))
         torque, _ = design.bit_rock.torque_and_slope(weight, np.abs(speed), np.exp)
         part = sign * half * weights * torque
         total += part.sum(axis=-1)
