@@ -84,7 +84,7 @@ class Design:
     @cached_property
     def top_drive(self) -> TopDriveLaw:
         """Top-drive law."""
-        return parts.top_drive(self.tables)
+        return parts.top_drive(self.tables, lambda: self.string)
 
     @cached_property
     def weight_on_bit(self) -> WeightLaw:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from drillctl.bit_rock import (
     BitRockLaw,
@@ -23,7 +24,10 @@ from drillctl.design.tables import (
     FrictionRow,
     JansenVanDenSteenTable,
     NavarroLopezSuarezTable,
+    PITable,
     SectionTable,
+    SoftTorqueTable,
+    StiffSpeedTable,
     StribeckTable,
     TabulatedFrictionTable,
     TuckerWangTable,
@@ -266,12 +270,27 @@ def _coefficients(table: NavarroLopezSuarezTable, weight: float) -> NavarroLopez
     return rows.at(weight)
 
 
-def top_drive(tables: DesignTables) -> TopDriveLaw:
-    """Top-drive law with its numbers."""
-    table = tables.controller
-    if isinstance(table, ConstantTorqueTable):
-        return ConstantTorque(table.torque)
-    return PI(table.kp, table.ki)
+def top_drive(tables: DesignTables, string: Callable[[], Drillstring]) -> TopDriveLaw:
+    """Top-drive law with its numbers; `string` is asked for by a law that is tuned to it.
+
+    Raises
+    ------
+    InputError
+        A law tuned to the pipe on a string whose uppermost section is a lumped spring.
+    """
+    match tables.controller:
+        case PITable(kp=kp, ki=ki):
+            return PI(kp, ki)
+        case ConstantTorqueTable(torque=torque):
+            return ConstantTorque(torque)
+        case StiffSpeedTable(stiffness=stiffness, rate=rate):
+            from drillctl.linear.tuning import stiff_speed
+
+            return PI(*stiff_speed(string(), stiffness, rate))
+        case SoftTorqueTable(share=share):
+            from drillctl.linear.tuning import soft_torque
+
+            return PI(*soft_torque(string(), share))
 
 
 def weight_on_bit(tables: DesignTables) -> WeightLaw:

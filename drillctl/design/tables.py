@@ -340,6 +340,34 @@ class PITable(Table):
     ki: q.IntegralGain
 
 
+class StiffSpeedTable(Table):
+    """Stiff speed control: kp = stiffness x pipe impedance, ki = rate x drive inertia.
+
+    The defaults are those of a public drilling simulator (NORCE).
+    """
+
+    law: Literal["stiff-speed"]
+    stiffness: q.PositiveNumber = 50.0
+    rate: q.PositiveNumber = 5.0
+
+
+class SoftTorqueTable(Table):
+    """Soft torque, a PI tuned to the string: kp = pipe impedance / share, ki = w_s^2 J_d.
+
+    w_s is the lowest frequency of the string with the top held, J_d the inertia of the drive.
+    """
+
+    law: Literal["soft-torque"]
+    share: q.PositiveNumber = 0.25
+
+    @field_validator("share")
+    @classmethod
+    def _up_to_one(cls, value: float) -> float:
+        if value > 1.0:
+            raise InputError(f"must be at most 1, got {value:g}")
+        return value
+
+
 class ConstantTorqueTable(Table):
     """A drive at constant torque."""
 
@@ -473,7 +501,9 @@ BitRockTable = Annotated[
     Field(discriminator="law"),
 ]
 WeightOnBitTable = Annotated[ConstantWeightTable | FollowingSpeedTable, Field(discriminator="law")]
-ControllerTable = Annotated[PITable | ConstantTorqueTable, Field(discriminator="law")]
+ControllerTable = Annotated[
+    PITable | ConstantTorqueTable | StiffSpeedTable | SoftTorqueTable, Field(discriminator="law")
+]
 
 
 class DesignTables(Table):

@@ -31,20 +31,26 @@ def stick_slip_frequency(string: Drillstring) -> float:
     return float(natural_frequencies(string.parts, "finite-elements", 1, top_held=True)[0])
 
 
-def stiff_speed(string: Drillstring) -> tuple[float, float]:
+def stiff_speed(
+    string: Drillstring, stiffness: float = 50.0, rate: float = 5.0
+) -> tuple[float, float]:
     """Gains of a stiff speed controller: Kp = 50 zeta, Ki = 5 J_d.
 
     Parameters
     ----------
     string : Drillstring
         Gives pipe impedance zeta and drive inertia J_d.
+    stiffness : float
+        Kp over zeta.
+    rate : float
+        Ki over J_d (1/s2).
 
     Returns
     -------
     tuple of float
         Kp (N m s/rad) and Ki (N m/rad), the default of a public drilling simulator (NORCE).
     """
-    return 50.0 * pipe_impedance(string), 5.0 * string.parts.top_inertia
+    return stiffness * pipe_impedance(string), rate * string.parts.top_inertia
 
 
 def soft_torque(string: Drillstring, share: float = 0.25) -> tuple[float, float]:

@@ -510,17 +510,17 @@ def test_sections_named_twice_in_the_model(tmp_path):
     ("text", "message"),
     [
         (rig(controller='[controller]\nlaw = "pid"\nkp = 1\nki = 1\n'),
-         "controller.law: no law 'pid'; did you mean 'pi'? allowed: constant-torque, pi"),
+         "controller.law: no law 'pid'; did you mean 'pi'? allowed: constant-torque, pi, soft-torque, stiff-speed"),
         (rig(controller="[controller]\nlaw = 3\n"),
-         "controller.law: no law 3; allowed: constant-torque, pi"),
+         "controller.law: no law 3; allowed: constant-torque, pi, soft-torque, stiff-speed"),
         (rig(controller="[controller]\nlaw = [3]\n"),
-         "controller.law: no law a list; allowed: constant-torque, pi"),
+         "controller.law: no law a list; allowed: constant-torque, pi, soft-torque, stiff-speed"),
         (rig(friction=FRICTION.replace("lopez-suarez", "lopes-suarez")),
          "bit_rock.law: no law 'navarro-lopes-suarez'; did you mean 'navarro-lopez-suarez'? "
          "allowed: bit-radius-friction, coulomb, jansen-van-den-steen, navarro-lopez-suarez, "
          "stribeck, tabulated, tucker-wang"),
         (rig(controller="[controller]\nkp = 1\n"),
-         "controller: law is missing; allowed: constant-torque, pi"),
+         "controller: law is missing; allowed: constant-torque, pi, soft-torque, stiff-speed"),
         (rig(friction=""), "bit_rock: is missing"),
         (rig(more='[weight_on_bit]\nlaw = "konstant"\n'),
          "weight_on_bit.law: no law 'konstant'; did you mean 'constant'? "
