@@ -57,6 +57,7 @@ reports: $(BIN)/drillctl
 	$(BIN)/drillctl modes monteiro-trindade-140kn --out runs/reports/modes
 	$(BIN)/drillctl loop monteiro-trindade-140kn --out runs/reports/loop
 	$(BIN)/drillctl regions monteiro-trindade-140kn --out runs/reports/regions
+	$(BIN)/drillctl regularisation monteiro-trindade-140kn --out runs/reports/regularisation
 	$(BIN)/drillctl simulate monteiro-trindade-140kn --out runs/reports/simulate
 	$(BIN)/drillctl map monteiro-trindade-140kn --out runs/reports/map
 	mkdir -p $(REPORT)

@@ -249,6 +249,25 @@ def regions(
 
 
 @app.command()
+def regularisation(
+    design: DesignName,
+    sets: Sets = None,
+    axis: Axes = None,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """The same map with friction smoothed by tanh: what regularising costs."""
+    from drillctl import verbs
+
+    _use(threads)
+    verbs.regularisation(_with_axes(_load(design, sets), axis), Options(out, json, units, verbose))
+
+
+@app.command()
 def simulate(
     design: DesignName,
     sets: Sets = None,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from drillctl.linear import LoopAnalysis
     from drillctl.simulation import Simulation
     from drillctl.simulation.limit_cycle import LimitCycle
-    from drillctl.studies import Axis, Sweep, ThreeRegions
+    from drillctl.studies import Axis, Regularisation, Sweep, ThreeRegions
 
 _MEASURES = {
     "j1": "s", "stuck_time": "s", "sticks": "", "stick_slip_index": "",
@@ -191,6 +191,21 @@ def regions(result: ThreeRegions) -> None:
         f"J1 level {result.level:g} s; attracted: within {result.band:.0%} of the operating speed "
         f"throughout the last {result.window:g} s of {result.horizon:g} s"
     )
+
+
+def regularisation(result: Regularisation) -> None:
+    """What each width of the smoothing does to J1 and to the regions."""
+    summary = result.summary()
+    exact = summary["set_valued_cells"]
+    levels = list(exact)
+    rows = [["set-valued", "-", "-", *(str(exact[level]) for level in levels)]]
+    for row in summary["widths"]:
+        cells = [f"{row['cells'][x]} ({row['changed_side'][x]} changed)" for x in levels]
+        shifts = [f"{row[name]:.2%}" for name in ("median_shift", "worst_shift")]
+        rows.append([f"{row['width']:g} rad/s", *shifts, *cells])
+    title = result.design.tables.title or result.design.name
+    heads = ["friction", "median change of J1", "worst", *(f"J1 <= {x} s" for x in levels)]
+    table(f"{title}: friction smoothed by tanh, {result.j1.size} cells", heads, rows)
 
 
 def _span(bounds: tuple[float, float] | None, factor: float) -> str:

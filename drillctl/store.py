@@ -36,6 +36,7 @@ from drillctl.store_reading import READERS, stored_name
 from drillctl.studies.audit import choose_cells
 from drillctl.studies.grid import axes_of
 from drillctl.studies.loop_maps import LoopMap
+from drillctl.studies.regularisation import WIDTHS, Regularisation
 from drillctl.studies.sweeps import Sweep
 from drillctl.studies.three_regions import PAPER_LEVEL, ThreeRegions
 
@@ -215,6 +216,7 @@ VERBS = {
     "LimitCycle": "cycle",
     "LoopAnalysis": "loop",
     "LoopMap": "loop-map",
+    "Regularisation": "regularisation",
     "ThreeRegions": "regions",
 }
 
@@ -279,6 +281,12 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["axes"] = axes
         if result.level != PAPER_LEVEL:
             settings["level"] = result.level
+    elif isinstance(result, Regularisation):
+        axes = [[a.path, a.values.tolist()] for a in result.axes]
+        if axes != _own_axes(design):
+            settings["axes"] = axes
+        if tuple(result.widths) != WIDTHS:
+            settings["widths"] = result.widths.tolist()
     elif isinstance(result, LimitCycle):
         settings["duration"] = result.simulated.duration
     elif isinstance(result, Modes):

@@ -23,6 +23,7 @@ from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.studies.audit import Audit
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
+from drillctl.studies.regularisation import Regularisation
 from drillctl.studies.sweeps import Sweep
 from drillctl.studies.three_regions import FIELDS, MASKS, ThreeRegions
 
@@ -183,6 +184,21 @@ def _orbit(data: xarray.Dataset, summary: dict[str, Any]) -> Orbit | None:
     )
 
 
+def read_regularisation(
+    design: Design, data: xarray.Dataset, summary: dict[str, Any]
+) -> Regularisation:
+    """A `Regularisation` as it was saved."""
+    return Regularisation(
+        design=design,
+        axes=tuple(_axis(path, data[stored_name(path)]) for path in summary["axes"]),
+        levels=design.tables.map.levels,
+        widths=data["width"].values,
+        j1=data["j1"].values,
+        smoothed=data["smoothed_j1"].values,
+        total_seconds=summary["total_seconds"],
+    )
+
+
 READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "map": read_sweep,
     "simulate": read_simulation,
@@ -191,4 +207,5 @@ READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "loop": read_loop,
     "loop-map": read_loop_map,
     "regions": read_three_regions,
+    "regularisation": read_regularisation,
 }

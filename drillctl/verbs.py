@@ -160,6 +160,22 @@ def regions(design: Design, options: Options) -> None:
     _conclude(folder, result.summary(), options)
 
 
+def regularisation(design: Design, options: Options) -> None:
+    """A map with set-valued friction beside the same with smoothed friction, with its figure."""
+    from drillctl import plots, printing, store, studies
+
+    folder = store.claim("regularisation", design, options.out)
+    if _shown_again(folder, options, lambda: printing.regularisation(store.open(folder.path))):
+        return
+    with _running(folder), console.progress() as bar:
+        result = studies.regularisation(design, progress=bar)
+    store.write_data(result, folder.path)
+    _draw(plots.regularisation(result), folder.path / "regularisation.png")
+    if not options.json:
+        printing.regularisation(result)
+    _conclude(folder, result.summary(), options)
+
+
 def simulate(design: Design, options: Options) -> None:
     """One run with its figure, signals and measures."""
     import drillctl

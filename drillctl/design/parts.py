@@ -177,9 +177,14 @@ def bit_rock(tables: DesignTables) -> BitRockLaw:
     law = _friction(tables)
     _refuse_impossible_friction(law, tables)
     over = getattr(tables.bit_rock, "regularised_over", None)
-    if over is not None and isinstance(law, NavarroLopezSuarez):
-        return Stribeck(static=law.a2, sliding=law.a1, decay=law.beta, sharpness=1.0 / over)
-    return law
+    if over is None or isinstance(tables.bit_rock, StribeckTable):
+        return law
+    if not isinstance(law, NavarroLopezSuarez):
+        raise InputError(
+            "does not go with a weight on bit that moves over a friction table",
+            "bit_rock.regularised_over",
+        )
+    return Stribeck(static=law.a2, sliding=law.a1, decay=law.beta, sharpness=1.0 / over)
 
 
 def _friction(tables: DesignTables) -> BitRockLaw:

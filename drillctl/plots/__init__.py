@@ -10,6 +10,7 @@
 - `map.py`: `stability_map` with regions and audit; `sweep_line` for a single parameter.
 - `limit_cycle.py`: `limit_cycle`, one period by each method.
 - `three_regions.py`: `three_regions` over the same two parameters.
+- `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
 - `time_response.py`: `time_response`, speeds against time with sticks shaded.
 - `style.py`: colours, sizes and the making of figures, shared by all.
 
@@ -27,6 +28,7 @@ from drillctl.plots.loop_shape import nichols, nyquist, sensitivity
 from drillctl.plots.map import stability_map, sweep_line
 from drillctl.plots.mobility import mobility
 from drillctl.plots.modes import mode_shapes
+from drillctl.plots.regularisation import regularisation
 from drillctl.plots.root_locus import root_locus
 from drillctl.plots.three_regions import three_regions
 from drillctl.plots.time_response import time_response
@@ -42,6 +44,7 @@ __all__ = [
     "mode_shapes",
     "nichols",
     "nyquist",
+    "regularisation",
     "root_locus",
     "sensitivity",
     "stability_map",

@@ -6,6 +6,7 @@
 - `regions.py`: cells and outlines at or under a level.
 - `three_regions.py`: locally stable, J1 under a level, attracted: three regions of one map.
 - `attraction.py`: operating points and long runs of its cells.
+- `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
 - `audit.py`: cells of a map simulated again with the reference solver.
 - `responses.py`, `tables.py`: time responses at cells of a map; maps as CSV.
 - `blocks.py`: finished blocks of a long run.
@@ -15,6 +16,7 @@
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import LoopMap, loop_map
 from drillctl.studies.regions import Region, region
+from drillctl.studies.regularisation import Regularisation, regularisation
 from drillctl.studies.responses import responses
 from drillctl.studies.sweeps import Sweep, stability_map, sweep
 from drillctl.studies.tables import write_loop_table, write_tables
@@ -24,10 +26,12 @@ __all__ = [
     "Axis",
     "LoopMap",
     "Region",
+    "Regularisation",
     "Sweep",
     "ThreeRegions",
     "loop_map",
     "region",
+    "regularisation",
     "responses",
     "stability_map",
     "sweep",

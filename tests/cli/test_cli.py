@@ -192,6 +192,18 @@ def test_regions_json(call):
     assert drillctl.open(f"runs/{BISTABLE}-regions-1").summary() == found
 
 
+def test_regularisation_json(call):
+    axes = ["--axis", "controller.kp=500:650:2", "--axis", "controller.ki=75:150:2"]
+    code, out, _ = call("regularisation", DESIGN, "--json", *axes)
+    found = parsed(out)
+    assert code == 0
+    assert len(found["widths"]) == 6
+    assert drillctl.open(f"runs/{DESIGN}-regularisation-1").summary() == found
+    code, out, _ = call("regularisation", DESIGN, *axes)
+    assert code == 0
+    assert "0.02 rad/s" in out
+
+
 def test_overdamped_poles_are_told(call):
     found = parsed(call("modes", "navarro-lopez-4dof", "--json")[1])
     assert [e["damping_ratio"] for e in found["free_free"] if e.get("overdamped")] == [None]

@@ -510,7 +510,8 @@ def test_sections_named_twice_in_the_model(tmp_path):
     ("text", "message"),
     [
         (rig(controller='[controller]\nlaw = "pid"\nkp = 1\nki = 1\n'),
-         "controller.law: no law 'pid'; did you mean 'pi'? allowed: constant-torque, pi, soft-torque, stiff-speed"),
+         "controller.law: no law 'pid'; did you mean 'pi'? "
+         "allowed: constant-torque, pi, soft-torque, stiff-speed"),
         (rig(controller="[controller]\nlaw = 3\n"),
          "controller.law: no law 3; allowed: constant-torque, pi, soft-torque, stiff-speed"),
         (rig(controller="[controller]\nlaw = [3]\n"),

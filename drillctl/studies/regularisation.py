@@ -1,0 +1,177 @@
+"""What smoothing the friction does to a map: the same cells, set-valued and regularised."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.progress import SILENT, Progress
+from drillctl.studies.grid import Axis, axes_of
+from drillctl.studies.sweeps import sweep
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray
+
+Array = NDArray[np.float64]
+
+WIDTHS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
+"""Widths of the regularisation that are compared by default (rad/s)."""
+WIDTH_PATH = "bit_rock.regularised_over"
+
+
+@dataclass(frozen=True, eq=False)
+class Regularisation:
+    """A map with set-valued friction beside the same map with smoothed friction.
+
+    Attributes
+    ----------
+    design : Design
+        The rig, its friction set-valued.
+    axes : tuple of Axis
+        Of the map.
+    levels : tuple of float
+        Levels of J1 (s).
+    widths : ndarray, shape (widths,)
+        Speeds over which tanh changes the sign of the friction (rad/s), widest first.
+    j1 : ndarray, shape of the map
+        J1 of the set-valued law (s).
+    smoothed : ndarray, shape (widths, *shape of the map)
+        J1 of the regularised law (s).
+    total_seconds : float
+        From call to return (s).
+    """
+
+    design: Design
+    axes: tuple[Axis, ...]
+    levels: tuple[float, ...]
+    widths: Array
+    j1: Array
+    smoothed: Array
+    total_seconds: float
+
+    @property
+    def shifts(self) -> Array:
+        """Relative change of J1 in each cell, shape of `smoothed`; NaN where a run failed."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self.smoothed / self.j1 - 1.0
+
+    def cells(self, level: float) -> tuple[int, list[int]]:
+        """Cells at or under a level: of the set-valued map, and of each width."""
+        return int((self.j1 <= level).sum()), [int((x <= level).sum()) for x in self.smoothed]
+
+    def changed(self, level: float) -> list[int]:
+        """Cells on the other side of a level than in the set-valued map, of each width."""
+        return [int(((x <= level) != (self.j1 <= level)).sum()) for x in self.smoothed]
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """Both maps, labelled by parameter path and width."""
+        import xarray
+
+        paths = [a.path for a in self.axes]
+        coords = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
+        coords["width"] = ("width", self.widths, {"units": "rad/s"})
+        variables = {
+            "j1": (paths, self.j1, {"units": "s"}),
+            "smoothed_j1": (["width", *paths], self.smoothed, {"units": "s"}),
+        }
+        return xarray.Dataset(variables, coords)
+
+    def summary(self) -> dict[str, Any]:
+        """Per width: median and worst shift of J1, cells per level and cells that change side."""
+        counts = {level: self.cells(level) for level in self.levels}
+        rows = []
+        for i, width in enumerate(self.widths):
+            size = np.abs(self.shifts[i])
+            finite = size[np.isfinite(size)]
+            rows.append(
+                {
+                    "width": float(width),
+                    "median_shift": float(np.median(finite)) if finite.size else None,
+                    "worst_shift": float(finite.max()) if finite.size else None,
+                    "failed": int(np.isnan(self.smoothed[i]).sum()),
+                    "cells": {f"{level:g}": counts[level][1][i] for level in self.levels},
+                    "changed_side": {f"{level:g}": self.changed(level)[i] for level in self.levels},
+                }
+            )
+        return {
+            "axes": {
+                a.path: {"min": float(a.values[0]), "max": float(a.values[-1]), "points": len(a)}
+                for a in self.axes
+            },
+            "set_valued_cells": {f"{level:g}": counts[level][0] for level in self.levels},
+            "widths": rows,
+            "total_seconds": self.total_seconds,
+        }
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
+
+
+def regularisation(
+    design: Design,
+    widths: tuple[float, ...] = WIDTHS,
+    axes: tuple[Axis, ...] | None = None,
+    progress: Progress = SILENT,
+) -> Regularisation:
+    """Compute a map with set-valued friction and again with friction smoothed by tanh.
+
+    Parameters
+    ----------
+    design : Design
+        Under the law of Navarro-Lopez & Suarez in either form.
+    widths : tuple of float
+        Widths of the regularisation (rad/s).
+    axes : tuple of Axis, optional
+        Instead of the design's own.
+    progress : Progress
+        Told of blocks.
+
+    Raises
+    ------
+    InputError
+        A law that is not regularised, a width that is not more than zero, or a weight on bit
+        that moves (its friction law has no regularised form).
+    """
+    begin = time.perf_counter()
+    if not hasattr(design.tables.bit_rock, "regularised_over"):
+        raise InputError(
+            f"{design.tables.bit_rock.law!r} has no regularised form; allowed: "
+            "bit-radius-friction, navarro-lopez-suarez",
+            "bit_rock.law",
+        )
+    if not widths or min(widths) <= 0.0:
+        raise InputError("widths must be more than 0 rad/s", "widths")
+    exact = _set_valued(design)
+    axes = axes_of(exact, exact.tables.map.axes) if axes is None else axes
+    reference = sweep(exact, axes, audit_cells=0, progress=progress)
+    ordered = np.array(sorted(widths, reverse=True))
+    smoothed = [
+        sweep(exact.replace({WIDTH_PATH: units.SI(float(w))}), axes, 0, progress).j1
+        for w in ordered
+    ]
+    seconds = time.perf_counter() - begin
+    return Regularisation(
+        exact, axes, exact.tables.map.levels, ordered, reference.j1, np.array(smoothed), seconds
+    )
+
+
+def _set_valued(design: Design) -> Design:
+    """The design with its friction as a set, whatever it says."""
+    if design.weight_on_bit.moves:
+        raise InputError("friction under a weight that moves is not regularised", "weight_on_bit")
+    if getattr(design.tables.bit_rock, "regularised_over", None) is None:
+        return design
+    raise InputError("is compared with the set-valued law: leave it out", WIDTH_PATH)
