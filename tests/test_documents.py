@@ -66,12 +66,15 @@ def test_links_lead_somewhere():
             assert (ROOT / named).exists(), f"{path.name}: {named}"
 
 
-def test_the_page_of_keys_is_up_to_date():
-    path = ROOT / "docs" / "make_design_file.py"
-    spec = importlib.util.spec_from_file_location("make_design_file", path)
+@pytest.mark.parametrize(
+    ("script", "made"), [("make_design_file", "design-file.md"), ("make_laws", "laws.md")]
+)
+def test_pages_made_from_the_code_are_up_to_date(script, made):
+    path = ROOT / "docs" / f"{script}.py"
+    spec = importlib.util.spec_from_file_location(script, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    assert module.page() == (ROOT / "docs" / "design-file.md").read_text(encoding="utf-8")
+    assert module.page() == (ROOT / "docs" / made).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
