@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from drillctl.design import tables
+
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -75,6 +77,19 @@ def test_pages_made_from_the_code_are_up_to_date(script, made):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     assert module.page() == (ROOT / "docs" / made).read_text(encoding="utf-8")
+
+
+def test_the_page_of_keys_leaves_no_table_out():
+    path = ROOT / "docs" / "make_design_file.py"
+    spec = importlib.util.spec_from_file_location("make_design_file", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    listed = {table for _, table in module.TABLES}
+    every = {
+        table for table in vars(tables).values()
+        if isinstance(table, type) and issubclass(table, tables.Table)
+    }  # fmt: skip
+    assert every - listed == {tables.Table, tables.DesignTables}
 
 
 @pytest.mark.parametrize(
