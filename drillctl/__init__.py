@@ -31,6 +31,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from drillctl.design import Design as Design
     from drillctl.design import load as load
+    from drillctl.errors import InputError as InputError
     from drillctl.linear import loop as loop
     from drillctl.linear import modes as modes
     from drillctl.simulation import simulate as simulate
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Design": "drillctl.design",
     "load": "drillctl.design",
+    "InputError": "drillctl.errors",
     "modes": "drillctl.linear",
     "loop": "drillctl.linear",
     "simulate": "drillctl.simulation",

@@ -16,6 +16,7 @@ from drillctl.linear import (
     root_locus,
     telling_frequencies,
 )
+from drillctl.linear.boundary import WINDOW, Window
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.tuning import stick_slip_frequency
 
@@ -84,5 +85,12 @@ def _over_gains(design: Design, slope: float) -> dict[str, Figure]:
     locus = root_locus(design, GAINS[0], np.linspace(0.25, 2.0, 141) * (kp or 500.0))
     return {
         "root-locus": plots.root_locus(locus),
-        "boundary": plots.gain_boundary(gain_boundary(design, slope=slope)),
+        "boundary": plots.gain_boundary(gain_boundary(design, _window(design), slope)),
     }
+
+
+def _window(design: Design) -> Window:
+    """Gains to look at: the usual ones, or so many that the design's own lie well inside."""
+    kp, ki = design.top_drive.gains()
+    (p0, p1), (i0, i1) = WINDOW
+    return (p0, max(p1, 1.6 * kp)), (i0, max(i1, 1.6 * ki))

@@ -312,7 +312,7 @@ def open(folder: str | Path) -> Any:
 
     Returns
     -------
-    Sweep, Simulation or Modes
+    Sweep, Simulation, Modes, LoopAnalysis, LoopMap, LimitCycle, ThreeRegions or Regularisation
         Equal to what was saved, to the bit; a simulation without its events.
 
     Raises

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from drillctl.studies import LoopMap
 
 DPI = 150
+MOST_NODES = 120
+"""Nodes of a string up to which `loop` maps what needs its poles in every cell."""
 
 
 def _draw(figure: Figure, path: Path) -> None:
@@ -41,14 +43,17 @@ def _shown_again(folder: RunFolder, options: Options, show: Callable[[], None]) 
 
 @contextmanager
 def _running(folder: RunFolder) -> Iterator[None]:
-    """A run in its folder: an impossible one leaves none, an interrupted one can go on."""
+    """A run in its folder: an impossible one leaves none, an interrupted map can go on."""
     try:
         yield
     except InputError:
         folder.discard()
         raise
     except KeyboardInterrupt:
-        console.note(f"what is finished is kept: the same with --out {folder.path} goes on")
+        if folder.verb == "map":  # the others have no finished parts to go on from
+            console.note(f"what is finished is kept: the same with --out {folder.path} goes on")
+        else:
+            folder.discard()
         raise
 
 
@@ -102,7 +107,10 @@ def loop(design: Design, options: Options) -> None:
     if found is not None:
         summary["map"] = found.summary()
         studies.write_loop_table(found, folder.path)
-        boundary = linear.gain_boundary(design) if over_gains(found.axes) else None
+        boundary = None
+        if over_gains(found.axes):
+            kp, ki = ((float(a.values[0]), float(a.values[-1])) for a in found.axes)
+            boundary = linear.gain_boundary(design, window=(kp, ki))
         picture = plots.loop_map(found, boundary=boundary, system=options.units)
         _draw(picture, folder.path / "slope-margin.png")
     if not options.json:
@@ -121,7 +129,14 @@ def _loop_map(design: Design, bar: Progress) -> LoopMap | None:
         if "axes" in design.tree.get("map", {}):
             raise
         return None  # the default ones, over gains, do not fit a drive without them
-    return studies.loop_map(design, axes, progress=bar) if len(axes) == 2 else None
+    if len(axes) != 2:
+        console.note(f"no map: it runs over 2 parameters, the design's [map] has {len(axes)}")
+        return None
+    nodes = design.string.nodes
+    if nodes > MOST_NODES:
+        console.note(f"map of the slope margin alone: poles of {nodes} nodes a cell take long")
+        return studies.loop_map(design, axes, ("slope_margin",), progress=bar)
+    return studies.loop_map(design, axes, progress=bar)
 
 
 def cycle(design: Design, options: Options) -> None:
@@ -152,6 +167,9 @@ def regions(design: Design, options: Options) -> None:
     if _shown_again(folder, options, lambda: printing.regions(store.open(folder.path))):
         return
     with _running(folder), console.progress() as bar:
+        if len(design.tables.map.axes) != 2:
+            count = len(design.tables.map.axes)
+            raise InputError(f"regions are shown over 2 parameters, got {count}", "map.axes")
         result = studies.three_regions(design, progress=bar)
     store.write_data(result, folder.path)
     _draw(plots.three_regions(result, system=options.units), folder.path / "three-regions.png")

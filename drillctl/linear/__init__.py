@@ -26,6 +26,7 @@ Transfer functions are never formed: their coefficients lose all digits on a str
 thirty elements. `control` is imported where a system is made and not before, as it is slow.
 """
 
+from drillctl.linear import export, tuning
 from drillctl.linear.boundary import GainBoundary, gain_boundary
 from drillctl.linear.ends import ends_of
 from drillctl.linear.impedance import DriveImpedance, drive_impedance
@@ -70,6 +71,7 @@ __all__ = [
     "drive_impedance",
     "ends_of",
     "equilibria",
+    "export",
     "frequency_response",
     "gain_boundary",
     "loop",
@@ -83,4 +85,5 @@ __all__ = [
     "slope_margin",
     "slope_margins",
     "telling_frequencies",
+    "tuning",
 ]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, Route, ends_of, telling_grid
-from drillctl.linear.operating_point import operating_point
+from drillctl.linear.operating_point import at_speed
 from drillctl.linear.slope_margin import slope_margin, slope_margins
 
 if TYPE_CHECKING:
@@ -138,21 +138,21 @@ def gain_boundary(
             raise InputError(
                 f"{low:g} to {high:g} is no range of gains from 0 up", f"window {name}"
             )
-    if slope is None:
-        slope = _slope_at_set_speed(design)
+    if slope is None:  # of gains that hold the set speed, whatever the design's own drive does
+        slope = at_speed(design, design.speed).slope
+    if not math.isfinite(slope):
+        raise InputError(f"must be a number, got {slope:g}", "slope")
     ends = ends_of(design.string, model)
+    if slope <= 0.0:  # a torque that does not fall with speed only takes energy
+        import shapely
+
+        (p0, p1), (i0, i1) = window
+        everywhere = shapely.MultiPolygon([shapely.box(p0, i0, p1, i1)])
+        return GainBoundary(design, model, slope, window, (), everywhere)
     branches = _branches(ends, slope, window)
     return GainBoundary(
         design, model, slope, window, branches, _region(ends, slope, window, branches)
     )
-
-
-def _slope_at_set_speed(design: Design) -> float:
-    from drillctl.linear.operating_point import at_speed
-
-    _, ki = design.top_drive.gains()
-    # Gains that hold the set speed are asked for, whatever the design's own drive does.
-    return operating_point(design).slope if ki != 0.0 else at_speed(design, design.speed).slope
 
 
 def _gains(ends: Ends, slope: float, omega: Array) -> tuple[Array, Array]:
@@ -196,6 +196,19 @@ def _runs(linked: NDArray[np.bool_]) -> list[slice]:
     return [slice(begin, end + 1) for begin, end in zip(begins, ends, strict=True)]
 
 
+def _to_the_edge(branch: Branch, window: Window) -> tuple[Array, Array]:
+    """Gains of a branch, the one that begins at Ki = 0 led across that edge of the window.
+
+    The lowest frequency is not zero: its gain is, to rounding, and a line that ends next to an
+    edge does not cut what lies beside it.
+    """
+    low, high = window[1]
+    if low > 0.0 or abs(branch.ki[0]) > 1e-6 * (high - low):
+        return branch.kp, branch.ki
+    beyond = -1e-3 * (high - low)
+    return np.append(branch.kp[0], branch.kp), np.append(beyond, branch.ki)
+
+
 def _region(
     ends: Ends, slope: float, window: Window, branches: tuple[Branch, ...]
 ) -> shapely.MultiPolygon:
@@ -203,12 +216,10 @@ def _region(
 
     (p0, p1), (i0, i1) = window
     box = shapely.box(p0, i0, p1, i1)
-    lines = [shapely.LineString(np.column_stack([b.kp, b.ki])) for b in branches]
+    lines = [shapely.LineString(np.column_stack(_to_the_edge(b, window))) for b in branches]
     cuts = shapely.unary_union([box.boundary, *(line.intersection(box) for line in lines)])
     faces = [face for face in shapely.get_parts(shapely.polygonize([cuts])) if face.area > 0.0]
     inside = np.array([[p.x, p.y] for p in (face.representative_point() for face in faces)])
-    if slope < 0.0:  # a torque that rises with speed only takes energy
-        return shapely.MultiPolygon([box])
     margin = slope_margins(ends, inside[:, 0], inside[:, 1]).slope
     # Between the lines of high modes faces are slivers, and the quick margin not sharp enough.
     for face in np.flatnonzero(np.abs(margin - slope) < CLOSE * slope):

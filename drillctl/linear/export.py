@@ -131,7 +131,7 @@ def write_matrices(design: Design, path: str | Path) -> Path:
         else:
             np.savez_compressed(path, allow_pickle=False, **_flat(content))
     except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", str(path)) from None
+        raise InputError(f"cannot be written: {error.strerror or error}", str(path)) from None
     return path
 
 

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-SPEEDS = np.geomspace(0.05, 20.0, 241)
+SPEEDS = np.geomspace(1e-3, 20.0, 401)
 """Speeds at which a critical one is looked for, over the set speed."""
-WEIGHTS = np.geomspace(0.05, 20.0, 121)
+WEIGHTS = np.geomspace(1e-3, 20.0, 201)
 """Weights at which a critical one is looked for, over that of the design."""
 
 
@@ -54,7 +54,7 @@ class LoopAnalysis:
     margins : Margins or None
         Broken at the top torque; None for a loop that is not stable.
     critical_speed : float or None
-        Speed nearest to the operating one at which stability changes (rad/s).
+        Speed nearest to the set speed at which stability changes (rad/s).
     critical_weight_on_bit : float or None
         Weight nearest to the operating one at which stability changes (N), within the friction
         table unless the design allows more.
@@ -198,7 +198,7 @@ def critical_speed(design: Design, tolerated: float | None = None) -> float | No
     -------
     float or None
         The one nearest to the set speed in ratio (rad/s); None if there is none from a
-        twentieth to twenty times the set speed.
+        thousandth to twenty times the set speed.
     """
     limit = _margin(design) if tolerated is None else tolerated
     return _nearest_zero(

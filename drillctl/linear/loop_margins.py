@@ -45,8 +45,8 @@ class Margins:
     ----------
     peak_sensitivity : float
         Largest of abs(S).
-    peak_sensitivity_hz : float
-        Where (Hz).
+    peak_sensitivity_hz : float or None
+        Where (Hz); None where it is reached beyond all modes only.
     disk : float
         Balanced disk margin alpha.
     gain_db, phase_deg : float
@@ -60,7 +60,7 @@ class Margins:
     """
 
     peak_sensitivity: float
-    peak_sensitivity_hz: float
+    peak_sensitivity_hz: float | None
     disk: float
     gain_db: float
     phase_deg: float
@@ -88,12 +88,13 @@ def margins(ends: Ends, drive: TopDriveLaw, slope: float, poles: ComplexArray) -
     peak, peak_at = _largest(lambda w: np.abs(loop.sensitivity(w)), grid)
     balance, disk_at = _largest(lambda w: np.abs(loop.balance(w)), grid)
     # At no or at any frequency a loop without drive has S - T = 1: a disk that touches nothing.
-    disk = 1.0 / balance
+    disk = 1.0 / max(balance, 0.5)
     gain, phase = disk_gain_and_phase(disk)
     delay, delay_at = _delay_margin(loop, grid)
     return Margins(
-        peak_sensitivity=peak,
-        peak_sensitivity_hz=peak_at / (2.0 * math.pi),
+        # Far above all modes L vanishes and S tends to 1.
+        peak_sensitivity=max(peak, 1.0),
+        peak_sensitivity_hz=peak_at / (2.0 * math.pi) if peak > 1.0 else None,
         disk=disk,
         gain_db=gain,
         phase_deg=phase,
@@ -218,8 +219,9 @@ def peak_sensitivities(
         best = 1 + int(np.argmin(small(grid, kp[i], ki[i], slope[i])[1:-1]))
         bracket[:, i] = grid[best - 1 : best + 2]
     found = elementwise.find_minimum(small, tuple(bracket), args=(kp, ki, slope))
-    level = np.minimum(found.f_x, small(bracket[1], kp, ki, slope))
-    return np.asarray(-level)
+    level = np.fmin(found.f_x, small(bracket[1], kp, ki, slope))
+    # Far above all modes L vanishes and S tends to 1.
+    return np.asarray(np.maximum(-level, 1.0))
 
 
 def _delay_margin(loop: _Loop, grid: Array) -> tuple[float, float | None]:

@@ -183,6 +183,8 @@ def frequency_response(
     refuse_frequencies(frequency)
     if loop not in LOOPS:
         raise InputError(f"no loop {loop!r}; {nearest(loop, LOOPS)}", "loop")
+    if not math.isfinite(slope):
+        raise InputError(f"must be a number, got {slope:g}", "slope")
     string = subject if isinstance(subject, Drillstring) else subject.string
     s = 2j * math.pi * frequency
     drive = np.zeros_like(s)

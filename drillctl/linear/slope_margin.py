@@ -93,7 +93,7 @@ def crossings(ends: Ends, kp: float, ki: float) -> Crossings:
         slope, omega = np.append(slope, kp + search.rigid), np.append(omega, 0.0)
     slope = np.maximum(slope, 0.0)
     if kp == 0.0 and not search.lossy:  # exactly, not to rounding
-        slope[:] = 0.0
+        slope[:] = ends.parts.bit_damping
     order = np.lexsort([omega, slope])
     return Crossings(slope[order], omega[order])
 
@@ -137,7 +137,7 @@ def slope_margins(ends: Ends, kp: ArrayLike, ki: ArrayLike) -> SlopeMargins:
         pair, place = search.lowest(part, pair, place)
         found = search.refined(place, part[pair])
         level = np.maximum(search.impedance(found, part[pair, 0], part[pair, 1]).real, 0.0)
-        level[(part[pair, 0] == 0.0) & (not search.lossy)] = 0.0
+        level[(part[pair, 0] == 0.0) & (not search.lossy)] = ends.parts.bit_damping
         # The last write wins: written from the highest to the lowest.
         order = np.lexsort([-found, -level])
         slope[first + pair[order]] = level[order]
@@ -173,7 +173,8 @@ class _Search:
             x.drag + x.mass_damping * (x.inertia + x.end_inertia) for x in parts.sections
         )  # fmt: skip
         s = 1j * self.grid
-        self.lossy = self.rigid > 0.0 or parts.modal_damping > 0.0 or any(
+        # The bit's own damper apart: it adds to D* and leaves the reactance lossless.
+        self.lossy = self.rigid > parts.bit_damping or parts.modal_damping > 0.0 or any(
             x.coupling_damping > 0.0 or x.stiffness_damping > 0.0 for x in parts.sections
         )  # fmt: skip
         # Without inertia at the bit resonances are so sharp that the grid tells little of them.

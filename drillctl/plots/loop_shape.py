@@ -198,12 +198,14 @@ def sensitivity(
     )
     best = int(np.argmax(sensitive))
     peak, where = float(sensitive[best]), float(frequency[best])
-    if analysis is not None and analysis.margins is not None:
-        peak, where = analysis.margins.peak_sensitivity, analysis.margins.peak_sensitivity_hz
-    ax.plot(
-        where, peak, "o", color=style.BLACK, markersize=6,
-        label=f"largest |S|: {peak:.4g} at {where:.3g} Hz",
-    )  # fmt: skip
+    found = None if analysis is None else analysis.margins
+    if found is not None and found.peak_sensitivity_hz is not None:
+        peak, where = found.peak_sensitivity, found.peak_sensitivity_hz
+    if found is None or found.peak_sensitivity_hz is not None:
+        ax.plot(
+            where, peak, "o", color=style.BLACK, markersize=6,
+            label=f"largest |S|: {peak:.4g} at {where:.3g} Hz",
+        )  # fmt: skip
     ax.axhline(1.0, color=GREY, linewidth=0.9, zorder=1)
     style.dress(ax, "frequency (Hz)", "magnitude", "Sensitivity at the top torque")
     hertz(ax)

@@ -204,6 +204,22 @@ def test_regularisation_json(call):
     assert "0.02 rad/s" in out
 
 
+def test_regions_over_one_parameter_are_refused_at_once(call):
+    axis = ["--axis", "controller.torque=9 kN*m:11 kN*m:3"]
+    code, out, err = call("regions", BISTABLE, *axis, "--out", "one")
+    assert (code, out) == (2, "")
+    assert "map.axes: regions are shown over 2 parameters, got 1" in err
+    assert not Path("one").exists()
+
+
+def test_loop_without_a_map_says_so(call):
+    axis = ["--axis", "controller.torque=9 kN*m:11 kN*m:3"]
+    code, out, err = call("loop", BISTABLE, *axis, "--json")
+    assert code == 0
+    assert "map" not in parsed(out)
+    assert "no map: it runs over 2 parameters" in err
+
+
 def test_overdamped_poles_are_told(call):
     found = parsed(call("modes", "navarro-lopez-4dof", "--json")[1])
     assert [e["damping_ratio"] for e in found["free_free"] if e.get("overdamped")] == [None]
@@ -702,6 +718,22 @@ def test_interrupted_in_a_default_folder_says_how_to_go_on(call, monkeypatch):
     code, _, err = call("map", DESIGN, *SMALL)
     assert code == 130
     assert f"--out runs/{DESIGN}-map-1" in err
+
+
+@pytest.mark.parametrize(("verb", "place"), [("loop", "linear.loop"), ("cycle", "limit_cycle")])
+def test_interrupted_without_parts_leaves_nothing_and_promises_nothing(
+    call, monkeypatch, verb, place
+):
+    def stop(*arguments, **options):
+        raise KeyboardInterrupt
+
+    import drillctl.linear  # noqa: F401
+
+    monkeypatch.setattr(f"drillctl.{place}", stop, raising=False)
+    code, out, err = call(verb, BISTABLE, "--out", "cut")
+    assert (code, out) == (130, "")
+    assert "goes on" not in err
+    assert not Path("cut").exists()
 
 
 def test_a_string_that_varies_resumes_by_group(call, monkeypatch):

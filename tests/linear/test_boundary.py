@@ -8,7 +8,7 @@ import shapely
 
 import drillctl
 from drillctl.errors import InputError
-from drillctl.linear import ends_of, gain_boundary, slope_margin
+from drillctl.linear import ends_of, gain_boundary, slope_margin, slope_margins
 from drillctl.linear.loop_poles import loop_poles, many_loop_poles
 
 DESIGN = "monteiro-trindade-140kn"
@@ -126,3 +126,22 @@ def test_slope_too_steep_for_any_gains(design):
 def test_impossible_windows_are_refused(design, window):
     with pytest.raises(InputError, match="no range of gains"):
         gain_boundary(design, window=window)
+
+
+@pytest.mark.parametrize("top", [5.0, 150.0, 500.0])
+@pytest.mark.parametrize("bit", [300.0, 600.0, 2000.0])
+def test_light_drives_and_heavy_bits(top, bit):
+    # There the lowest branch begins at Ki = 0 inside the region's edge, and must cut it.
+    design = drillctl.load(
+        DESIGN, **{"top_drive.inertia": f"{top} kg*m^2", "bha.inertia": f"{bit} kg*m^2"}
+    )
+    found = gain_boundary(design)
+    kp, ki = np.meshgrid(np.linspace(5, 995, 34), np.linspace(2.5, 497.5, 34), indexing="ij")
+    mask = slope_margins(ends_of(design.string), kp, ki).slope > found.slope
+    inside = shapely.intersects_xy(found.region, kp, ki)
+    assert (mask != inside).sum() <= 2
+
+
+def test_a_slope_that_is_no_number_is_refused(design):
+    with pytest.raises(InputError, match="must be a number"):
+        gain_boundary(design, slope=float("nan"))

@@ -17,6 +17,7 @@ from drillctl.linear.loop_margins import disk_gain_and_phase, pole_grid
 from drillctl.linear.loop_poles import loop_poles, many_loop_poles, with_slope
 from drillctl.linear.slope_margin import slope_margin
 from drillctl.linear.state_space import open_loop_matrices
+from drillctl.studies import Axis, loop_map
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"
@@ -202,3 +203,19 @@ def test_saved_and_read_back(tmp_path):
         assert back.summary() == found.summary()
         assert back.margins == found.margins
         np.testing.assert_array_equal(back.poles, found.poles)
+
+
+def test_a_sensitivity_is_never_under_one():
+    # With a heavy damper at the bit |S| stays under 1 on any grid and tends to 1 beyond it.
+    design = paper(2250.0, 125.0, **{"bha.damping": "500 N*m*s/rad"})
+    found = loop(design)
+    assert found.margins.peak_sensitivity >= 1.0
+    assert found.margins.disk <= 2.0
+    grid = (
+        Axis("controller.kp", "", np.array([1000.0, 2250.0])),
+        Axis("controller.ki", "", np.array([100.0, 125.0])),
+    )
+    found = loop_map(design, grid)
+    assert found.stable.all()
+    assert np.isfinite(found.values["peak_sensitivity"]).all()
+    assert found.values["peak_sensitivity"].min() >= 1.0

@@ -11,8 +11,10 @@ from scipy.optimize import brentq
 
 import drillctl
 from drillctl.drillstring import Section, assemble
+from drillctl.errors import InputError
 from drillctl.linear.counting import natural_frequencies
 from drillctl.linear.ends import ends_of
+from drillctl.linear.loop_poles import with_slope
 from drillctl.linear.operating_point import operating_point
 from drillctl.linear.slope_margin import crossings, slope_margin, slope_margins
 from drillctl.linear.state_space import closed_loop_matrices
@@ -485,3 +487,20 @@ def test_maps_of_a_continuum_without_bit_inertia():
     ends = ends_of(assemble((Section("pipe", 30, 315.0, inertia=280.0),), 500.0, 0.0), "wave")
     one, _ = slope_margin(ends, 1.7e5, 0.33)
     assert slope_margins(ends, 1.7e5, 0.33).slope == pytest.approx(one, rel=1e-4)
+
+
+def test_the_bits_own_damper_is_all_that_an_undamped_string_tolerates():
+    string = string_of(**{"bha.damping": "180 N*m*s/rad"})
+    for model in ("finite-elements", "wave", "matrices"):
+        assert slope_margin(ends_of(string, model), 0.0, 100.0)[0] == 180.0
+    assert np.all(slope_margins(ends_of(string), 0.0, [0.0, 50.0, 100.0]).slope == 180.0)
+    for slope, stable in ((178.0, True), (182.0, False)):
+        poles = np.linalg.eigvals(with_slope(closed_loop_matrices(string, 0.0, 100.0), slope).a)
+        assert (poles.real.max() < 0.0) == stable
+
+
+@pytest.mark.parametrize("gains", [(-1.0, 5.0), (5.0, -1.0), (float("nan"), 5.0)])
+def test_gains_that_feed_energy_are_refused(gains):
+    for function in (slope_margin, slope_margins):
+        with pytest.raises(InputError, match="gains of 0 or more"):
+            function(ends_of(string_of()), *gains)

@@ -353,3 +353,12 @@ def test_the_table_has_ten_rows():
 def test_the_table_is_what_the_code_gives(number):
     module = script()
     assert module.row(number, module.CASES[number - 1]) == rows_of_the_page()[number - 1]
+
+
+def test_a_bit_that_the_drive_cannot_turn_is_no_equilibrium():
+    design = drillctl.load("navarro-lopez-2dof-bistable", **{"controller.torque": "1 kN*m"})
+    found = limit_cycle(design, periods=16)
+    assert found.status == "stalled"
+    assert json.dumps(found.summary(), allow_nan=False)
+    last = found.summary()["simulated"]["last_distance"]
+    assert last is None or last < 1e3

@@ -102,14 +102,15 @@ class Returns:
         """Whether the bit turns evenly, ever more so."""
         return bool(
             self.mean_speed > 0.0
+            and self.bit_speed.min() > 0.0
             and self.swing[-1] <= LARGEST * self.mean_speed
             and self.swing[-1] <= self.swing[0]
         )
 
     @property
     def stalled(self) -> bool:
-        """Whether the bit stood still throughout."""
-        return bool(self.swing.max() == 0.0 and self.mean_speed == 0.0)
+        """Whether the bit stood still throughout the last expected period."""
+        return bool(self.swing[-1] == 0.0 and self.bit_speed[-1] == 0.0)
 
     def distances(self, apart: int = 1) -> Array:
         """Distance of each return from the one `apart` before, over the swing of bit speed."""
@@ -130,7 +131,7 @@ class Returns:
             "period_spread": spread(self.periods),
             "peak_spread": spread(self.last_peaks),
             "stuck_time_spread": spread(self.stuck[-LAST:]),
-            "last_distance": float(self.distances()[-1]) if some else None,
+            "last_distance": float(self.distances()[-1]) if some and self.swing[-1] > 0 else None,
         }
 
 
