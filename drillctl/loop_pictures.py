@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from drillctl.design import Design
     from drillctl.studies import Axis
 
+MOST_NODES = 120
+"""Nodes of a string up to which its poles are computed over and over, for maps and loci."""
 GAINS = ("controller.kp", "controller.ki")
 
 
@@ -81,12 +83,13 @@ def _over_gains(design: Design, slope: float) -> dict[str, Figure]:
     """Root locus over the proportional gain and the boundary of the stable gains."""
     from drillctl import plots
 
+    figures = {"boundary": plots.gain_boundary(gain_boundary(design, _window(design), slope))}
     kp, _ = design.top_drive.gains()
-    locus = root_locus(design, GAINS[0], np.linspace(0.25, 2.0, 141) * (kp or 500.0))
-    return {
-        "root-locus": plots.root_locus(locus),
-        "boundary": plots.gain_boundary(gain_boundary(design, _window(design), slope)),
-    }
+    path = GAINS[0]
+    if design.string.nodes <= MOST_NODES and design.tables.controller.law == "pi":
+        locus = root_locus(design, path, np.linspace(0.25, 2.0, 141) * (kp or 500.0))
+        figures["root-locus"] = plots.root_locus(locus)
+    return figures
 
 
 def _window(design: Design) -> Window:

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from drillctl.studies import LoopMap
 
 DPI = 150
-MOST_NODES = 120
-"""Nodes of a string up to which `loop` maps what needs its poles in every cell."""
 
 
 def _draw(figure: Figure, path: Path) -> None:
@@ -121,20 +119,24 @@ def loop(design: Design, options: Options) -> None:
 def _loop_map(design: Design, bar: Progress) -> LoopMap | None:
     """The map over the two axes of a design; None where its axes do not make one."""
     from drillctl import studies
+    from drillctl.loop_pictures import MOST_NODES
     from drillctl.studies.grid import axes_of
 
     try:
         axes = axes_of(design, design.tables.map.axes)
-    except InputError:
-        if "axes" in design.tree.get("map", {}):
-            raise
-        return None  # the default ones, over gains, do not fit a drive without them
+    except InputError as error:
+        if "axes" in design.tree.get("map", {}):  # the default ones fit no drive without gains
+            console.note(f"no map: {error}")
+        return None
     if len(axes) != 2:
         console.note(f"no map: it runs over 2 parameters, the design's [map] has {len(axes)}")
         return None
     nodes = design.string.nodes
     if nodes > MOST_NODES:
-        console.note(f"map of the slope margin alone: poles of {nodes} nodes a cell take long")
+        console.note(
+            f"map of the slope margin alone, no root locus: {nodes} nodes; up to {MOST_NODES} the "
+            "poles are computed for every cell"
+        )
         return studies.loop_map(design, axes, ("slope_margin",), progress=bar)
     return studies.loop_map(design, axes, progress=bar)
 

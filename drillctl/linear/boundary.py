@@ -25,7 +25,7 @@ from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, Route, ends_of, telling_grid
 from drillctl.linear.operating_point import at_speed
-from drillctl.linear.slope_margin import slope_margin, slope_margins
+from drillctl.linear.slope_margin import slope_margins
 
 if TYPE_CHECKING:
     import shapely
@@ -222,8 +222,10 @@ def _region(
     inside = np.array([[p.x, p.y] for p in (face.representative_point() for face in faces)])
     margin = slope_margins(ends, inside[:, 0], inside[:, 1]).slope
     # Between the lines of high modes faces are slivers, and the quick margin not sharp enough.
-    for face in np.flatnonzero(np.abs(margin - slope) < CLOSE * slope):
-        margin[face] = slope_margin(ends, *inside[face])[0]
+    near = np.flatnonzero(np.abs(margin - slope) < CLOSE * slope)
+    if len(near):
+        every = slope_margins(ends, inside[near, 0], inside[near, 1], candidates=10**9)
+        margin[near] = every.slope
     stable = margin > slope
     whole = shapely.unary_union([face for face, kept in zip(faces, stable, strict=True) if kept])
     return shapely.MultiPolygon([p for p in shapely.get_parts(whole) if p.area > 0.0])

@@ -109,7 +109,9 @@ def slope_margin(ends: Ends, kp: float, ki: float) -> tuple[float, float]:
     return float(found.slope[0]), float(found.omega[0])
 
 
-def slope_margins(ends: Ends, kp: ArrayLike, ki: ArrayLike) -> SlopeMargins:
+def slope_margins(
+    ends: Ends, kp: ArrayLike, ki: ArrayLike, candidates: int = CANDIDATES
+) -> SlopeMargins:
     """D* over many gain pairs at once.
 
     Parameters
@@ -118,6 +120,8 @@ def slope_margins(ends: Ends, kp: ArrayLike, ki: ArrayLike) -> SlopeMargins:
         The string.
     kp, ki : array_like
         Gains (N m s/rad, N m/rad), not negative; broadcast against each other.
+    candidates : int
+        Crossings of each pair that are refined.
 
     Returns
     -------
@@ -129,7 +133,7 @@ def slope_margins(ends: Ends, kp: ArrayLike, ki: ArrayLike) -> SlopeMargins:
     kp, ki = np.broadcast_arrays(np.asarray(kp, dtype=float), np.asarray(ki, dtype=float))
     gains = np.column_stack([kp.ravel(), ki.ravel()])
     refuse_gains(gains)
-    search = _Search(ends)
+    search = _Search(ends, candidates)
     slope, omega = np.full(len(gains), np.inf), np.zeros(len(gains))
     for first in range(0, len(gains), CHUNK):
         part = gains[first : first + CHUNK]
@@ -165,7 +169,7 @@ class _Search:
     matrices.
     """
 
-    def __init__(self, ends: Ends) -> None:
+    def __init__(self, ends: Ends, candidates: int = CANDIDATES) -> None:
         self.ends = ends
         self.grid = telling_grid(ends)
         parts = ends.parts
@@ -178,7 +182,7 @@ class _Search:
             x.coupling_damping > 0.0 or x.stiffness_damping > 0.0 for x in parts.sections
         )  # fmt: skip
         # Without inertia at the bit resonances are so sharp that the grid tells little of them.
-        self.candidates = CANDIDATES if parts.bit_inertia > 0.0 else len(self.grid)
+        self.candidates = candidates if parts.bit_inertia > 0.0 else len(self.grid)
         resistor = max(x.impedance for x in parts.sections) or np.sqrt(
             parts.sections[0].stiffness * (parts.top_inertia + parts.bit_inertia)
         )
