@@ -150,13 +150,16 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
 def validate(
     design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False
 ) -> None:
-    """Check a design: every key, unit and range, and its map's axes."""
+    """Check a design: every key, unit and range, its map's axes, its uncertain parameters."""
     from drillctl import console
+    from drillctl.studies.draws import uncertain_parameters
     from drillctl.studies.grid import axes_of
 
     found = _load(design, sets)
     if "axes" in found.tree.get("map", {}):  # the default ones need not fit every law
         axes_of(found, found.tables.map.axes)
+    if found.tables.uncertain:
+        uncertain_parameters(found)
     if json:
         console.emit({"valid": True, "name": found.name, "path": found.origin})
     else:

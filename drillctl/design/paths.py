@@ -13,7 +13,9 @@ from drillctl.design.tables import Table
 from drillctl.errors import InputError, nearest, shown
 from drillctl.units import Kind
 
-_HIDDEN = ("title", "source", "status", "notes", "schema_version", "map")
+_HIDDEN = (
+    "title", "source", "status", "notes", "schema_version", "map", "uncertain", "uncertainty",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

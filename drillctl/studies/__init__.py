@@ -7,12 +7,14 @@
 - `three_regions.py`: locally stable, J1 under a level, attracted: three regions of one map.
 - `attraction.py`: operating points and long runs of its cells.
 - `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
+- `draws.py`: uncertain parameters and draws from them; `drawn_lanes.py`: the lanes of draws.
 - `audit.py`: cells of a map simulated again with the reference solver.
 - `responses.py`, `tables.py`: time responses at cells of a map; maps as CSV.
 - `blocks.py`: finished blocks of a long run.
 - `memory.py`: grids too large for the memory.
 """
 
+from drillctl.studies.draws import Draws, draw, uncertain_parameters
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import LoopMap, loop_map
 from drillctl.studies.regions import Region, region
@@ -24,11 +26,13 @@ from drillctl.studies.three_regions import ThreeRegions, three_regions
 
 __all__ = [
     "Axis",
+    "Draws",
     "LoopMap",
     "Region",
     "Regularisation",
     "Sweep",
     "ThreeRegions",
+    "draw",
     "loop_map",
     "region",
     "regularisation",
@@ -36,6 +40,7 @@ __all__ = [
     "stability_map",
     "sweep",
     "three_regions",
+    "uncertain_parameters",
     "write_loop_table",
     "write_tables",
 ]
