@@ -17,6 +17,7 @@ from drillctl.bit_rock.tabulated import KNOTS
 from drillctl.design import quantities as q
 from drillctl.design.base import Table as Table
 from drillctl.design.base import number_or_quantity
+from drillctl.design.compare_tables import CompareTable
 from drillctl.design.uncertain_tables import DistributionTable, UncertaintyTable, flattened
 from drillctl.drillstring import GRADES, PIPES
 from drillctl.errors import InputError, nearest, shown
@@ -523,6 +524,7 @@ class DesignTables(Table):
     map: MapTable = MapTable()
     uncertain: dict[str, DistributionTable] = Field(default_factory=dict)
     uncertainty: UncertaintyTable = UncertaintyTable()
+    compare: CompareTable = CompareTable()
 
     @field_validator("uncertain", mode="before")
     @classmethod

@@ -18,6 +18,8 @@ _TYPES = {
     "model_attributes_type": "it must be a table",
     "dict_type": "it must be a table",
     "string_type": "it must be text in quotes",
+    "bool_type": "it must be true or false",
+    "bool_parsing": "it must be true or false",
 }
 """What is due, by pydantic's name of the error."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,20 +91,32 @@ def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
         Every draw is impossible; the message is that of the first.
     """
     design = _beyond_the_table(design, draws)
-    possible: list[tuple[int, Design]] = []
+    apart = any(path.startswith(SHARED) for path in draws.values)
+    possible: list[_Drawn] = []
     errors: list[InputError] = []
     for number in range(len(draws)):
         values = {path: units.SI(column[number]) for path, column in draws.values.items()}
         try:
             variant = design.replace(values)
-            lane_numbers(variant)
+            lane = lane_numbers(variant)
         except InputError as error:
             errors.append(error)
         else:
-            possible.append((number, variant))
+            # Thousands of designs would fill the memory; lanes on one string need but one.
+            kept = variant if apart or not possible else possible[0].design
+            possible.append(_Drawn(number, kept, lane))
     if not possible:
         raise InputError(f"every draw is impossible; the first: {errors[0]}", "uncertain")
-    return DrawnLanes(_groups(possible, draws), _told(errors))
+    parts = [[one] for one in possible] if apart else [possible]
+    return DrawnLanes(tuple(_group(part) for part in parts), _told(errors))
+
+
+class _Drawn(NamedTuple):
+    """A possible draw: its position, the design of its string, the numbers of its lane."""
+
+    number: int
+    design: Design
+    lane: dict[str, float]
 
 
 def _beyond_the_table(design: Design, draws: Draws) -> Design:
@@ -113,19 +126,10 @@ def _beyond_the_table(design: Design, draws: Draws) -> Design:
     return design.replace({"bit_rock.outside_table": "extrapolate"})
 
 
-def _groups(possible: list[tuple[int, Design]], draws: Draws) -> tuple[DrawnGroup, ...]:
-    if any(path.startswith(SHARED) for path in draws.values):
-        parts = [[one] for one in possible]
-    else:
-        parts = [possible]
-    return tuple(_group(part) for part in parts)
-
-
-def _group(part: list[tuple[int, Design]]) -> DrawnGroup:
-    found = [lane_numbers(variant) for _, variant in part]
-    columns = {key: np.array([numbers[key] for numbers in found]) for key in found[0]}
-    design = part[0][1]
-    return DrawnGroup(design, lanes_of(design, columns), np.array([number for number, _ in part]))
+def _group(part: list[_Drawn]) -> DrawnGroup:
+    columns = {key: np.array([one.lane[key] for one in part]) for key in part[0].lane}
+    design = part[0].design
+    return DrawnGroup(design, lanes_of(design, columns), np.array([one.number for one in part]))
 
 
 def _told(errors: list[InputError]) -> tuple[Failures, ...]:
