@@ -9,7 +9,7 @@ import inspect
 from pathlib import Path
 from typing import Any, get_args
 
-from drillctl.design import tables
+from drillctl.design import compare_tables, tables, uncertain_tables
 from drillctl.design.paths import kind_of
 
 HEAD = """# Keys of a design file
@@ -48,6 +48,10 @@ TABLES = (
     ("[simulation]", tables.SimulationTable),
     ("[map]", tables.MapTable),
     ("entries of map.axes", tables.AxisTable),
+    ('[uncertain."dotted.path"]', uncertain_tables.DistributionTable),
+    ("[uncertainty]", uncertain_tables.UncertaintyTable),
+    ("[compare]", compare_tables.CompareTable),
+    ("entries of compare.cases", compare_tables.CaseTable),
 )
 
 

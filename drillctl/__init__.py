@@ -10,7 +10,7 @@ A design flows one way: file -> `Design` -> plant -> simulation -> map -> region
 `weight_on_bit`         laws of the weight on bit
 `linear`                plant and loop as `control.StateSpace`, modes, margins, boundaries
 `simulation`            reference solver (located events) and batch engine (lanes)
-`studies`               sweeps, regions, audits
+`studies`               sweeps, regions, comparisons, audits
 `plots`                 a result in, a figure out
 `store`                 results on disk
 `units`, `errors`       quantities at the edge; exceptions
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from drillctl.simulation import simulate as simulate
     from drillctl.simulation.limit_cycle import limit_cycle as limit_cycle
     from drillctl.store import open as open
+    from drillctl.studies import compare as compare
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
 
@@ -49,6 +50,7 @@ _HOME = {
     "simulate": "drillctl.simulation",
     "limit_cycle": "drillctl.simulation.limit_cycle",
     "sweep": "drillctl.studies",
+    "compare": "drillctl.studies",
     "stability_map": "drillctl.studies",
     "open": "drillctl.store",
     "plots": "drillctl",

@@ -150,13 +150,19 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
 def validate(
     design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False
 ) -> None:
-    """Check a design: every key, unit and range, and its map's axes."""
+    """Check a design: every key, unit and range, its axes, draws and cases."""
     from drillctl import console
+    from drillctl.studies.cases import case_designs, refuse_unequal
+    from drillctl.studies.draws import uncertain_parameters
     from drillctl.studies.grid import axes_of
 
     found = _load(design, sets)
     if "axes" in found.tree.get("map", {}):  # the default ones need not fit every law
         axes_of(found, found.tables.map.axes)
+    if found.tables.uncertain:
+        uncertain_parameters(found)
+    if found.tables.compare.cases:
+        refuse_unequal(case_designs(found))
     if json:
         console.emit({"valid": True, "name": found.name, "path": found.origin})
     else:
@@ -265,6 +271,42 @@ def regularisation(
 
     _use(threads)
     verbs.regularisation(_with_axes(_load(design, sets), axis), Options(out, json, units, verbose))
+
+
+@app.command()
+def compare(
+    design: DesignName,
+    sets: Sets = None,
+    realizations: Annotated[
+        int | None, typer.Option("--realizations", help="Draws of what is uncertain.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the draws.")] = None,
+    equal_mean_weight: Annotated[
+        bool | None,
+        typer.Option(
+            "--equal-mean-weight/--nominal-weight",
+            help="Shift the nominal weight of a moving weight on bit until means are equal.",
+        ),
+    ] = None,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """Cases at the same draws: distributions, paired differences, shares under each level."""
+    from drillctl import verbs
+
+    _use(threads)
+    given = {
+        "uncertainty.realizations": realizations,
+        "uncertainty.seed": seed,
+        "compare.equal_mean_weight": equal_mean_weight,
+    }
+    asked = {path: value for path, value in given.items() if value is not None}
+    found = _load(design, sets)
+    verbs.compare(found.replace(asked) if asked else found, Options(out, json, units, verbose))
 
 
 @app.command()

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from drillctl.linear import LoopAnalysis
     from drillctl.simulation import Simulation
     from drillctl.simulation.limit_cycle import LimitCycle
-    from drillctl.studies import Axis, Regularisation, Sweep, ThreeRegions
+    from drillctl.studies import Axis, Comparison, Regularisation, Sweep, ThreeRegions
+    from drillctl.studies.comparison import ComparedCase, Difference
 
 _MEASURES = {
     "j1": "s", "stuck_time": "s", "sticks": "", "stick_slip_index": "",
@@ -206,6 +207,68 @@ def regularisation(result: Regularisation) -> None:
     title = result.design.tables.title or result.design.name
     heads = ["friction", "median change of J1", "worst", *(f"J1 <= {x} s" for x in levels)]
     table(f"{title}: friction smoothed by tanh, {result.j1.size} cells", heads, rows)
+
+
+def comparison(result: Comparison, system: units.System) -> None:
+    """Distributions of the cases, their differences from the first, shares under each level."""
+    from drillctl.studies.comparison import MEASURES
+
+    names = [case.name for case in result.cases]
+    title = result.design.tables.title or result.design.name
+    rows = []
+    for name, unit in MEASURES.items():
+        factor, label = units.displayed(1.0, unit, system)
+        found = [case.distribution(name) for case in result.cases]
+        rows.append([_head(name, label), *(_spread(one, factor) for one in found)])
+    table(
+        f"{title}: mean over {result.realizations} draws (5 % to 95 %)", ["measure", *names], rows
+    )
+    if len(names) > 1:
+        rows = []
+        for name, unit in MEASURES.items():
+            factor, label = units.displayed(1.0, unit, system)
+            apart = [result.paired[case][name] for case in names[1:]]
+            rows.append([_head(name, label), *(_apart(one, factor) for one in apart)])
+        heads = ["measure", *names[1:]]
+        table(f"difference from {names[0]!r} draw by draw, mean (95 % interval)", heads, rows)
+    rows = []
+    for level in result.levels:
+        shares = [case.share(level) for case in result.cases]
+        cells = [f"{share:.1%} ({low:.1%} to {high:.1%})" for _, share, (low, high) in shares]
+        rows.append([f"J1 <= {level:g} s", *cells])
+    table("share of the draws (95 % interval)", ["level", *names], rows)
+    for case in result.cases:
+        _case_notes(case, system)
+    line(f"drawn: {', '.join(result.baseline.drawn)}; seed {result.seed}")
+
+
+def _case_notes(case: ComparedCase, system: units.System) -> None:
+    if case.weight_shift:
+        shift, unit = units.displayed(case.weight_shift, "N", system)
+        line(f"{case.name}: nominal weight shifted by {shift:+.3f} {unit} for equal means")
+    for failure in case.failures:
+        reason = f"{failure.reason}: {failure.example}"
+        line(f"{case.name}: {failure.count} of {len(case.status)} draws failed; {reason}")
+
+
+def _head(name: str, label: str) -> str:
+    return f"{name} ({label})" if label not in ("", "1") else name
+
+
+def _spread(found: dict[str, Any], factor: float) -> str:
+    if found["mean"] is None:
+        return "-"
+    mean, low, high = (f"{found[key] * factor:.4g}" for key in ("mean", "p05", "p95"))
+    return f"{mean} ({low} to {high})"
+
+
+def _apart(found: Difference, factor: float) -> str:
+    if found.difference is None:
+        return "-"
+    if found.interval is None:
+        return f"{found.difference * factor:+.4g}"
+    low, high = (f"{end * factor:.4g}" for end in found.interval)
+    return f"{found.difference * factor:+.4g} ({low} to {high})"
 
 
 def _span(bounds: tuple[float, float] | None, factor: float) -> str:

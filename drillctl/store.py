@@ -34,6 +34,8 @@ from drillctl.simulation.trajectory import Simulation
 from drillctl.store_blocks import FolderBlocks
 from drillctl.store_reading import READERS, stored_name
 from drillctl.studies.audit import choose_cells
+from drillctl.studies.cases import case_designs
+from drillctl.studies.comparison import Comparison
 from drillctl.studies.grid import axes_of
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.regularisation import WIDTHS, Regularisation
@@ -213,6 +215,7 @@ VERBS = {
     "Sweep": "map",
     "Simulation": "simulate",
     "Modes": "modes",
+    "Comparison": "compare",
     "LimitCycle": "cycle",
     "LoopAnalysis": "loop",
     "LoopMap": "loop-map",
@@ -287,11 +290,22 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["axes"] = axes
         if tuple(result.widths) != WIDTHS:
             settings["widths"] = result.widths.tolist()
+    elif isinstance(result, Comparison):
+        cases = {case.name: case.design for case in result.cases}
+        if list(cases.items()) != _own_cases(design):
+            settings["cases"] = {name: to_toml(case) for name, case in cases.items()}
     elif isinstance(result, LimitCycle):
         settings["duration"] = result.simulated.duration
     elif isinstance(result, Modes):
         settings["count"] = max(len(result.free_free), len(result.fixed_top))
     return design, settings
+
+
+def _own_cases(design: Design) -> list[Any] | None:
+    try:
+        return list(case_designs(design).items())
+    except InputError:  # cases given one by one need not be those of their first
+        return None
 
 
 def _own_axes(design: Design) -> list[Any] | None:

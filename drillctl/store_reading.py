@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import tomllib
 from collections.abc import Callable
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
@@ -10,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl.design import Design
+from drillctl.design.validation import validated
 from drillctl.linear.loop_analysis import LoopAnalysis
 from drillctl.linear.loop_margins import Margins
 from drillctl.linear.modal import Mode, Modes
@@ -21,6 +24,8 @@ from drillctl.simulation.measures import Measures
 from drillctl.simulation.reference import EnergyAudit
 from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.studies.audit import Audit
+from drillctl.studies.comparison import MEASURES, ComparedCase, Comparison
+from drillctl.studies.drawn_lanes import Failures
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
 from drillctl.studies.regularisation import Regularisation
@@ -199,10 +204,48 @@ def read_regularisation(
     )
 
 
+def read_comparison(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Comparison:
+    """A `Comparison` as it was saved."""
+    texts = json.loads(data.attrs["case_designs"])
+    told = ("realizations", "seed", "weight_from", "equal_mean_weight", "total_seconds")
+    return Comparison(
+        design=design,
+        cases=tuple(
+            _case(name, _resolved(text, design), data.isel(case=number), summary)
+            for number, (name, text) in enumerate(zip(summary["cases"], texts, strict=True))
+        ),
+        levels=design.tables.map.levels,
+        **{name: summary[name] for name in told},
+        provenance={key: str(v) for key, v in data.attrs.items() if key != "case_designs"},
+    )
+
+
+def _case(name: str, design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> ComparedCase:
+    told = summary["cases"][name]
+    return ComparedCase(
+        name=name,
+        design=design,
+        drawn={path: data[stored_name(path)].values for path in summary["uncertain"]},
+        measures={measure: data[measure].values for measure in MEASURES},
+        status=data["status"].values.astype(np.int8),
+        failures=tuple(Failures(**failure) for failure in told["failures"]),
+        weight_shift=told["weight_shift"],
+        step=told["step"],
+        modes=told["modes"],
+    )
+
+
+def _resolved(text: str, like: Design) -> Design:
+    """A design from the text of a resolved one, named like another."""
+    tree = tomllib.loads(text)
+    return Design(like.name, validated(tree, like.origin), tree, like.origin)
+
+
 READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "map": read_sweep,
     "simulate": read_simulation,
     "modes": read_modes,
+    "compare": read_comparison,
     "cycle": read_cycle,
     "loop": read_loop,
     "loop-map": read_loop_map,

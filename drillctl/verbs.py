@@ -196,6 +196,32 @@ def regularisation(design: Design, options: Options) -> None:
     _conclude(folder, result.summary(), options)
 
 
+def compare(design: Design, options: Options) -> None:
+    """Cases at the same draws, with their figures and tables."""
+    import drillctl
+    from drillctl import plots, printing, store, studies
+
+    folder = store.claim("compare", design, options.out)
+    if _shown_again(
+        folder, options, lambda: printing.comparison(store.open(folder.path), options.units)
+    ):
+        return
+    with _running(folder), console.progress() as bar:
+        result = drillctl.compare(design, progress=bar)
+    store.write_data(result, folder.path)
+    studies.write_comparison(result, folder.path)
+    _draw(plots.j1_distributions(result), folder.path / "distributions.png")
+    picture = plots.j1_against_weight(result, system=options.units)
+    _draw(picture, folder.path / "weight.png")
+    if len(result.cases) > 1:
+        _draw(plots.paired_differences(result), folder.path / "differences.png")
+    else:
+        console.note("one case only: give others in compare.cases to compare it with")
+    if not options.json:
+        printing.comparison(result, options.units)
+    _conclude(folder, result.summary(), options)
+
+
 def simulate(design: Design, options: Options) -> None:
     """One run with its figure, signals and measures."""
     import drillctl

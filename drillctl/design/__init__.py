@@ -1,6 +1,7 @@
 """Design files: TOML text in, a validated frozen `Design` out, and back.
 
 - `tables.py`: every key a design may hold, with its unit and range.
+- `uncertain_tables.py`: the keys of uncertain parameters; `base.py`: what every table is.
 - `quantities.py`: the field types those tables use.
 - `merging.py`: a design laid over its model; single values set by path.
 - `validation.py`: errors in the user's words.

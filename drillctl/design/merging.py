@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from drillctl.design.tables import DesignTables, refuse_same_names
+from drillctl.design.uncertain_tables import flattened
 from drillctl.errors import InputError, nearest, shown
 
 Tree = dict[str, Any]
@@ -25,7 +26,8 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
     """Return `base` with `top` laid over it.
 
     Tables merge key by key, sections by name (a new name is added at the bottom). A table
-    whose `law` changes, or a start whose `kind` changes, drops what belonged to the old one.
+    whose `law` changes, a start whose `kind` or an uncertain parameter whose `distribution`
+    changes, drops what belonged to the old one.
 
     Parameters
     ----------
@@ -46,6 +48,10 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
     """
     if _changed(base, top, "law") or (path == "start" and _changed(base, top, "kind", "turning")):
         return dict(top)
+    if path.startswith("uncertain.") and _changed(base, top, "distribution"):
+        return dict(top)
+    if path == "uncertain":
+        base, top = flattened(base), flattened(top)
     merged = dict(base)
     for ways in _ALTERNATIVES.get(path, ()):
         taken = [way for way in ways if any(key in top for key in way)]
@@ -104,7 +110,8 @@ def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
         No such section.
     """
     # A law or a kind drops the numbers of the old one, so it goes before the new one's.
-    for path in sorted(values, key=lambda path: not path.endswith((".law", ".kind"))):
+    first = (".law", ".kind", ".distribution")
+    for path in sorted(values, key=lambda path: not path.endswith(first)):
         if "controller" not in tree and path.startswith("controller."):
             # The default controller is what a gain alone is a change of.
             controller = DesignTables.model_fields["controller"].default

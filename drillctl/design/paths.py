@@ -13,7 +13,10 @@ from drillctl.design.tables import Table
 from drillctl.errors import InputError, nearest, shown
 from drillctl.units import Kind
 
-_HIDDEN = ("title", "source", "status", "notes", "schema_version", "map")
+_HIDDEN = (
+    "title", "source", "status", "notes", "schema_version", "map", "uncertain", "uncertainty",
+    "compare",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,16 @@ axes = [
     {{ path = "controller.ki", min = 0, max = 1000, points = 41 }},
 ]
 levels = [20, 30, 40, 50]         # of J1, in seconds
+
+# [uncertain."bit_rock.a1_factor"] # by default a1_factor and a2_factor, lognormal, 5 %
+# distribution = "lognormal"      # or normal, uniform, triangular
+# cov = 0.05                      # standard deviation over mean
+
+# [[compare.cases]]               # the first is the baseline
+# name = "as it is"
+# [[compare.cases]]
+# name = "stiffer drive"
+# set = {{ "controller.kp" = 900.0 }}
 """
 
 

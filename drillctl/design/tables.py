@@ -9,20 +9,18 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from drillctl import units
 from drillctl.bit_rock.over_weight import KNOTS as KNOTS_OVER_WEIGHT
 from drillctl.bit_rock.tabulated import KNOTS
 from drillctl.design import quantities as q
+from drillctl.design.base import Table as Table
+from drillctl.design.base import number_or_quantity
+from drillctl.design.compare_tables import CompareTable
+from drillctl.design.uncertain_tables import DistributionTable, UncertaintyTable, flattened
 from drillctl.drillstring import GRADES, PIPES
 from drillctl.errors import InputError, nearest, shown
-
-
-class Table(BaseModel):
-    """A table of a design: unknown keys refused, frozen when made."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class OperatingPoint(Table):
@@ -448,7 +446,7 @@ class AxisTable(Table):
     @field_validator("min", "max", mode="before")
     @classmethod
     def _number_or_quantity(cls, value: object) -> object:
-        return value if isinstance(value, str) else q.number(value)
+        return number_or_quantity(value)
 
     @field_validator("points")
     @classmethod
@@ -524,6 +522,14 @@ class DesignTables(Table):
     start: StartTable = StartTable()
     simulation: SimulationTable = SimulationTable()
     map: MapTable = MapTable()
+    uncertain: dict[str, DistributionTable] = Field(default_factory=dict)
+    uncertainty: UncertaintyTable = UncertaintyTable()
+    compare: CompareTable = CompareTable()
+
+    @field_validator("uncertain", mode="before")
+    @classmethod
+    def _paths(cls, value: object) -> object:
+        return flattened(value) if isinstance(value, dict) else value
 
     @model_validator(mode="before")
     @classmethod

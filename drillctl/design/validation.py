@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -16,7 +16,10 @@ _TYPES = {
     "tuple_type": "it must be a list",
     "model_type": "it must be a table",
     "model_attributes_type": "it must be a table",
+    "dict_type": "it must be a table",
     "string_type": "it must be text in quotes",
+    "bool_type": "it must be true or false",
+    "bool_parsing": "it must be true or false",
 }
 """What is due, by pydantic's name of the error."""
 
@@ -134,6 +137,8 @@ def _table_class(annotation: Any, step: str) -> Any:
     """The table class inside an annotation: itself, an item of a tuple, or the law `step`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
+    if get_origin(annotation) is dict:  # of tables by name
+        return get_args(annotation)[1]
     classes = [a for a in get_args(annotation) if a is not Ellipsis and a is not type(None)]
     for cls in classes:
         law = getattr(cls, "model_fields", {}).get("law")

@@ -23,7 +23,7 @@ def to_tree(table: Table) -> Tree:
     tree: Tree = {}
     for key, info in type(table).model_fields.items():
         value = _plain(getattr(table, key), kind_of(info))
-        if value is not None and value != "":
+        if value is not None and value != "" and value != {}:
             tree[info.alias or key] = value
     return tree
 
@@ -33,6 +33,8 @@ def _plain(value: Any, kind: units.Kind | None) -> Any:
         return to_tree(value)
     if isinstance(value, tuple):
         return [_plain(item, None) for item in value]
+    if isinstance(value, dict):
+        return {key: _plain(item, None) for key, item in value.items()}
     if kind is not None and isinstance(value, float):
         return units.write(value, kind)
     return value

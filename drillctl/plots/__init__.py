@@ -8,6 +8,7 @@
 - `root_locus.py`: `root_locus`, poles of the loop against a parameter.
 - `friction.py`: `friction_curves`, bit torque against bit speed at each weight on bit.
 - `map.py`: `stability_map` with regions and audit; `sweep_line` for a single parameter.
+- `comparison.py`: `j1_distributions`, `paired_differences`, `j1_against_weight` of cases.
 - `limit_cycle.py`: `limit_cycle`, one period by each method.
 - `three_regions.py`: `three_regions` over the same two parameters.
 - `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
@@ -19,6 +20,7 @@ figure and never shows it. Nothing here touches the state of pyplot. Axes are in
 the rig floor: rpm, kN, kN m, m.
 """
 
+from drillctl.plots.comparison import j1_against_weight, j1_distributions, paired_differences
 from drillctl.plots.frequency import bode
 from drillctl.plots.friction import friction_curves
 from drillctl.plots.impedance import drive_impedance
@@ -38,12 +40,15 @@ __all__ = [
     "drive_impedance",
     "friction_curves",
     "gain_boundary",
+    "j1_against_weight",
+    "j1_distributions",
     "limit_cycle",
     "loop_map",
     "mobility",
     "mode_shapes",
     "nichols",
     "nyquist",
+    "paired_differences",
     "regularisation",
     "root_locus",
     "sensitivity",

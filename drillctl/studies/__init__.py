@@ -7,28 +7,37 @@
 - `three_regions.py`: locally stable, J1 under a level, attracted: three regions of one map.
 - `attraction.py`: operating points and long runs of its cells.
 - `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
+- `draws.py`: uncertain parameters and draws from them; `drawn_lanes.py`: the lanes of draws.
+- `comparison.py`: cases at the same draws; `cases.py`: what makes them comparable.
+- `drawn_runs.py`: runs of draws, equal mean weights; `intervals.py`: shares and means.
 - `audit.py`: cells of a map simulated again with the reference solver.
 - `responses.py`, `tables.py`: time responses at cells of a map; maps as CSV.
 - `blocks.py`: finished blocks of a long run.
 - `memory.py`: grids too large for the memory.
 """
 
+from drillctl.studies.comparison import Comparison, compare
+from drillctl.studies.draws import Draws, draw, uncertain_parameters
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import LoopMap, loop_map
 from drillctl.studies.regions import Region, region
 from drillctl.studies.regularisation import Regularisation, regularisation
 from drillctl.studies.responses import responses
 from drillctl.studies.sweeps import Sweep, stability_map, sweep
-from drillctl.studies.tables import write_loop_table, write_tables
+from drillctl.studies.tables import write_comparison, write_loop_table, write_tables
 from drillctl.studies.three_regions import ThreeRegions, three_regions
 
 __all__ = [
     "Axis",
+    "Comparison",
+    "Draws",
     "LoopMap",
     "Region",
     "Regularisation",
     "Sweep",
     "ThreeRegions",
+    "compare",
+    "draw",
     "loop_map",
     "region",
     "regularisation",
@@ -36,6 +45,8 @@ __all__ = [
     "stability_map",
     "sweep",
     "three_regions",
+    "uncertain_parameters",
+    "write_comparison",
     "write_loop_table",
     "write_tables",
 ]

@@ -18,7 +18,7 @@ from drillctl.studies.memory import refuse_too_large
 
 Array = NDArray[np.float64]
 
-_SHARED = ("drillstring.", "top_drive.", "bha.", "simulation.")
+SHARED = ("drillstring.", "top_drive.", "bha.", "simulation.")
 """Paths under these change what all lanes share; the others differ from lane to lane."""
 
 
@@ -43,7 +43,7 @@ class Axis:
     @property
     def shared(self) -> bool:
         """Whether it changes the string or the scheme, which all lanes of a group share."""
-        return self.path.startswith(_SHARED)
+        return self.path.startswith(SHARED)
 
     def __len__(self) -> int:
         return len(self.values)

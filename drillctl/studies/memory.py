@@ -16,15 +16,23 @@ MEMORY_SHARE = 0.5
 """Largest share of the free memory that a sweep may ask for."""
 
 
-def refuse_too_large(points: Sequence[int]) -> None:
-    """Refuse (`InputError`) a grid of so many points along its axes, if memory falls short."""
+def refuse_too_large(points: Sequence[int], where: str = "map.axes") -> None:
+    """Refuse (`InputError`) a grid of so many points along its axes, if memory falls short.
+
+    Parameters
+    ----------
+    points : sequence of int
+        Along each axis.
+    where : str
+        Key that asks for them.
+    """
     cells = math.prod(points)
     needed, usable = cells * BYTES_PER_CELL, MEMORY_SHARE * _free_memory()
     if needed > usable:
         raise InputError(
             f"{cells:,} cells need about {needed / 2**30:,.1f} GiB; "
             f"{usable / 2**30:.1f} GiB may be used: fewer points",
-            "map.axes",
+            where,
         )
 
 

@@ -29,13 +29,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_UNITS = {
+UNITS = {
     "j1": "s", "j1_rate": "1", "stuck_time": "s", "sticks": "1", "stick_slip_index": "1",
     "mean_bit_speed": "rad/s", "min_bit_speed": "rad/s", "peak_bit_speed": "rad/s",
     "peak_pipe_torque": "N*m", "peak_top_torque": "N*m", "settling_time": "s",
     "settling_time_wide": "s", "mean_weight_on_bit": "N", "rop_proxy": "1",
     "work_at_bit": "J", "work_per_turn": "J", "time_outside_table": "s",
 }  # fmt: skip
+"""SI unit of each measure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,7 @@ class Sweep:
         paths = [a.path for a in self.axes]
         coordinates = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
         variables: dict[str, Any] = {
-            name: (paths, values, {"units": _UNITS[name]}) for name, values in self.measures.items()
+            name: (paths, values, {"units": UNITS[name]}) for name, values in self.measures.items()
         }
         flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
         variables["status"] = (paths, self.status, flags)

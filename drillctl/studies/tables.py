@@ -1,4 +1,4 @@
-"""Maps and regions as CSV, for spreadsheets."""
+"""Maps, regions and comparisons as CSV, for spreadsheets."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.measures import STATUSES
+from drillctl.studies.comparison import MEASURES, QUANTILES, Comparison
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.sweeps import Sweep
 
@@ -58,3 +59,53 @@ def write_loop_table(result: LoopMap, folder: Path) -> None:
         points = itertools.product(*(axis.values for axis in result.axes))
         for point, *row in zip(points, *columns, strict=True):
             writer.writerow([*map(float, point), *("" if v != v else repr(float(v)) for v in row)])
+
+
+def write_comparison(result: Comparison, folder: Path) -> None:
+    """Write `comparison.csv`, a row a case and measure, `shares.csv`, a row a case and level.
+
+    And `draws.csv`, a row a case and realization. SI units, empty where a figure is undefined.
+
+    Parameters
+    ----------
+    result : Comparison
+        What was computed.
+    folder : Path
+        Where to.
+    """
+    figures = ("mean", "std", *QUANTILES, "defined")
+    apart = ("difference", "difference_low", "difference_high", "pairs")
+    rows: list[list[object]] = []
+    for case in result.cases:
+        for name, unit in MEASURES.items():
+            found = case.distribution(name)
+            row = [case.name, name, unit, *(found[figure] for figure in figures)]
+            if case is result.baseline:
+                rows.append([*row, *(None for _ in apart)])
+            else:
+                paired = result.paired[case.name][name]
+                interval = paired.interval or (None, None)
+                rows.append([*row, paired.difference, *interval, paired.pairs])
+    _write(folder / "comparison.csv", ["case", "measure", "unit", *figures, *apart], rows)
+    rows = []
+    for case in result.cases:
+        for level in result.levels:
+            hits, share, interval = case.share(level)
+            rows.append([case.name, level, hits, share, *interval])
+    _write(folder / "shares.csv", ["case", "level", "draws", "share", "low", "high"], rows)
+    rows = []
+    for case in result.cases:
+        columns = [*case.drawn.values(), *case.measures.values()]
+        for number, (status, *values) in enumerate(zip(case.status, *columns, strict=True)):
+            rows.append([case.name, number, *map(float, values), STATUSES[status]])
+    heads = ["case", "realization", *result.baseline.drawn, *MEASURES, "status"]
+    _write(folder / "draws.csv", heads, rows)
+
+
+def _write(path: Path, heads: list[str], rows: list[list[object]]) -> None:
+    """Write rows; what is None or NaN is an empty field."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(heads)
+        for row in rows:
+            writer.writerow(["" if value is None or value != value else value for value in row])

@@ -1,0 +1,245 @@
+"""Cases side by side: distributions of J1, paired differences, J1 against weight on bit."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from drillctl import units
+from drillctl.errors import InputError
+from drillctl.plots.style import BLACK, COLOURS, DASHES, LINE, SMALL, TITLE, axes_or_new, dress
+from drillctl.studies.intervals import mean_interval
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from drillctl.studies.comparison import ComparedCase, Comparison
+
+_WORDS = {
+    "j1": "J1", "stuck_time": "stuck time", "stick_slip_index": "stick-slip index",
+    "peak_bit_speed": "peak bit speed", "peak_pipe_torque": "peak pipe torque",
+    "peak_top_torque": "peak top torque", "settling_time": "settling time",
+    "mean_weight_on_bit": "mean WOB", "mean_weight_after_start": "mean WOB after start",
+    "rop_proxy": "ROP proxy", "work_per_turn": "work per turn",
+    "time_outside_table": "time outside table",
+}  # fmt: skip
+"""Measures as they are spoken of."""
+WIDEST = 110
+"""Longest line of a caption (characters)."""
+LEVEL_COLOUR = "#888888"
+"""Of the levels of J1: in the background, yet legible."""
+
+
+def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
+    """Share of the draws at or under each J1, a curve a case, with the levels marked.
+
+    Parameters
+    ----------
+    result : Comparison
+        Any number of cases.
+    ax : Axes, optional
+        Axes to draw on.
+
+    Returns
+    -------
+    Figure
+        A curve ends below 1 where draws failed: they are under no level.
+    """
+    figure, ax = axes_or_new(ax, 7.5, 5.0)
+    for number, case in enumerate(result.cases):
+        values = np.sort(case.measures["j1"][~np.isnan(case.measures["j1"])])
+        share = np.arange(1, len(values) + 1) / result.realizations
+        label = case.name if len(values) == result.realizations else (
+            f"{case.name} ({result.realizations - len(values)} failed)"
+        )  # fmt: skip
+        ax.step(
+            np.concatenate([values[:1], values]), np.concatenate([share[:1] * 0.0, share]),
+            where="post",
+            linewidth=LINE, label=label, color=_colour(number),
+            linestyle=DASHES[number % len(DASHES)],
+        )  # fmt: skip
+    for level in result.levels:
+        ax.axvline(level, color=LEVEL_COLOUR, linewidth=0.8, linestyle=":")
+        ax.text(
+            level, 1.015, f"{level:g}", color=LEVEL_COLOUR, fontsize=SMALL, ha="center",
+            transform=ax.get_xaxis_transform(),
+        )  # fmt: skip
+    ax.set_ylim(0.0, 1.0)
+    ax.set_xlim(left=0.0)
+    dress(ax, "J1 (s)", "share of draws at or under")
+    ax.set_title(_title(result), fontsize=TITLE, loc="left", pad=18.0)
+    _legend(ax, len(result.cases))
+    figure.supxlabel(_caption(result, "Grey: levels of J1 (s)."), fontsize=SMALL)
+    return figure
+
+
+def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
+    """Difference of each case from the baseline in every measure, with 95 % intervals.
+
+    Parameters
+    ----------
+    result : Comparison
+        Two cases or more.
+    ax : Axes, optional
+        Axes to draw on.
+
+    Returns
+    -------
+    Figure
+        In percent of the baseline's mean over the same draws; a measure that is zero or
+        undefined there is named below.
+
+    Raises
+    ------
+    InputError
+        There is one case only.
+    """
+    if len(result.cases) < 2:
+        raise InputError("differences are between two cases or more, the result has 1")
+    figure, ax = axes_or_new(ax, 8.0, 6.0)
+    drawn, left_out = _relative(result)
+    others = result.cases[1:]
+    for number, case in enumerate(others):
+        place = np.arange(len(drawn)) + (number - 0.5 * (len(others) - 1)) * 0.8 / len(others)
+        rows = [drawn[name][case.name] for name in drawn]
+        known = [k for k, row in enumerate(rows) if row is not None]
+        points = np.array([rows[k] for k in known]).reshape(-1, 3)
+        ax.errorbar(
+            points[:, 0], place[known],
+            xerr=np.abs(points[:, 1:].T - points[:, 0]), fmt="o", markersize=4.5, capsize=3.0,
+            linewidth=LINE, color=_colour(number + 1), label=case.name,
+        )  # fmt: skip
+    ax.axvline(0.0, color=BLACK, linewidth=0.8)
+    ax.set_yticks(range(len(drawn)), [_WORDS[name] for name in drawn])
+    ax.set_ylim(max(len(drawn), 1) - 0.5, -0.5)
+    dress(ax, f"difference from {result.baseline.name!r} (% of its mean)", "", _title(result))
+    _legend(ax, len(others))
+    lost = f"Zero or undefined in a case: {', '.join(left_out)}." if left_out else ""
+    text = "Mean of the differences draw by draw; bars: 95 % bootstrap intervals of that mean."
+    figure.supxlabel(_caption(result, text, lost), fontsize=SMALL)
+    return figure
+
+
+def j1_against_weight(
+    result: Comparison, ax: Axes | None = None, system: units.System = "si"
+) -> Figure:
+    """J1 against the mean weight on bit after the start: what smoothness costs in weight.
+
+    Parameters
+    ----------
+    result : Comparison
+        Any number of cases.
+    ax : Axes, optional
+        Axes to draw on.
+    system : {'si', 'field'}
+        Units of the weight.
+
+    Returns
+    -------
+    Figure
+        A dot a draw, a large mark a case at its means, with a line through the cases that no
+        other beats in both, unless the weights were made equal.
+    """
+    figure, ax = axes_or_new(ax, 7.5, 5.5)
+    means = []
+    for number, case in enumerate(result.cases):
+        j1, weight = case.measures["j1"], case.measures["mean_weight_after_start"]
+        known = ~(np.isnan(j1) | np.isnan(weight))
+        if not known.any():
+            continue
+        shown, unit = units.displayed(weight[known], "N", system)
+        colour = _colour(number)
+        ax.plot(shown, j1[known], ".", color=colour, markersize=3.0, alpha=0.35)
+        centre = (float(shown.mean()), float(j1[known].mean()))
+        means.append(centre)
+        ax.errorbar(
+            *centre, xerr=_bar(shown, result.seed), yerr=_bar(j1[known], result.seed),
+            fmt="osD^v"[number % 5], color=colour, markeredgecolor=BLACK, markersize=9.0,
+            capsize=3.0, label=case.name, zorder=4,
+        )  # fmt: skip
+    # Of weights made equal only the rest of a search is left: nothing to be better in.
+    front = [] if result.equal_mean_weight else _unbeaten(means)
+    if len(front) > 1:
+        ax.plot(*zip(*front, strict=True), color=BLACK, linewidth=0.9, linestyle="--",
+                label="unbeaten in both", zorder=3)  # fmt: skip
+    _, unit = units.displayed(1.0, "N", system)
+    ax.set_ylim(bottom=0.0)
+    dress(ax, f"mean WOB after {result.weight_from:g} s ({unit})", "J1 (s)", _title(result))
+    _legend(ax, len(result.cases) + 1)
+    text = "Large: means over the draws with their 95 % intervals; small: the draws."
+    figure.supxlabel(_caption(result, text), fontsize=SMALL)
+    return figure
+
+
+def _relative(
+    result: Comparison,
+) -> tuple[dict[str, dict[str, tuple[float, float, float] | None]], list[str]]:
+    """Differences and interval ends (%) by measure and case; and the measures without any."""
+    drawn: dict[str, dict[str, tuple[float, float, float] | None]] = {}
+    left_out = []
+    for name, words in _WORDS.items():
+        row = {case.name: _percent(result, case, name) for case in result.cases[1:]}
+        if any(row.values()):
+            drawn[name] = row
+        if not all(row.values()):
+            left_out.append(words)
+    return drawn, left_out
+
+
+def _percent(
+    result: Comparison, case: ComparedCase, name: str
+) -> tuple[float, float, float] | None:
+    base = result.baseline.measures[name]
+    # Over the pairs alone: the draws that the difference is of.
+    paired = base[~np.isnan(base) & ~np.isnan(case.measures[name])]
+    found = result.paired[case.name][name]
+    mean = abs(float(paired.mean())) if paired.size else 0.0
+    if found.difference is None or mean == 0.0:
+        return None
+    low, high = found.interval or (found.difference, found.difference)
+    return 100 * found.difference / mean, 100 * low / mean, 100 * high / mean
+
+
+def _bar(values: np.ndarray, seed: int) -> list[list[float]] | None:
+    interval, mean = mean_interval(values, seed), float(values.mean())
+    # Rounding alone may put the mean of equal values outside.
+    return interval and [[max(mean - interval[0], 0.0)], [max(interval[1] - mean, 0.0)]]
+
+
+def _unbeaten(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Points that no other beats with more weight and less J1, by weight."""
+    return sorted(
+        one for one in points
+        if not any(o != one and o[0] >= one[0] and o[1] <= one[1] for o in points)
+    )  # fmt: skip
+
+
+def _colour(number: int) -> str:
+    return COLOURS[number % len(COLOURS)]
+
+
+def _title(result: Comparison) -> str:
+    return result.design.tables.title or result.design.name
+
+
+def _legend(ax: Axes, entries: int) -> None:
+    ax.legend(
+        loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=min(entries, 4), fontsize=SMALL,
+        frameon=False,
+    )  # fmt: skip
+
+
+def _caption(result: Comparison, *lines: str) -> str:
+    table = result.design.tables
+    origin = f"String {table.status}. " if table.status == "reconstructed" else ""
+    equal = "Nominal weights shifted for equal means." if result.equal_mean_weight else ""
+    first = (
+        f"{origin}{result.realizations} draws of {', '.join(result.baseline.drawn)}, the same for "
+        f"all cases (seed {result.seed})."
+    )
+    parts = [part for line in (first, equal, *lines) for part in textwrap.wrap(line, WIDEST)]
+    return "\n".join(parts)

@@ -1,0 +1,354 @@
+"""Cases compared at equal terms: the same starts, the same draws, optionally the same mean weight.
+
+What differs between two cases is told by the paired difference: at every draw one case less the
+other, and the mean of that. Most of what the draws scatter is common to both and drops out.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design, to_toml
+from drillctl.errors import InputError
+from drillctl.progress import SILENT, Progress
+from drillctl.provenance import provenance
+from drillctl.simulation.measures import STATUSES
+from drillctl.studies.cases import case_designs, in_case, refuse_unequal
+from drillctl.studies.drawn_lanes import Failures, drawn_lanes
+from drillctl.studies.drawn_runs import equalising_shift, run_draws, start_up
+from drillctl.studies.draws import draw, uncertain_parameters
+from drillctl.studies.intervals import Interval, mean_interval, share_interval
+from drillctl.studies.memory import refuse_too_large
+from drillctl.studies.sweeps import UNITS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray
+
+Array = NDArray[np.float64]
+
+MEASURES = {
+    name: UNITS[name]
+    for name in (
+        "j1", "stuck_time", "stick_slip_index", "peak_bit_speed", "peak_pipe_torque",
+        "peak_top_torque", "settling_time", "mean_weight_on_bit",
+    )
+} | {
+    "mean_weight_after_start": "N", "rop_proxy": UNITS["rop_proxy"],
+    "work_per_turn": UNITS["work_per_turn"], "time_outside_table": UNITS["time_outside_table"],
+}  # fmt: skip
+"""What is compared, with its unit."""
+QUANTILES = {"p05": 0.05, "p50": 0.5, "p95": 0.95}
+"""Of the distribution of a measure over the draws."""
+NO_ANSWER = "no finite answer"
+"""Reason of a run that broke down."""
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedCase:
+    """One case at all draws.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    design : Design
+        What was simulated, but for the draws and the shift.
+    drawn : dict of ndarray, shape (realizations,)
+        Values of the uncertain parameters by path (SI).
+    measures : dict of ndarray, shape (realizations,)
+        By the names of `MEASURES` (SI); NaN where undefined.
+    status : ndarray of int8, shape (realizations,)
+        Index into `simulation.measures.STATUSES`.
+    failures : tuple of Failures
+        Why draws came to nothing.
+    weight_shift : float
+        Added to the nominal weight on bit for the sake of equal means (N).
+    step, modes : float and int, or None
+        Scheme of the batch engine; None where it differs from draw to draw.
+    """
+
+    name: str
+    design: Design
+    drawn: dict[str, Array]
+    measures: dict[str, Array]
+    status: NDArray[np.int8]
+    failures: tuple[Failures, ...]
+    weight_shift: float
+    step: float | None
+    modes: int | None
+
+    def distribution(self, measure: str) -> dict[str, Any]:
+        """Mean, standard deviation, quantiles (SI) and number of draws that define a measure."""
+        values = self.measures[measure]
+        values = values[~np.isnan(values)]
+        if not values.size:
+            return {"mean": None, "std": None, **dict.fromkeys(QUANTILES), "defined": 0}
+        spread = float(values.std(ddof=1)) if values.size > 1 else None
+        quantiles = np.quantile(values, list(QUANTILES.values()))
+        return {
+            "mean": float(values.mean()),
+            "std": spread,
+            **dict(zip(QUANTILES, map(float, quantiles), strict=True)),
+            "defined": int(values.size),
+        }
+
+    def share(self, level: float) -> tuple[int, float, Interval]:
+        """Draws with J1 at or under a level (s), their share and its interval.
+
+        A draw that failed is not under any level: the share is of all draws.
+        """
+        total = len(self.status)
+        hits = int((np.nan_to_num(self.measures["j1"], nan=np.inf) <= level).sum())
+        return hits, hits / total, share_interval(hits, total)
+
+    def summary(self, levels: tuple[float, ...]) -> dict[str, Any]:
+        """Measures, regions, statuses, failures, shift and scheme; SI."""
+        regions = {}
+        for level in levels:
+            hits, share, interval = self.share(level)
+            regions[f"{level:g}"] = {"draws": hits, "share": share, "interval_95": list(interval)}
+        return {
+            "measures": {name: self.distribution(name) for name in MEASURES},
+            "regions": regions,
+            "statuses": {
+                name: int((self.status == code).sum())
+                for code, name in enumerate(STATUSES)
+                if (self.status == code).any()
+            },
+            "failures": [asdict(failure) for failure in self.failures],
+            "weight_shift": self.weight_shift,
+            "step": self.step,
+            "modes": self.modes,
+        }
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Mean of a measure of one case less that of the baseline, draw by draw.
+
+    Attributes
+    ----------
+    difference : float or None
+        Mean over the pairs (SI); None without pairs.
+    interval : tuple of float, or None
+        Bootstrap interval; None for fewer than two pairs.
+    pairs : int
+        Draws at which both cases define the measure.
+    """
+
+    difference: float | None
+    interval: Interval | None
+    pairs: int
+
+    def summary(self) -> dict[str, Any]:
+        """As strict JSON values."""
+        interval = None if self.interval is None else list(self.interval)
+        return {"difference": self.difference, "interval_95": interval, "pairs": self.pairs}
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Cases at the same starts and the same draws.
+
+    Attributes
+    ----------
+    design : Design
+        Whose cases they are; of cases given one by one the first.
+    cases : tuple of ComparedCase
+        The baseline first.
+    realizations, seed : int
+        Number of draws, and what they follow from.
+    levels : tuple of float
+        Levels of J1 (s).
+    weight_from : float
+        Where the window of `mean_weight_after_start` begins (s).
+    equal_mean_weight : bool
+        Whether nominal weights were shifted for equal means.
+    total_seconds : float
+        From call to return (s).
+    provenance : dict of str
+        Versions and processor it came from.
+    """
+
+    design: Design
+    cases: tuple[ComparedCase, ...]
+    realizations: int
+    seed: int
+    levels: tuple[float, ...]
+    weight_from: float
+    equal_mean_weight: bool
+    total_seconds: float
+    provenance: dict[str, str] = field(default_factory=provenance)
+
+    @property
+    def baseline(self) -> ComparedCase:
+        """The case that the others are compared with."""
+        return self.cases[0]
+
+    @cached_property
+    def paired(self) -> dict[str, dict[str, Difference]]:
+        """Difference of every other case from the baseline, by case and measure."""
+        return {
+            case.name: {name: self.difference(case, name) for name in MEASURES}
+            for case in self.cases[1:]
+        }
+
+    def difference(self, case: ComparedCase, measure: str) -> Difference:
+        """Paired difference of a case from the baseline in one measure."""
+        apart = case.measures[measure] - self.baseline.measures[measure]
+        apart = apart[~np.isnan(apart)]
+        if not apart.size:
+            return Difference(None, None, 0)
+        return Difference(float(apart.mean()), mean_interval(apart, self.seed), int(apart.size))
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """Measures, statuses and drawn values by case and realization, with units."""
+        import xarray
+
+        over = ("case", "realization")
+        coordinates = {
+            "case": ("case", np.array([case.name for case in self.cases], dtype=object)),
+            "realization": ("realization", np.arange(self.realizations)),
+        }
+        variables: dict[str, Any] = {
+            name: (over, np.stack([case.measures[name] for case in self.cases]), {"units": unit})
+            for name, unit in MEASURES.items()
+        }
+        for drawn in uncertain_parameters(self.baseline.design):
+            values = np.stack([case.drawn[drawn.path] for case in self.cases])
+            variables[drawn.path] = (over, values, {"units": drawn.unit})
+        flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
+        variables["status"] = (over, np.stack([case.status for case in self.cases]), flags)
+        designs = json.dumps([to_toml(case.design) for case in self.cases])
+        attributes = {**self.provenance, "case_designs": designs}
+        return xarray.Dataset(variables, coordinates, attributes)
+
+    def summary(self) -> dict[str, Any]:
+        """Cases with their measures and regions, paired differences, settings; SI units."""
+        return {
+            "cases": {case.name: case.summary(self.levels) for case in self.cases},
+            "paired": {
+                name: {measure: found.summary() for measure, found in differences.items()}
+                for name, differences in self.paired.items()
+            },
+            "baseline": self.baseline.name,
+            "realizations": self.realizations,
+            "seed": self.seed,
+            "uncertain": list(self.baseline.drawn),
+            "equal_mean_weight": self.equal_mean_weight,
+            "weight_from": self.weight_from,
+            "total_seconds": self.total_seconds,
+        }
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
+
+
+def compare(
+    cases: Design | Mapping[str, Design],
+    realizations: int | None = None,
+    seed: int | None = None,
+    equal_mean_weight: bool | None = None,
+    progress: Progress = SILENT,
+) -> Comparison:
+    """Compare cases on the same starts and the same draws of what is uncertain.
+
+    Parameters
+    ----------
+    cases : Design or dict of Design
+        A design, for the cases of its `[compare]` table; or cases by name. The first is the
+        baseline.
+    realizations : int, optional
+        Number of draws; by default that of the first design's `[uncertainty]` table.
+    seed : int, optional
+        What they follow from; by default from there too.
+    equal_mean_weight : bool, optional
+        Shift the nominal weight of a case with a moving weight on bit until its mean after the
+        start, over the draws, is the nominal one; by default as `[compare]` says.
+    progress : Progress
+        Told of runs.
+
+    Returns
+    -------
+    Comparison
+        A draw that is impossible or breaks down is a status and counted, not an exception.
+
+    Raises
+    ------
+    InputError
+        Cases that are not on equal terms, impossible settings, every draw impossible, or a mean
+        weight that cannot be reached.
+    """
+    begin = time.perf_counter()
+    given = {
+        "uncertainty.realizations": realizations,
+        "uncertainty.seed": seed,
+        "compare.equal_mean_weight": equal_mean_weight,
+    }
+    asked = {path: value for path, value in given.items() if value is not None}
+    if isinstance(cases, Design):
+        design = cases.replace(asked) if asked else cases
+        named = case_designs(design)
+    else:
+        named = dict(cases)
+        refuse_unequal(named)
+        first = next(iter(named.values()))
+        design = first.replace(asked) if asked else first
+    refuse_unequal(named)
+    draws, equal = design.tables.uncertainty, design.tables.compare.equal_mean_weight
+    refuse_too_large([draws.realizations, len(named)], "uncertainty.realizations")
+    progress.begin("simulating cases", draws.realizations * len(named))
+    found = []
+    for name, variant in named.items():
+        try:
+            found.append(_run_case(name, variant, draws.realizations, draws.seed, equal))
+        except InputError as error:
+            raise in_case(error, variant, name) from None
+        progress.advance(draws.realizations)
+    return Comparison(
+        design=design,
+        cases=tuple(found),
+        realizations=draws.realizations,
+        seed=draws.seed,
+        levels=design.tables.map.levels,
+        weight_from=start_up(design.tables.simulation.duration),
+        equal_mean_weight=equal,
+        total_seconds=time.perf_counter() - begin,
+    )
+
+
+def _run_case(name: str, design: Design, count: int, seed: int, equal: bool) -> ComparedCase:
+    draws = draw(design, count, seed)
+    drawn = drawn_lanes(design, draws)
+    shift = equalising_shift(drawn, count) if equal else 0.0
+    runs = run_draws(drawn, count, shift)
+    impossible = sum(failure.count for failure in drawn.failures)
+    broken = int((runs.status == STATUSES.index("failed")).sum()) - impossible
+    failures = drawn.failures
+    if broken:
+        failures = (*failures, Failures(NO_ANSWER, broken, "a number of the run is not finite"))
+    return ComparedCase(
+        name=name,
+        design=design,
+        drawn=draws.values,
+        measures={measure: runs.measures[measure] for measure in MEASURES},
+        status=runs.status,
+        failures=failures,
+        weight_shift=shift,
+        step=runs.step,
+        modes=runs.modes,
+    )

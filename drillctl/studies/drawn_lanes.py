@@ -1,0 +1,140 @@
+"""Draws of uncertain parameters as lanes of the batch engine; impossible ones told apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.simulation.lanes import Lanes, lane_numbers, lanes_of
+from drillctl.studies.draws import Draws
+from drillctl.studies.grid import SHARED
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnGroup:
+    """Draws that share a string.
+
+    Attributes
+    ----------
+    design : Design
+        Of the first of them.
+    lanes : Lanes
+        One a draw.
+    numbers : ndarray of int, shape (lanes,)
+        Position of each among all draws.
+    """
+
+    design: Design
+    lanes: Lanes
+    numbers: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Failures:
+    """Draws that came to nothing, for one reason.
+
+    Attributes
+    ----------
+    reason : str
+        Key or cause.
+    count : int
+        How many draws.
+    example : str
+        What was said of the first of them.
+    """
+
+    reason: str
+    count: int
+    example: str
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnLanes:
+    """All draws of a design.
+
+    Attributes
+    ----------
+    groups : tuple of DrawnGroup
+        The possible ones; a single group unless a draw changes the string.
+    failures : tuple of Failures
+        The impossible ones.
+    """
+
+    groups: tuple[DrawnGroup, ...]
+    failures: tuple[Failures, ...]
+
+
+def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
+    """Lanes of a design at every draw.
+
+    Parameters
+    ----------
+    design : Design
+        Into which the drawn values are put.
+    draws : Draws
+        Of its uncertain parameters.
+
+    Returns
+    -------
+    DrawnLanes
+        A drawn weight on bit may lie outside the friction table, which is then extrapolated.
+
+    Raises
+    ------
+    InputError
+        Every draw is impossible; the message is that of the first.
+    """
+    design = _beyond_the_table(design, draws)
+    apart = any(path.startswith(SHARED) for path in draws.values)
+    possible: list[_Drawn] = []
+    errors: list[InputError] = []
+    for number in range(len(draws)):
+        values = {path: units.SI(column[number]) for path, column in draws.values.items()}
+        try:
+            variant = design.replace(values)
+            lane = lane_numbers(variant)
+        except InputError as error:
+            errors.append(error)
+        else:
+            # Thousands of designs would fill the memory; lanes on one string need but one.
+            kept = variant if apart or not possible else possible[0].design
+            possible.append(_Drawn(number, kept, lane))
+    if not possible:
+        raise InputError(f"every draw is impossible; the first: {errors[0]}", "uncertain")
+    parts = [[one] for one in possible] if apart else [possible]
+    return DrawnLanes(tuple(_group(part) for part in parts), _told(errors))
+
+
+class _Drawn(NamedTuple):
+    """A possible draw: its position, the design of its string, the numbers of its lane."""
+
+    number: int
+    design: Design
+    lane: dict[str, float]
+
+
+def _beyond_the_table(design: Design, draws: Draws) -> Design:
+    table = getattr(design.tables.bit_rock, "table", None)
+    if table is None or "operating_point.weight_on_bit" not in draws.values:
+        return design
+    return design.replace({"bit_rock.outside_table": "extrapolate"})
+
+
+def _group(part: list[_Drawn]) -> DrawnGroup:
+    columns = {key: np.array([one.lane[key] for one in part]) for key in part[0].lane}
+    design = part[0].design
+    return DrawnGroup(design, lanes_of(design, columns), np.array([one.number for one in part]))
+
+
+def _told(errors: list[InputError]) -> tuple[Failures, ...]:
+    """Errors counted by the key that they name: their numbers differ from draw to draw."""
+    by_key: dict[str, list[InputError]] = {}
+    for error in errors:
+        by_key.setdefault(error.where, []).append(error)
+    return tuple(Failures(key, len(some), some[0].problem) for key, some in by_key.items())

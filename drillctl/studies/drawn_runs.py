@@ -1,0 +1,191 @@
+"""Runs of a design at every draw, and the weight on bit that it had on the mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.errors import InputError
+from drillctl.simulation.batch import FLOATS, Prepared, prepare, run_batch
+from drillctl.simulation.lanes import Lanes
+from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.scheme import Scheme
+from drillctl.studies.drawn_lanes import DrawnLanes
+
+Array = NDArray[np.float64]
+
+START_UP = 20.0
+"""Time (s) that `mean_weight_after_start` leaves out, of runs of 100 s and more."""
+START_UP_SHARE = 0.2
+"""And its largest share of shorter runs."""
+EQUAL_TO = 2e-3
+"""Largest relative difference of mean weights that are called equal."""
+SOUGHT_TO = 5e-4
+"""Relative difference that the search for equal weights stops at."""
+MOST_SHIFTS = 40
+"""Shifts of the nominal weight that are tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnRuns:
+    """What was measured at every draw.
+
+    Attributes
+    ----------
+    measures : dict of ndarray, shape (draws,)
+        By the names of `simulation.batch.FLOATS`, and `mean_weight_after_start` (N); NaN where
+        undefined.
+    status : ndarray of int8, shape (draws,)
+        Index into `simulation.measures.STATUSES`.
+    step, modes : float and int, or None
+        Scheme; None where it differs from draw to draw.
+    """
+
+    measures: dict[str, Array]
+    status: NDArray[np.int8]
+    step: float | None
+    modes: int | None
+
+
+def start_up(duration: float) -> float:
+    """Time (s) at the beginning of a run that `mean_weight_after_start` leaves out."""
+    return min(START_UP, START_UP_SHARE * duration)
+
+
+def run_draws(drawn: DrawnLanes, count: int, shift: float = 0.0) -> DrawnRuns:
+    """Simulate a design at every draw with the batch engine.
+
+    Parameters
+    ----------
+    drawn : DrawnLanes
+        The possible draws.
+    count : int
+        All draws; the impossible ones have the status `failed` and no measures.
+    shift : float
+        Added to the nominal weight of a law that moves the weight on bit (N).
+
+    Raises
+    ------
+    InputError
+        A given step is too long for the friction at some draw.
+    """
+    measures = {name: np.full(count, np.nan) for name in (*FLOATS, "mean_weight_after_start")}
+    status = np.full(count, STATUSES.index("failed"), dtype=np.int8)
+    schemes = set()
+    for group in drawn.groups:
+        lanes = shifted(group.lanes, shift)
+        prepared = prepare(lanes, group.design.tables.simulation)
+        batch = run_batch(lanes, prepared)
+        schemes.add((prepared.scheme.step, prepared.scheme.modes))
+        for name in FLOATS:
+            measures[name][group.numbers] = batch.measures[name]
+        whole = batch.measures["mean_weight_on_bit"]
+        measures["mean_weight_after_start"][group.numbers] = _after_start(lanes, prepared, whole)
+        status[group.numbers] = batch.status
+    step, modes = next(iter(schemes)) if len(schemes) == 1 else (None, None)
+    return DrawnRuns(measures, status, step, modes)
+
+
+def _after_start(lanes: Lanes, prepared: Prepared, whole: Array) -> Array:
+    """Mean weight (N) after the start: the mean of the whole run less that of its beginning.
+
+    The beginning is run again by itself. That is the same trajectory, step for step, and the
+    kernel needs no second window that every other study would pay for.
+    """
+    scheme = prepared.scheme
+    steps = round(start_up(prepared.duration) / scheme.step)
+    if not lanes.weight.moves or not 0 < steps < scheme.steps:
+        return whole
+    time = steps * scheme.step
+    beginning = Prepared(prepared.stepper, Scheme(scheme.step, steps, scheme.modes), time, 0.0)
+    before = run_batch(lanes, beginning).measures["mean_weight_on_bit"]
+    late: Array = (whole * prepared.duration - before * time) / (prepared.duration - time)
+    return late
+
+
+def shifted(lanes: Lanes, shift: float) -> Lanes:
+    """Lanes whose law of the weight on bit has its nominal weight shifted (N)."""
+    if shift == 0.0:
+        return lanes
+    return replace(lanes, weight=lanes.weight._replace(nominal=lanes.weight.nominal + shift))
+
+
+def equalising_shift(drawn: DrawnLanes, count: int) -> float:
+    """Shift of the nominal weight (N) at which the mean weight on bit is the nominal one.
+
+    Means over the draws; that of the weight over each run after its start.
+
+    Parameters
+    ----------
+    drawn : DrawnLanes
+        The possible draws.
+    count : int
+        All draws.
+
+    Returns
+    -------
+    float
+        0 for a law that does not move the weight.
+
+    Raises
+    ------
+    InputError
+        The limits of the law, or jumps of the mean, do not let it come within `EQUAL_TO`.
+    """
+    if not drawn.groups[0].lanes.weight.moves:
+        return 0.0
+    target = float(np.mean(np.concatenate([g.lanes.nominal_weight for g in drawn.groups])))
+    low, high = _allowed(drawn)
+
+    def excess(shift: float) -> float:
+        weights = run_draws(drawn, count, shift).measures["mean_weight_after_start"]
+        if np.isnan(weights).all():
+            raise InputError("no draw gives a finite answer", "weight_on_bit")
+        return float(np.nanmean(weights)) / target - 1.0
+
+    shift, error = _zero(excess, low, high, target)
+    if abs(error) > EQUAL_TO:
+        raise InputError(
+            f"within its limits the law cannot have a mean weight of {target / 1e3:g} kN: at the "
+            f"nominal weight shifted by {shift / 1e3:g} kN it has {(1 + error) * target / 1e3:g}",
+            "weight_on_bit",
+        )
+    return shift
+
+
+def _allowed(drawn: DrawnLanes) -> tuple[float, float]:
+    """Shifts (N) that keep the nominal weight of every draw within the limits of its law."""
+    laws = [group.lanes.weight for group in drawn.groups]
+    low = max(float(np.max(law.least - law.nominal)) for law in laws)
+    high = min(float(np.min(law.most - law.nominal)) for law in laws)
+    return low, high
+
+
+def _zero(
+    excess: Callable[[float], float], low: float, high: float, scale: float
+) -> tuple[float, float]:
+    """Where the excess vanishes, and what is left of it; the nearest found if it does not."""
+    known = {0.0: excess(0.0)}
+    stride = 1.0
+    while len(known) < MOST_SHIFTS:
+        best = min(known, key=lambda shift: abs(known[shift]))
+        if abs(known[best]) <= SOUGHT_TO:
+            break
+        under = max((s for s, e in known.items() if e < 0.0), default=None)
+        over = min((s for s, e in known.items() if e > 0.0), default=None)
+        if under is not None and over is not None:
+            share = known[under] / (known[under] - known[over])
+            # Not too near an end: the mean jumps where a draw begins to stick.
+            trial = under + (over - under) * min(max(share, 0.1), 0.9)
+        else:
+            # More weight, more mean weight, at about the same rate.
+            trial = min(max(best - stride * known[best] * scale, low), high)
+            stride *= 1.5
+        if trial in known:
+            break
+        known[trial] = excess(trial)
+    best = min(known, key=lambda shift: abs(known[shift]))
+    return best, known[best]

@@ -1,0 +1,184 @@
+"""The command `compare`: its answers, files, messages and options."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+import drillctl
+from drillctl.cli import run
+
+SHIPPED = "pi-vs-dynamic-wob-140kn"
+ALONE = "monteiro-trindade-140kn"
+SHORT = ["--set", "simulation.duration=10 s", "--realizations", "5"]
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path, monkeypatch):
+    """Runs go to a folder of their own; pictures are not rendered."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
+
+
+@pytest.fixture
+def call(capsys):
+    """Run a command line in this process: exit code, stdout, stderr."""
+
+    def _call(*arguments):
+        capsys.readouterr()
+        code = run([str(a) for a in arguments])
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return _call
+
+
+def strict(text):
+    def refuse(constant):
+        raise ValueError(f"{constant} is not JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_json_has_the_keys_of_the_contract(call):
+    code, out, err = call("compare", SHIPPED, *SHORT, "--seed", "7", "--json", "--out", "run")
+    assert (code, err) == (0, "results: run\n")
+    found = strict(out)
+    names = ["constant weight", "2 kN s/rad", "4 kN s/rad", "6 kN s/rad"]
+    assert list(found["cases"]) == names
+    for case in found["cases"].values():
+        assert {"measures", "regions"} <= set(case)
+        assert case["measures"]["j1"]["defined"] == 5
+        assert list(case["regions"]) == ["20", "30", "40", "50"]
+        for region in case["regions"].values():
+            low, high = region["interval_95"]
+            assert 0.0 <= low <= region["share"] <= high <= 1.0
+    assert list(found["paired"]) == names[1:]
+    for measures in found["paired"].values():
+        for difference in measures.values():
+            assert {"difference", "interval_95"} <= set(difference)
+    j1 = found["paired"]["4 kN s/rad"]["j1"]
+    assert j1["interval_95"][0] < j1["difference"] < j1["interval_95"][1]
+    assert (found["realizations"], found["seed"], found["baseline"]) == (5, 7, names[0])
+    # A run of 10 s never settles: null, not NaN.
+    assert found["cases"][names[0]]["measures"]["settling_time"]["mean"] is None
+    assert strict(Path("run/summary.json").read_text()) == found
+
+
+def test_folder_holds_tables_pictures_and_the_run(call):
+    assert call("compare", SHIPPED, *SHORT, "--out", "run")[0] == 0
+    assert {"distributions.png", "differences.png", "weight.png", "design.toml", "data.zarr"} <= {
+        path.name for path in Path("run").iterdir()
+    }
+    result = drillctl.open("run")
+    assert result.realizations == 5
+    with Path("run/draws.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 20
+    assert float(rows[6]["j1"]) == result.cases[1].measures["j1"][1]
+    assert float(rows[6]["bit_rock.a1_factor"]) == result.cases[1].drawn["bit_rock.a1_factor"][1]
+    assert rows[0]["settling_time"] == ""
+    with Path("run/comparison.csv").open(encoding="utf-8") as stream:
+        rows = {(row["case"], row["measure"]): row for row in csv.DictReader(stream)}
+    told = rows["6 kN s/rad", "j1"]
+    expected = result.paired["6 kN s/rad"]["j1"]
+    assert float(told["difference"]) == expected.difference
+    assert (float(told["difference_low"]), float(told["difference_high"])) == expected.interval
+    assert rows["constant weight", "j1"]["difference"] == ""
+    with Path("run/shares.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 16
+    assert int(rows[0]["draws"]) == result.cases[0].share(20.0)[0]
+
+
+def test_tables_for_people(call):
+    long = ["--set", "simulation.duration=60 s"]
+    code, out, _ = call("compare", SHIPPED, *SHORT, *long, "--equal-mean-weight")
+    assert code == 0
+    assert "mean over 5 draws (5 % to 95 %)" in out
+    assert "difference from 'constant weight' draw by draw" in out
+    assert "share of the draws (95 % interval)" in out
+    assert "mean_weight_on_bit (kN)" in out
+    assert "nominal weight shifted by" in out
+    assert "drawn: bit_rock.a1_factor, bit_rock.a2_factor; seed 2012" in out
+    assert "nan" not in out
+    assert "mean_weight_on_bit (klbf)" in call("compare", ALONE, *SHORT, "--units", "field")[1]
+
+
+def test_impossible_draws_are_told(call):
+    law = "{distribution = 'uniform', min = 0.1, max = 0.9}"
+    wide = ["--set", f"uncertain={{'bit_rock.a2_factor' = {law}}}"]
+    code, out, err = call("compare", ALONE, *SHORT, "--realizations", "40", *wide)
+    assert code == 0
+    assert "of 40 draws failed; " in out
+    assert "bit_rock.a2_factor: the factors give a2" in out
+    assert "one case only" in err
+    assert "Traceback" not in err
+
+
+def test_options_are_part_of_the_run(call):
+    assert call("compare", ALONE, *SHORT, "--out", "run")[0] == 0
+    assert "already done: run" in call("compare", ALONE, *SHORT, "--out", "run")[2]
+    for other in (["--seed", "3"], ["--equal-mean-weight"], ["--realizations", "6"]):
+        code, out, err = call("compare", ALONE, *SHORT, *other, "--out", "run")
+        assert (code, out) == (2, "")
+        assert "another design or other settings" in err
+
+
+def test_finished_run_is_shown_again(call, monkeypatch):
+    code, first, _ = call("compare", SHIPPED, *SHORT, "--out", "run")
+    assert code == 0
+
+    def fail(*arguments, **options):
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr("drillctl.compare", fail, raising=False)
+    code, again, err = call("compare", SHIPPED, *SHORT, "--out", "run")
+    assert (code, err) == (0, "already done: run\n")
+    assert again == first.replace("results: run\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "messages"),
+    [
+        (["--realizations", "0"], ["uncertainty.realizations: 0 is not allowed"]),
+        (["--seed", "-3"], ["uncertainty.seed: -3 is not allowed"]),
+        (["--set", "compare.cases=[{name = 'a', set = {'controller.kpp' = 3}}]"],
+         ["compare.cases 'a': controller.kpp", "did you mean 'kp'"]),
+        (["--set", "simulation.duration=10 s", "--realizations", "5", "--equal-mean-weight"],
+         ["compare.cases '6 kN s/rad': weight_on_bit: within its limits the law cannot have"]),
+        (["--set", "compare.case=[]"], ["compare.case: unknown key; did you mean 'cases'"]),
+        (["--set", "uncertain.bit_rock.a1_factor.distribution=lognorm"],
+         ["uncertain.bit_rock.a1_factor.distribution", "did you mean 'lognormal'"]),
+        (["--set", "uncertain.bit_rock.a1_factor.cov=-1"],
+         ["uncertain.bit_rock.a1_factor.cov: -1 is not allowed"]),
+        (["--set", "uncertain.bit_rock.b1_factor={distribution='normal', cov=0.1}"],
+         ["uncertain.bit_rock.b1_factor", "did you mean 'bit_rock.a1_factor'"]),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_and_leaves_nothing(call, arguments, messages):
+    code, out, err = call("compare", SHIPPED, *arguments, "--json")
+    assert (code, out) == (2, "")
+    assert f"{SHIPPED}.toml" in err
+    for message in messages:
+        assert message in err
+    assert err.count("\n") == 1
+    assert not list(Path().glob("runs/*"))
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("uncertain.bit_rock.b1_factor={distribution='normal', cov=0.1}", "no numeric parameter"),
+        ("compare.cases=[{name = 'a', set = {'controller.kpp' = 3}}]", "compare.cases 'a'"),
+        ("compare.cases=[{name='a'}, {name='b', set={'start.kind'='rest'}}]", "the same start"),
+    ],
+)
+def test_validate_sees_draws_and_cases(call, setting, message):
+    assert call("validate", SHIPPED)[0] == 0
+    code, out, err = call("validate", SHIPPED, "--set", setting)
+    assert (code, out) == (2, "")
+    assert message in err
