@@ -5,7 +5,7 @@
 - `loop_maps.py`: figures of the linear loop over a grid.
 - `regions.py`: cells and outlines at or under a level.
 - `three_regions.py`: locally stable, J1 under a level, attracted: three regions of one map.
-- `attraction.py`: operating points and long runs of its cells.
+- `attraction.py`: long runs of its cells; `steady.py`: operating points of the cells of a grid.
 - `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
 - `draws.py`: uncertain parameters and draws from them; `drawn_lanes.py`: the lanes of draws.
 - `comparison.py`: cases at the same draws; `cases.py`: what makes them comparable.

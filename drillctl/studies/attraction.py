@@ -7,15 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.bit_rock import contact
-from drillctl.design import Design
-from drillctl.errors import InputError
-from drillctl.linear.operating_point import operating_point
 from drillctl.simulation.batch import Prepared, prepare, run_batch, trace
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import NARROW_BAND, STATUSES, WINDOW
 from drillctl.simulation.start import Kind
-from drillctl.studies.grid import Axis, Group, cell_design
+from drillctl.studies.grid import Group
+from drillctl.studies.steady import gains_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -26,22 +23,6 @@ STARTS: tuple[Kind, ...] = ("rest", "wound_up")
 """Starts that a cell must leave for steady drilling: both are far from it."""
 TRACED_LANES = 128
 """Lanes traced together: some 70 MB at 20 ms."""
-
-
-@dataclass(frozen=True, eq=False)
-class Steady:
-    """Steady drilling of a number of lanes.
-
-    Attributes
-    ----------
-    speed : ndarray, shape (lanes,)
-        Of top and bit (rad/s); NaN where drive, drag and rock balance at no speed.
-    slope : ndarray, shape (lanes,)
-        Falling slope of the rock there (N m s/rad); NaN at the same lanes.
-    """
-
-    speed: Array
-    slope: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,35 +42,6 @@ class Ended:
     attracted: Mask
     sticking: Mask
     failed: Mask
-
-
-def steady_drilling(design: Design, axes: tuple[Axis, ...], group: Group) -> Steady:
-    """Operating speed of each cell of a group and the slope there.
-
-    Parameters
-    ----------
-    design : Design
-        Of the grid.
-    axes : tuple of Axis
-        Of the grid.
-    group : Group
-        Cells that share a string.
-
-    Returns
-    -------
-    Steady
-        With integral action at the set speed; without, at the equilibrium nearest to it.
-    """
-    lanes = group.lanes
-    speed = lanes.set_speed.copy()
-    for lane in np.flatnonzero(gains_of(lanes)[1] == 0.0):
-        cell = cell_design(design, axes, int(group.cells[lane]))
-        try:
-            speed[lane] = operating_point(cell).speed
-        except InputError:  # there is none
-            speed[lane] = np.nan
-    _, slope = contact(lanes.friction, lanes.weight, speed, np.exp)
-    return Steady(speed, np.where(np.isnan(speed), np.nan, -slope))
 
 
 def long_runs(group: Group) -> Prepared:
@@ -137,9 +89,3 @@ def _stays(lanes: Lanes, speed: Array, prepared: Prepared) -> Mask:
     time, signals = trace(lanes, prepared, prepared.scheme.step)
     late = signals["bit_speed"][time >= HORIZON - WINDOW]
     return np.asarray((np.abs(late - speed) <= NARROW_BAND * speed).all(axis=0))
-
-
-def gains_of(lanes: Lanes) -> tuple[Array, Array]:
-    """Proportional and integral gain of every lane (N m s/rad, N m/rad)."""
-    kp, ki = (np.broadcast_to(np.asarray(g, float), len(lanes)) for g in lanes.drive.gains())
-    return kp, ki

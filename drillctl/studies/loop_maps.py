@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.bit_rock import contact
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.counting import natural_frequencies
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_margins import peak_sensitivities
 from drillctl.linear.loop_poles import many_loop_poles
-from drillctl.linear.operating_point import operating_point
 from drillctl.linear.slope_margin import slope_margins
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.grid import Axis, Group, axes_of, cell_design, groups, shape_of
+from drillctl.studies.grid import Axis, Group, axes_of, groups, shape_of
+from drillctl.studies.steady import gains_of, steady_drilling
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -159,8 +158,8 @@ def _figures(
 ) -> dict[str, Array]:
     """Each wanted figure of the cells that share a string."""
     lanes, string = group.lanes, group.design.string
-    kp, ki = (np.broadcast_to(np.asarray(g, dtype=float), len(lanes)) for g in lanes.drive.gains())
-    slope = slopes(design, axes, group)
+    kp, ki = gains_of(lanes)
+    slope = steady_drilling(design, axes, group).slope
     ends = ends_of(string)
     margin = slope_margins(ends, kp, ki)
     steady = np.isfinite(slope)
@@ -212,36 +211,3 @@ def _low_damping(group: Group, poles: NDArray[np.complexfloating[Any, Any]]) -> 
         ratio = np.where(size < limit, ratio, np.inf)
         least = np.nanmin(ratio, axis=1)
     return np.where(np.isinf(least), 1.0, least)
-
-
-def slopes(design: Design, axes: tuple[Axis, ...], group: Group) -> Array:
-    """Falling slope at the operating point of each cell of a group (N m s/rad).
-
-    Parameters
-    ----------
-    design : Design
-        Of the grid.
-    axes : tuple of Axis
-        Of the grid.
-    group : Group
-        Cells that share a string.
-
-    Returns
-    -------
-    ndarray, shape (lanes,)
-        NaN where a drive without speed control finds no steady speed.
-    """
-    lanes = group.lanes
-    _, ki = lanes.drive.gains()
-    _, rise = contact(lanes.friction, lanes.weight, lanes.set_speed, np.exp)
-    slope = -np.asarray(rise)
-    for lane in np.flatnonzero(np.broadcast_to(np.asarray(ki) == 0.0, slope.shape)):
-        slope[lane] = _slope(cell_design(design, axes, int(group.cells[lane])))
-    return slope
-
-
-def _slope(design: Design) -> float:
-    try:
-        return operating_point(design).slope
-    except InputError:  # the drive cannot turn this bit
-        return np.nan

@@ -25,11 +25,10 @@ from drillctl.studies.attraction import (
     HORIZON,
     STARTS,
     ends_from,
-    gains_of,
     long_runs,
-    steady_drilling,
 )
 from drillctl.studies.grid import Axis, Group, axes_of, groups, shape_of
+from drillctl.studies.steady import gains_of, steady_drilling
 from drillctl.studies.sweeps import sweep
 
 if TYPE_CHECKING:

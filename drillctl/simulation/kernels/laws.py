@@ -83,17 +83,6 @@ def _kinetic_torque_at_rest(law, weight):
     return lambda law, weight: method(law, weight)
 
 
-def torque_and_slope(law: Any, weight: float, speed: float) -> tuple[float, float]:
-    """`law.torque_and_slope(weight, speed, exp)` with the compiled exponential."""
-    raise NotImplementedError("compiled only")
-
-
-@overload(torque_and_slope)
-def _torque_and_slope(law, weight, speed):
-    method = _method(law, "torque_and_slope")
-    return lambda law, weight, speed: method(law, weight, speed, exp)
-
-
 def mean_torque(law: Any, angle: float, rate: float) -> tuple[float, float]:
     """`law.mean_torque(angle, rate)`, with `rate` = 1 / step (1/s)."""
     raise NotImplementedError("compiled only")

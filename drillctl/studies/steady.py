@@ -1,0 +1,68 @@
+"""Steady drilling of the cells of a grid: operating speed, slope of the rock, gains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.bit_rock import contact
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.linear.operating_point import operating_point
+from drillctl.simulation.lanes import Lanes
+from drillctl.studies.grid import Axis, Group, cell_design
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Steady:
+    """Steady drilling of a number of lanes.
+
+    Attributes
+    ----------
+    speed : ndarray, shape (lanes,)
+        Of top and bit (rad/s); NaN where drive, drag and rock balance at no speed.
+    slope : ndarray, shape (lanes,)
+        Falling slope of the rock there (N m s/rad); NaN at the same lanes.
+    """
+
+    speed: Array
+    slope: Array
+
+
+def steady_drilling(design: Design, axes: tuple[Axis, ...], group: Group) -> Steady:
+    """Operating speed of each cell of a group and the slope there.
+
+    Parameters
+    ----------
+    design : Design
+        Of the grid.
+    axes : tuple of Axis
+        Of the grid.
+    group : Group
+        Cells that share a string.
+
+    Returns
+    -------
+    Steady
+        Of each cell what `drillctl.linear.operating_point` says of it.
+    """
+    lanes = group.lanes
+    speed = lanes.set_speed.copy()
+    for lane in np.flatnonzero(gains_of(lanes)[1] == 0.0):
+        cell = cell_design(design, axes, int(group.cells[lane]))
+        try:
+            speed[lane] = operating_point(cell).speed
+        except InputError:  # there is none
+            speed[lane] = np.nan
+    _, slope = contact(lanes.friction, lanes.weight, speed, np.exp)
+    return Steady(speed, np.where(np.isnan(speed), np.nan, -slope))
+
+
+def gains_of(lanes: Lanes) -> tuple[Array, Array]:
+    """Proportional and integral gain of every lane (N m s/rad, N m/rad)."""
+    kp, ki = (np.broadcast_to(np.asarray(g, float), len(lanes)) for g in lanes.drive.gains())
+    return kp, ki
