@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from test_reference import EVENT_ACCURATE, paper
 
@@ -219,6 +219,8 @@ def test_a_lane_that_overflows_fails_alone():
     assert np.array_equal(found.measures["j1"][healthy], alone.measures["j1"][healthy])
 
 
+# A short stiff string: what its shapes had left of the rigid body twisted it by 1e-6 N m.
+@example(inertia=1060.75, bit=1065.75, length=201.0, speed=10.0, elements=21)
 @settings(max_examples=25, deadline=None)
 @given(
     inertia=st.floats(100, 5000),
@@ -248,7 +250,7 @@ def test_a_rig_without_friction_and_control_keeps_its_energy(inertia, bit, lengt
     expected = design.tables.start.speed
     assert found.min_bit_speed == pytest.approx(expected, rel=1e-9)
     assert found.peak_bit_speed == pytest.approx(expected, rel=1e-9)
-    assert found.peak_pipe_torque == pytest.approx(0.0, abs=1e-6)
+    assert found.peak_pipe_torque == pytest.approx(0.0, abs=1e-8)
     assert found.work_at_bit == 0.0
 
 
