@@ -288,6 +288,7 @@ def compare(
             help="Shift the nominal weight of a moving weight on bit until means are equal.",
         ),
     ] = None,
+    axis: Axes = None,
     out: Out = None,
     json: Json = False,
     threads: Threads = None,
@@ -295,7 +296,7 @@ def compare(
     verbose: Verbose = False,
     debug: Debug = False,
 ) -> None:
-    """Cases at the same draws: distributions, paired differences, shares under each level."""
+    """Cases at the same draws: distributions, paired differences, shares, regions, responses."""
     from drillctl import verbs
 
     _use(threads)
@@ -305,7 +306,7 @@ def compare(
         "compare.equal_mean_weight": equal_mean_weight,
     }
     asked = {path: value for path, value in given.items() if value is not None}
-    found = _load(design, sets)
+    found = _with_axes(_load(design, sets), axis)
     verbs.compare(found.replace(asked) if asked else found, Options(out, json, units, verbose))
 
 

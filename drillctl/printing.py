@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from drillctl.linear import LoopAnalysis
     from drillctl.simulation import Simulation
     from drillctl.simulation.limit_cycle import LimitCycle
-    from drillctl.studies import Axis, Comparison, Regularisation, Sweep, ThreeRegions
+    from drillctl.studies import Axis, Comparison, Region, Regularisation, Sweep, ThreeRegions
     from drillctl.studies.comparison import ComparedCase, Difference
 
 _MEASURES = {
@@ -210,7 +210,7 @@ def regularisation(result: Regularisation) -> None:
 
 
 def comparison(result: Comparison, system: units.System) -> None:
-    """Distributions of the cases, their differences from the first, shares under each level."""
+    """Distributions of the cases, differences from the first, shares and areas under each level."""
     from drillctl.studies.comparison import MEASURES
 
     names = [case.name for case in result.cases]
@@ -237,8 +237,17 @@ def comparison(result: Comparison, system: units.System) -> None:
         cells = [f"{share:.1%} ({low:.1%} to {high:.1%})" for _, share, (low, high) in shares]
         rows.append([f"J1 <= {level:g} s", *cells])
     table("share of the draws (95 % interval)", ["level", *names], rows)
+    if any(case.nominal.map is not None for case in result.cases):
+        rows = [
+            [f"J1 <= {level:g} s", *(_area(case.region(level)) for case in result.cases)]
+            for level in result.levels
+        ]
+        axes = ", ".join(table.path for table in result.design.tables.map.axes)
+        table(f"share of the map over {axes}, without draws (cells)", ["level", *names], rows)
     for case in result.cases:
         _case_notes(case, system)
+        if case.nominal.no_map and result.design.tables.compare.maps:
+            line(f"{case.name}: no map: {case.nominal.no_map}")
     line(f"drawn: {', '.join(result.baseline.drawn)}; seed {result.seed}")
 
 
@@ -249,6 +258,10 @@ def _case_notes(case: ComparedCase, system: units.System) -> None:
     for failure in case.failures:
         reason = f"{failure.reason}: {failure.example}"
         line(f"{case.name}: {failure.count} of {len(case.status)} draws failed; {reason}")
+
+
+def _area(found: Region | None) -> str:
+    return "-" if found is None else f"{found.area_fraction:.1%} ({found.cells})"
 
 
 def _head(name: str, label: str) -> str:

@@ -27,4 +27,32 @@ class Silent:
         """Parts are done; nobody is told."""
 
 
+class Within:
+    """Reports a task that is a part of a larger one, as parts of that one.
+
+    A task that begins anew, as a sweep does for each kernel, and tells again what is done
+    already, is not counted twice.
+
+    Parameters
+    ----------
+    whole : Progress
+        Its task has begun, in parts of the same kind.
+    """
+
+    def __init__(self, whole: Progress) -> None:
+        self._whole = whole
+        self._done = self._told = 0
+
+    def begin(self, task: str, total: int) -> None:
+        """The part begins, perhaps once more; the larger task goes on."""
+        self._done = 0
+
+    def advance(self, done: int) -> None:
+        """Parts are done; those not yet told of are told."""
+        self._done += done
+        if self._done > self._told:
+            self._whole.advance(self._done - self._told)
+            self._told = self._done
+
+
 SILENT = Silent()

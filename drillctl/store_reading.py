@@ -28,6 +28,7 @@ from drillctl.studies.comparison import MEASURES, ComparedCase, Comparison
 from drillctl.studies.drawn_lanes import Failures
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
+from drillctl.studies.nominal import Nominal, map_dimension, nominal_design
 from drillctl.studies.regularisation import Regularisation
 from drillctl.studies.sweeps import Sweep
 from drillctl.studies.three_regions import FIELDS, MASKS, ThreeRegions
@@ -216,7 +217,7 @@ def read_comparison(design: Design, data: xarray.Dataset, summary: dict[str, Any
         ),
         levels=design.tables.map.levels,
         **{name: summary[name] for name in told},
-        provenance={key: str(v) for key, v in data.attrs.items() if key != "case_designs"},
+        provenance=_provenance(data),
     )
 
 
@@ -232,7 +233,53 @@ def _case(name: str, design: Design, data: xarray.Dataset, summary: dict[str, An
         weight_shift=told["weight_shift"],
         step=told["step"],
         modes=told["modes"],
+        nominal=_nominal(nominal_design(design, told["weight_shift"]), data, summary, told),
     )
+
+
+def _nominal(
+    design: Design, data: xarray.Dataset, summary: dict[str, Any], told: dict[str, Any]
+) -> Nominal:
+    """Map and response of one case, from the dataset of that case."""
+    found = told["nominal"]
+    kept = ~np.isnan(data["response_time"].values)  # the rest is padding
+    response = Simulation(
+        design=design,
+        time=data["response_time"].values[kept],
+        signals={name: data[f"response_{name}"].values[kept] for name in SIGNALS},
+        events=(),
+        measures=Measures(**found["measures"]),
+        status=found["status"],
+        engine=found["engine"],
+        step=found["step"],
+        modes=found["modes"],
+        energy=None,
+    )
+    made = found["map"] and _case_map(design, data, found["map"], summary["uncertain"])
+    return Nominal(made, found["no_map"], response)
+
+
+def _case_map(
+    design: Design, data: xarray.Dataset, told: dict[str, Any], drawn: list[str]
+) -> Sweep:
+    none = np.empty(0, dtype=np.int64)
+    return Sweep(
+        design=design,
+        axes=tuple(
+            _axis(path, data[stored_name(map_dimension(path, drawn))]) for path in told["axes"]
+        ),
+        levels=design.tables.map.levels,
+        measures={name: data[f"map_{name}"].values for name in FLOATS},
+        status=data["map_status"].values.astype(np.int8),
+        audit=Audit(none, np.empty(0), np.empty(0)),
+        **{name: told[name] for name in ("step", "modes", "seconds", "total_seconds")},
+        provenance=_provenance(data),
+    )
+
+
+def _provenance(data: xarray.Dataset) -> dict[str, str]:
+    """Of a comparison: its attributes but for the designs of its cases."""
+    return {key: str(value) for key, value in data.attrs.items() if key != "case_designs"}
 
 
 def _resolved(text: str, like: Design) -> Design:

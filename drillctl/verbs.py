@@ -213,6 +213,11 @@ def compare(design: Design, options: Options) -> None:
     _draw(plots.j1_distributions(result), folder.path / "distributions.png")
     picture = plots.j1_against_weight(result, system=options.units)
     _draw(picture, folder.path / "weight.png")
+    picture = plots.compared_responses(result, system=options.units)
+    _draw(picture, folder.path / "responses.png")
+    if any(case.nominal.map is not None for case in result.cases):
+        picture = plots.compared_regions(result, system=options.units)
+        _draw(picture, folder.path / "regions.png")
     if len(result.cases) > 1:
         _draw(plots.paired_differences(result), folder.path / "differences.png")
     else:

@@ -28,11 +28,13 @@ class CompareTable(Table):
     """What is compared: the first case is the baseline; without cases, the design alone.
 
     `equal_mean_weight` shifts the nominal weight of a case whose weight on bit moves until its
-    mean over the draws, after the start, is that of a constant weight.
+    mean over the draws, after the start, is that of a constant weight. `maps` asks for the map of
+    every case over the axes of `[map]`, at its own values.
     """
 
     cases: tuple[CaseTable, ...] = ()
     equal_mean_weight: bool = False
+    maps: bool = True
 
     @field_validator("cases")
     @classmethod

@@ -9,6 +9,7 @@
 - `friction.py`: `friction_curves`, bit torque against bit speed at each weight on bit.
 - `map.py`: `stability_map` with regions and audit; `sweep_line` for a single parameter.
 - `comparison.py`: `j1_distributions`, `paired_differences`, `j1_against_weight` of cases.
+- `nominal_cases.py`: `compared_regions` and `compared_responses` of cases at their own values.
 - `limit_cycle.py`: `limit_cycle`, one period by each method.
 - `three_regions.py`: `three_regions` over the same two parameters.
 - `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
@@ -30,6 +31,7 @@ from drillctl.plots.loop_shape import nichols, nyquist, sensitivity
 from drillctl.plots.map import stability_map, sweep_line
 from drillctl.plots.mobility import mobility
 from drillctl.plots.modes import mode_shapes
+from drillctl.plots.nominal_cases import compared_regions, compared_responses
 from drillctl.plots.regularisation import regularisation
 from drillctl.plots.root_locus import root_locus
 from drillctl.plots.three_regions import three_regions
@@ -37,6 +39,8 @@ from drillctl.plots.time_response import time_response
 
 __all__ = [
     "bode",
+    "compared_regions",
+    "compared_responses",
     "drive_impedance",
     "friction_curves",
     "gain_boundary",

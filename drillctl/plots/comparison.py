@@ -1,4 +1,4 @@
-"""Cases side by side: distributions of J1, paired differences, J1 against weight on bit."""
+"""Cases at the same draws: distributions of J1, paired differences, J1 against weight on bit."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ _WORDS = {
     "time_outside_table": "time outside table",
 }  # fmt: skip
 """Measures as they are spoken of."""
+UNBEATEN = "unbeaten in both"
+"""Legend of the cases that no other beats."""
 WIDEST = 110
 """Longest line of a caption (characters)."""
 LEVEL_COLOUR = "#888888"
@@ -59,7 +61,7 @@ def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
         ax.step(
             np.concatenate([values[:1], values]), np.concatenate([share[:1] * 0.0, share]),
             where="post",
-            linewidth=LINE, label=label, color=_colour(number),
+            linewidth=LINE, label=label, color=case_colour(number),
             linestyle=DASHES[number % len(DASHES)],
         )  # fmt: skip
     for level in result.levels:
@@ -71,8 +73,8 @@ def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
     ax.set_ylim(0.0, 1.0)
     ax.set_xlim(left=0.0)
     dress(ax, "J1 (s)", "share of draws at or under")
-    ax.set_title(_title(result), fontsize=TITLE, loc="left", pad=18.0)
-    _legend(ax, len(result.cases))
+    ax.set_title(title_of(result), fontsize=TITLE, loc="left", pad=18.0)
+    legend_below(ax, len(result.cases))
     figure.supxlabel(_caption(result, "Grey: levels of J1 (s)."), fontsize=SMALL)
     return figure
 
@@ -111,13 +113,13 @@ def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
         ax.errorbar(
             points[:, 0], place[known],
             xerr=np.abs(points[:, 1:].T - points[:, 0]), fmt="o", markersize=4.5, capsize=3.0,
-            linewidth=LINE, color=_colour(number + 1), label=case.name,
+            linewidth=LINE, color=case_colour(number + 1), label=case.name,
         )  # fmt: skip
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
     ax.set_yticks(range(len(drawn)), [_WORDS[name] for name in drawn])
     ax.set_ylim(max(len(drawn), 1) - 0.5, -0.5)
-    dress(ax, f"difference from {result.baseline.name!r} (% of its mean)", "", _title(result))
-    _legend(ax, len(others))
+    dress(ax, f"difference from {result.baseline.name!r} (% of its mean)", "", title_of(result))
+    legend_below(ax, len(others))
     lost = f"Zero or undefined in a case: {', '.join(left_out)}." if left_out else ""
     text = "Mean of the differences draw by draw; bars: 95 % bootstrap intervals of that mean."
     figure.supxlabel(_caption(result, text, lost), fontsize=SMALL)
@@ -141,37 +143,46 @@ def j1_against_weight(
     Returns
     -------
     Figure
-        A dot a draw, a large mark a case at its means, with a line through the cases that no
-        other beats in both, unless the weights were made equal.
+        A Pareto picture: a dot a draw, a large mark a case at its means over the draws that all
+        cases define; ringed those that no other beats in both, with the border of what they beat.
+        No rings where the weights were made equal.
     """
     figure, ax = axes_or_new(ax, 7.5, 5.5)
+    shared = _shared(result)
     means = []
     for number, case in enumerate(result.cases):
-        j1, weight = case.measures["j1"], case.measures["mean_weight_after_start"]
-        known = ~(np.isnan(j1) | np.isnan(weight))
-        if not known.any():
+        j1 = case.measures["j1"]
+        weight, _ = units.displayed(case.measures["mean_weight_after_start"], "N", system)
+        if np.isnan(j1).all():
             continue
-        shown, unit = units.displayed(weight[known], "N", system)
-        colour = _colour(number)
-        ax.plot(shown, j1[known], ".", color=colour, markersize=3.0, alpha=0.35)
-        centre = (float(shown.mean()), float(j1[known].mean()))
-        means.append(centre)
+        colour = case_colour(number)
+        ax.plot(weight, j1, ".", color=colour, markersize=3.0, alpha=0.35)
+        if not shared.any():
+            continue
+        means.append((float(weight[shared].mean()), float(j1[shared].mean())))
         ax.errorbar(
-            *centre, xerr=_bar(shown, result.seed), yerr=_bar(j1[known], result.seed),
+            *means[-1], xerr=_bar(weight[shared], result.seed), yerr=_bar(j1[shared], result.seed),
             fmt="osD^v"[number % 5], color=colour, markeredgecolor=BLACK, markersize=9.0,
             capsize=3.0, label=case.name, zorder=4,
         )  # fmt: skip
     # Of weights made equal only the rest of a search is left: nothing to be better in.
-    front = [] if result.equal_mean_weight else _unbeaten(means)
-    if len(front) > 1:
-        ax.plot(*zip(*front, strict=True), color=BLACK, linewidth=0.9, linestyle="--",
-                label="unbeaten in both", zorder=3)  # fmt: skip
+    rings = len(means) > 1 and not result.equal_mean_weight
+    if rings:
+        # More weight than one of them is to be had only at the J1 of the next: hence the steps.
+        ax.plot(
+            *zip(*_unbeaten(means), strict=True), "o--", drawstyle="steps-pre", color=BLACK,
+            linewidth=0.9, markersize=17.0, markerfacecolor="none", markeredgewidth=1.2,
+            label=UNBEATEN, zorder=3,
+        )  # fmt: skip
     _, unit = units.displayed(1.0, "N", system)
     ax.set_ylim(bottom=0.0)
-    dress(ax, f"mean WOB after {result.weight_from:g} s ({unit})", "J1 (s)", _title(result))
-    _legend(ax, len(result.cases) + 1)
-    text = "Large: means over the draws with their 95 % intervals; small: the draws."
-    figure.supxlabel(_caption(result, text), fontsize=SMALL)
+    dress(ax, f"mean WOB after {result.weight_from:g} s ({unit})", "J1 (s)", title_of(result))
+    legend_below(ax, len(result.cases) + 1)
+    count = int(shared.sum())
+    which = "the draws" if count == result.realizations else f"the {count} draws defined in all"
+    text = f"Large: means over {which} with their 95 % intervals; small: the draws."
+    best = "Ringed: no other case has less J1 and more weight on the mean." if rings else ""
+    figure.supxlabel(_caption(result, text, best), fontsize=SMALL)
     return figure
 
 
@@ -204,6 +215,16 @@ def _percent(
     return 100 * found.difference / mean, 100 * low / mean, 100 * high / mean
 
 
+def _shared(result: Comparison) -> np.ndarray:
+    """Draws at which J1 and weight are defined in every case, but for cases without any."""
+    known = [
+        ~np.isnan(case.measures["j1"] + case.measures["mean_weight_after_start"])
+        for case in result.cases
+    ]
+    some = [one for one in known if one.any()]
+    return np.logical_and.reduce(some) if some else np.zeros(result.realizations, dtype=bool)
+
+
 def _bar(values: np.ndarray, seed: int) -> list[list[float]] | None:
     interval, mean = mean_interval(values, seed), float(values.mean())
     # Rounding alone may put the mean of equal values outside.
@@ -218,18 +239,23 @@ def _unbeaten(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]
     )  # fmt: skip
 
 
-def _colour(number: int) -> str:
+def case_colour(number: int) -> str:
+    """Colour of a case by its place; the same in every picture of a comparison."""
     return COLOURS[number % len(COLOURS)]
 
 
-def _title(result: Comparison) -> str:
+def title_of(result: Comparison) -> str:
+    """Title of a picture: that of the design, or its name."""
     return result.design.tables.title or result.design.name
 
 
-def _legend(ax: Axes, entries: int) -> None:
+def legend_below(ax: Axes, entries: int) -> None:
+    """Legend under the axes, four entries a row, that of the unbeaten after the cases."""
+    found = zip(*ax.get_legend_handles_labels(), strict=True)
+    handles = [handle for handle, _ in sorted(found, key=lambda pair: pair[1] == UNBEATEN)]
     ax.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=min(entries, 4), fontsize=SMALL,
-        frameon=False,
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=min(entries, 4),
+        fontsize=SMALL, frameon=False,
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@
 - `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
 - `draws.py`: uncertain parameters and draws from them; `drawn_lanes.py`: the lanes of draws.
 - `comparison.py`: cases at the same draws; `cases.py`: what makes them comparable.
+- `nominal.py`: their maps and motions at their own values.
 - `drawn_runs.py`: runs of draws, equal mean weights; `intervals.py`: shares and means.
 - `audit.py`: cells of a map simulated again with the reference solver.
 - `responses.py`, `tables.py`: time responses at cells of a map; maps as CSV.

@@ -11,7 +11,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,12 @@ from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.cases import case_designs, in_case, refuse_unequal
 from drillctl.studies.drawn_lanes import Failures, drawn_lanes
-from drillctl.studies.drawn_runs import equalising_shift, run_draws, start_up
+from drillctl.studies.drawn_runs import DrawnRuns, equalising_shift, run_draws, start_up
 from drillctl.studies.draws import draw, uncertain_parameters
 from drillctl.studies.intervals import Interval, mean_interval, share_interval
 from drillctl.studies.memory import refuse_too_large
+from drillctl.studies.nominal import Nominal, labelled, nominal_design, nominal_runs
+from drillctl.studies.regions import Region, region
 from drillctl.studies.sweeps import UNITS
 
 if TYPE_CHECKING:
@@ -75,6 +77,8 @@ class ComparedCase:
         Added to the nominal weight on bit for the sake of equal means (N).
     step, modes : float and int, or None
         Scheme of the batch engine; None where it differs from draw to draw.
+    nominal : Nominal
+        Map and motion at its own values, the weight shifted as for the draws.
     """
 
     name: str
@@ -86,6 +90,7 @@ class ComparedCase:
     weight_shift: float
     step: float | None
     modes: int | None
+    nominal: Nominal
 
     def distribution(self, measure: str) -> dict[str, Any]:
         """Mean, standard deviation, quantiles (SI) and number of draws that define a measure."""
@@ -111,12 +116,24 @@ class ComparedCase:
         hits = int((np.nan_to_num(self.measures["j1"], nan=np.inf) <= level).sum())
         return hits, hits / total, share_interval(hits, total)
 
+    def region(self, level: float) -> Region | None:
+        """Cells and outline of the nominal map at or under a level of J1 (s); None without map."""
+        found = self.nominal.map
+        return None if found is None else region(found.j1, found.axes, level)
+
     def summary(self, levels: tuple[float, ...]) -> dict[str, Any]:
-        """Measures, regions, statuses, failures, shift and scheme; SI."""
+        """Measures, regions, statuses, failures, shift, scheme and nominal runs; SI."""
         regions = {}
         for level in levels:
             hits, share, interval = self.share(level)
-            regions[f"{level:g}"] = {"draws": hits, "share": share, "interval_95": list(interval)}
+            inside = self.region(level)
+            regions[f"{level:g}"] = {
+                "draws": hits,
+                "share": share,
+                "interval_95": list(interval),
+                "cells": None if inside is None else inside.cells,
+                "area_fraction": None if inside is None else inside.area_fraction,
+            }
         return {
             "measures": {name: self.distribution(name) for name in MEASURES},
             "regions": regions,
@@ -129,6 +146,7 @@ class ComparedCase:
             "weight_shift": self.weight_shift,
             "step": self.step,
             "modes": self.modes,
+            "nominal": self.nominal.summary(),
         }
 
 
@@ -213,7 +231,7 @@ class Comparison:
 
     @property
     def data(self) -> xarray.Dataset:
-        """Measures, statuses and drawn values by case and realization, with units."""
+        """Measures, statuses, drawn values by case and realization; maps, responses; with units."""
         import xarray
 
         over = ("case", "realization")
@@ -230,6 +248,7 @@ class Comparison:
             variables[drawn.path] = (over, values, {"units": drawn.unit})
         flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
         variables["status"] = (over, np.stack([case.status for case in self.cases]), flags)
+        variables |= labelled([case.nominal for case in self.cases], list(self.baseline.drawn))
         designs = json.dumps([to_toml(case.design) for case in self.cases])
         attributes = {**self.provenance, "case_designs": designs}
         return xarray.Dataset(variables, coordinates, attributes)
@@ -280,18 +299,20 @@ def compare(
         Shift the nominal weight of a case with a moving weight on bit until its mean after the
         start, over the draws, is the nominal one; by default as `[compare]` says.
     progress : Progress
-        Told of runs.
+        Told of runs and of cells of the maps.
 
     Returns
     -------
     Comparison
-        A draw that is impossible or breaks down is a status and counted, not an exception.
+        A draw that is impossible or breaks down is a status and counted, not an exception. Maps
+        of the cases over the axes of the first design's `[map]` table, unless its `compare.maps`
+        says no.
 
     Raises
     ------
     InputError
-        Cases that are not on equal terms, impossible settings, every draw impossible, or a mean
-        weight that cannot be reached.
+        Cases that are not on equal terms, impossible settings, every draw impossible, a mean
+        weight that cannot be reached, or maps too large for the memory.
     """
     begin = time.perf_counter()
     given = {
@@ -312,16 +333,19 @@ def compare(
     draws, equal = design.tables.uncertainty, design.tables.compare.equal_mean_weight
     refuse_too_large([draws.realizations, len(named)], "uncertainty.realizations")
     progress.begin("simulating cases", draws.realizations * len(named))
-    found = []
+    runs, own = [], {}
     for name, variant in named.items():
         try:
-            found.append(_run_case(name, variant, draws.realizations, draws.seed, equal))
+            runs.append(_run_case(variant, draws.realizations, draws.seed, equal))
+            own[name] = nominal_design(variant, runs[-1].shift)
         except InputError as error:
             raise in_case(error, variant, name) from None
         progress.advance(draws.realizations)
+    axes = design.tables.map.axes if design.tables.compare.maps else None
+    nominal = nominal_runs(own, axes, progress)
     return Comparison(
         design=design,
-        cases=tuple(found),
+        cases=tuple(map(_compared, named, named.values(), runs, nominal)),
         realizations=draws.realizations,
         seed=draws.seed,
         levels=design.tables.map.levels,
@@ -331,7 +355,16 @@ def compare(
     )
 
 
-def _run_case(name: str, design: Design, count: int, seed: int, equal: bool) -> ComparedCase:
+class _CaseRuns(NamedTuple):
+    """What the draws of a case came to."""
+
+    drawn: dict[str, Array]
+    failures: tuple[Failures, ...]
+    shift: float
+    runs: DrawnRuns
+
+
+def _run_case(design: Design, count: int, seed: int, equal: bool) -> _CaseRuns:
     draws = draw(design, count, seed)
     drawn = drawn_lanes(design, draws)
     shift = equalising_shift(drawn, count) if equal else 0.0
@@ -341,14 +374,19 @@ def _run_case(name: str, design: Design, count: int, seed: int, equal: bool) -> 
     failures = drawn.failures
     if broken:
         failures = (*failures, Failures(NO_ANSWER, broken, "a number of the run is not finite"))
+    return _CaseRuns(draws.values, failures, shift, runs)
+
+
+def _compared(name: str, design: Design, case: _CaseRuns, nominal: Nominal) -> ComparedCase:
     return ComparedCase(
         name=name,
         design=design,
-        drawn=draws.values,
-        measures={measure: runs.measures[measure] for measure in MEASURES},
-        status=runs.status,
-        failures=failures,
-        weight_shift=shift,
-        step=runs.step,
-        modes=runs.modes,
+        drawn=case.drawn,
+        measures={measure: case.runs.measures[measure] for measure in MEASURES},
+        status=case.runs.status,
+        failures=case.failures,
+        weight_shift=case.shift,
+        step=case.runs.step,
+        modes=case.runs.modes,
+        nominal=nominal,
     )

@@ -91,8 +91,11 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     for case in result.cases:
         for level in result.levels:
             hits, share, interval = case.share(level)
-            rows.append([case.name, level, hits, share, *interval])
-    _write(folder / "shares.csv", ["case", "level", "draws", "share", "low", "high"], rows)
+            inside = case.region(level)
+            area = (None, None) if inside is None else (inside.cells, inside.area_fraction)
+            rows.append([case.name, level, hits, share, *interval, *area])
+    heads = ["case", "level", "draws", "share", "low", "high", "cells", "area_fraction"]
+    _write(folder / "shares.csv", heads, rows)
     rows = []
     for case in result.cases:
         columns = [*case.drawn.values(), *case.measures.values()]

@@ -341,7 +341,7 @@ def test_pictures_of_every_verb(call):
     for verb, options in verbs_on("wob-rpm-chart").items():
         assert call(verb, "wob-rpm-chart", *options, "--out", verb)[0] == 0
         pictures = list(Path(verb).glob("*.png"))
-        expected = {"modes": 3, "loop": 9, "simulate": 1, "map": 2, "regions": 1, "compare": 2}
+        expected = {"modes": 3, "loop": 9, "simulate": 1, "map": 2, "regions": 1, "compare": 4}
         assert len(pictures) == expected[verb]
         assert all(path.stat().st_size > 3000 for path in pictures)
 

@@ -53,7 +53,10 @@ def test_json_has_the_keys_of_the_contract(call):
         assert {"measures", "regions"} <= set(case)
         assert case["measures"]["j1"]["defined"] == 5
         assert list(case["regions"]) == ["20", "30", "40", "50"]
+        assert case["nominal"]["no_map"] is None
+        assert case["nominal"]["measures"]["j1"] > 0.0
         for region in case["regions"].values():
+            assert region["area_fraction"] == region["cells"] / 41**2
             low, high = region["interval_95"]
             assert 0.0 <= low <= region["share"] <= high <= 1.0
     assert list(found["paired"]) == names[1:]
@@ -70,9 +73,10 @@ def test_json_has_the_keys_of_the_contract(call):
 
 def test_folder_holds_tables_pictures_and_the_run(call):
     assert call("compare", SHIPPED, *SHORT, "--out", "run")[0] == 0
-    assert {"distributions.png", "differences.png", "weight.png", "design.toml", "data.zarr"} <= {
-        path.name for path in Path("run").iterdir()
-    }
+    assert {
+        "distributions.png", "differences.png", "weight.png", "regions.png", "responses.png",
+        "design.toml", "data.zarr",
+    } <= {path.name for path in Path("run").iterdir()}  # fmt: skip
     result = drillctl.open("run")
     assert result.realizations == 5
     with Path("run/draws.csv").open(encoding="utf-8") as stream:
@@ -92,6 +96,55 @@ def test_folder_holds_tables_pictures_and_the_run(call):
         rows = list(csv.DictReader(stream))
     assert len(rows) == 16
     assert int(rows[0]["draws"]) == result.cases[0].share(20.0)[0]
+    region = result.cases[1].region(30.0)
+    assert (rows[5]["cells"], rows[5]["area_fraction"]) == (
+        str(region.cells), str(region.area_fraction)
+    )  # fmt: skip
+
+
+AXES = ["--axis", "controller.kp=100:900:5", "--axis", "controller.ki=50:250:3"]
+
+
+def test_axes_of_the_maps_may_be_given(call):
+    code, out, _ = call("compare", SHIPPED, *SHORT, *AXES, "--json", "--out", "run")
+    assert code == 0
+    for case in strict(out)["cases"].values():
+        assert case["nominal"]["map"]["axes"]["controller.ki"] == {
+            "min": 50.0, "max": 250.0, "points": 3
+        }  # fmt: skip
+        assert case["regions"]["50"]["area_fraction"] == case["regions"]["50"]["cells"] / 15
+    assert drillctl.open("run").cases[3].nominal.map.j1.shape == (5, 3)
+
+
+def test_maps_may_be_left_out(call):
+    code, out, _ = call(
+        "compare", SHIPPED, *SHORT, "--set", "compare.maps=false", "--json", "--out", "run"
+    )
+    assert code == 0
+    for case in strict(out)["cases"].values():
+        assert case["nominal"]["map"] is None
+        assert case["nominal"]["no_map"] == "compare.maps is false"
+        assert case["regions"]["20"]["area_fraction"] is None
+        assert case["regions"]["20"]["share"] is not None
+    assert Path("run/responses.png").exists()
+    assert not Path("run/regions.png").exists()
+    code, out, _ = call("compare", SHIPPED, *SHORT, "--set", "compare.maps=false", "--out", "run")
+    assert code == 0
+    assert "share of the map" not in out
+    assert "no map" not in out  # it was asked for
+    with Path("run/shares.csv").open(encoding="utf-8") as stream:
+        assert {row["cells"] for row in csv.DictReader(stream)} == {""}
+
+
+def test_a_case_without_map_is_told(call):
+    law = "{'controller.law' = 'constant-torque', 'controller.torque' = '7 kN*m'}"
+    cases = f"compare.cases=[{{name = 'pi'}}, {{name = 'torque', set = {law}}}]"
+    code, out, _ = call("compare", ALONE, *SHORT, *AXES, "--set", cases, "--out", "run")
+    assert code == 0
+    assert "share of the map over controller.kp, controller.ki, without draws (cells)" in out
+    assert "torque: no map: map.axes controller.kp: no numeric parameter" in out
+    assert "pi: no map" not in out
+    assert Path("run/regions.png").exists()
 
 
 def test_tables_for_people(call):

@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 import drillctl
 from drillctl.errors import InputError
 from drillctl.plots import j1_against_weight, j1_distributions, paired_differences
-from drillctl.plots.comparison import _unbeaten
+from drillctl.plots.comparison import UNBEATEN, _unbeaten
 from drillctl.studies.comparison import MEASURES, ComparedCase, Comparison
+from drillctl.studies.nominal import Nominal
 
 COUNT = 30
 
@@ -35,6 +36,7 @@ def case(design, name, shift, failed=0):
     return ComparedCase(
         name=name, design=design, drawn={"bit_rock.a1_factor": np.ones(COUNT)},
         measures=measures, status=status, failures=(), weight_shift=0.0, step=0.02, modes=9,
+        nominal=Nominal(None, "not asked", None),
     )  # fmt: skip
 
 
@@ -109,11 +111,13 @@ def test_intervals_are_drawn(design):
 def test_j1_against_weight(result):
     ax, text = drawn(j1_against_weight(result))
     means = [c.lines[0].get_xydata()[0] for c in ax.containers]
-    one = result.baseline.measures
-    expected = (one["mean_weight_after_start"].mean() / 1e3, one["j1"].mean())
-    assert means[0] == pytest.approx(expected)
+    for mean, found in zip(means, result.cases, strict=True):
+        # Over draws 6 to 29 in both cases: the others failed in one of them.
+        weight, j1 = found.measures["mean_weight_after_start"][6:], found.measures["j1"][6:]
+        assert mean == pytest.approx((weight.mean() / 1e3, j1.mean()))
+    assert "means over the 24 draws defined in all" in text
     dots = [line for line in ax.lines if line.get_marker() == "."]
-    assert [len(line.get_xdata()) for line in dots] == [30, 24]
+    assert [int(np.isfinite(line.get_ydata()).sum()) for line in dots] == [30, 24]
     assert "mean WOB after 20 s (kN)" in text
     _, text = drawn(j1_against_weight(result, system="field"))
     assert "(klbf)" in text
@@ -124,6 +128,56 @@ def test_no_case_is_called_unbeaten_where_weights_were_made_equal(design):
     assert "unbeaten in both" in drawn(j1_against_weight(made(design, *cases)))[1]
     equal = made(design, *cases, equal_mean_weight=True)
     assert "unbeaten" not in drawn(j1_against_weight(equal))[1]
+
+
+def ringed(ax):
+    (found,) = (line for line in ax.lines if line.get_label() == UNBEATEN)
+    return found.get_xydata().tolist()
+
+
+def test_the_unbeaten_are_ringed(design):
+    light, heavy, worse = (case(design, name, shift) for name, shift in
+                           (("light", 0.0), ("heavy", 4.0), ("worse", 8.0)))  # fmt: skip
+    worse.measures["mean_weight_after_start"][:] = 142e3
+    result = made(design, light, heavy, worse)
+    ax, text = drawn(j1_against_weight(result))
+    means = [
+        [one.measures["mean_weight_after_start"].mean() / 1e3, one.measures["j1"].mean()]
+        for one in result.cases
+    ]
+    assert np.allclose(ringed(ax), means[:2])
+    assert "no other case has less J1 and more weight" in text
+    labels = [label.get_text() for label in ax.get_legend().get_texts()]
+    assert labels == ["light", "heavy", "worse", UNBEATEN]
+
+
+def test_one_that_beats_all_is_ringed_alone(design):
+    best = case(design, "best", -5.0)
+    best.measures["mean_weight_after_start"][:] = 200e3
+    ax, _ = drawn(j1_against_weight(made(design, case(design, "one", 0.0), best)))
+    assert np.allclose(ringed(ax), [[200.0, 19.5]])
+
+
+def test_a_case_is_not_the_better_for_failing_at_the_worst(design):
+    """Over its own draws the second has less J1 and would beat the first."""
+    one, two = case(design, "one", 0.0), case(design, "two", 1.0)
+    for found in (one, two):
+        found.measures["mean_weight_after_start"][:] = 140e3
+    two.measures["j1"][20:] = np.nan
+    assert np.nanmean(two.measures["j1"]) < one.measures["j1"].mean()
+    ax, _ = drawn(j1_against_weight(made(design, one, two)))
+    assert np.allclose(ringed(ax), [[140.0, one.measures["j1"][:20].mean()]])
+
+
+def test_no_draw_in_common_is_no_mean(design):
+    one, two = case(design, "one", 0.0), case(design, "two", 0.0)
+    one.measures["j1"][:15] = np.nan
+    two.measures["j1"][15:] = np.nan
+    figure = j1_against_weight(made(design, one, two))
+    figure.savefig(io.BytesIO(), dpi=40)
+    (ax,) = figure.axes
+    assert not ax.containers
+    assert "means over the 0 draws" in figure._supxlabel.get_text()
 
 
 def test_the_unbeaten():
@@ -147,7 +201,9 @@ def test_one_case_has_no_differences(design):
 def test_a_case_that_failed_altogether_can_be_drawn(design):
     result = made(design, case(design, "one", 0.0), case(design, "two", 0.0, failed=COUNT))
     assert "two (30 failed)" in drawn(j1_distributions(result))[1]
-    drawn(j1_against_weight(result))
+    ax, text = drawn(j1_against_weight(result))
+    assert len(ax.containers) == 1  # the other still has its mean, over all draws
+    assert "means over the draws" in text
     drawn(paired_differences(result))
 
 
