@@ -9,7 +9,15 @@ import inspect
 from pathlib import Path
 from typing import Any, get_args
 
-from drillctl.design import compare_tables, tables, uncertain_tables
+from drillctl.design import (
+    bit_rock_tables,
+    compare_tables,
+    controller_tables,
+    scenario_tables,
+    tables,
+    uncertain_tables,
+    weight_tables,
+)
 from drillctl.design.paths import kind_of
 
 HEAD = """# Keys of a design file
@@ -20,7 +28,7 @@ the top level: `schema`, `model` (a shipped name or a path; the design is laid o
 
 A key with a unit takes text such as the example; the unit may be any of its kind. Gains may be
 bare numbers. Sections of a design and of its model are merged by name. A table whose `law`
-changes drops the numbers of the old law.
+changes drops the numbers of the old law; `controller.drive` and `weight_on_bit.path` stay.
 """
 
 TABLES = (
@@ -29,21 +37,34 @@ TABLES = (
     ("[[drillstring.sections]]", tables.SectionTable),
     ("[top_drive]", tables.TopDriveTable),
     ("[bha]", tables.BhaTable),
-    ('[bit_rock] law = "navarro-lopez-suarez"', tables.NavarroLopezSuarezTable),
-    ("rows of bit_rock.table", tables.FrictionRow),
-    ('[bit_rock] law = "bit-radius-friction"', tables.BitRadiusFrictionTable),
-    ('[bit_rock] law = "jansen-van-den-steen"', tables.JansenVanDenSteenTable),
-    ('[bit_rock] law = "coulomb"', tables.CoulombTable),
-    ('[bit_rock] law = "tabulated"', tables.TabulatedFrictionTable),
-    ("entries of bit_rock.points", tables.FrictionPoint),
-    ('[bit_rock] law = "tucker-wang"', tables.TuckerWangTable),
-    ('[bit_rock] law = "stribeck"', tables.StribeckTable),
-    ('[controller] law = "pi"', tables.PITable),
-    ('[controller] law = "constant-torque"', tables.ConstantTorqueTable),
-    ('[controller] law = "stiff-speed"', tables.StiffSpeedTable),
-    ('[controller] law = "soft-torque"', tables.SoftTorqueTable),
-    ('[weight_on_bit] law = "constant"', tables.ConstantWeightTable),
-    ('[weight_on_bit] law = "navarro-lopez-suarez"', tables.FollowingSpeedTable),
+    ('[bit_rock] law = "navarro-lopez-suarez"', bit_rock_tables.NavarroLopezSuarezTable),
+    ("rows of bit_rock.table", bit_rock_tables.FrictionRow),
+    ('[bit_rock] law = "bit-radius-friction"', bit_rock_tables.BitRadiusFrictionTable),
+    ('[bit_rock] law = "jansen-van-den-steen"', bit_rock_tables.JansenVanDenSteenTable),
+    ('[bit_rock] law = "coulomb"', bit_rock_tables.CoulombTable),
+    ('[bit_rock] law = "tabulated"', bit_rock_tables.TabulatedFrictionTable),
+    ("entries of bit_rock.points", bit_rock_tables.FrictionPoint),
+    ('[bit_rock] law = "tucker-wang"', bit_rock_tables.TuckerWangTable),
+    ('[bit_rock] law = "stribeck"', bit_rock_tables.StribeckTable),
+    ('[controller] law = "pi"', controller_tables.PITable),
+    ('[controller] law = "constant-torque"', controller_tables.ConstantTorqueTable),
+    ('[controller] law = "stiff-speed"', controller_tables.StiffSpeedTable),
+    ('[controller] law = "soft-torque"', controller_tables.SoftTorqueTable),
+    ('[controller] law = "z-torque"', controller_tables.ZTorqueTable),
+    (
+        '[controller] law = "torsional-rectification"',
+        controller_tables.TorsionalRectificationTable,
+    ),
+    ('[controller] law = "active-damping"', controller_tables.ActiveDampingTable),
+    ("[controller.drive]", controller_tables.DriveTable),
+    ('[weight_on_bit] law = "constant"', weight_tables.ConstantWeightTable),
+    ('[weight_on_bit] law = "navarro-lopez-suarez"', weight_tables.FollowingSpeedTable),
+    ('[weight_on_bit] law = "surface-observer"', weight_tables.SurfaceObserverTable),
+    ('[weight_on_bit] law = "stick-slip-alarm"', weight_tables.StickSlipAlarmTable),
+    ("[weight_on_bit.path]", weight_tables.PathTable),
+    ("[scenario.speed]", scenario_tables.SpeedProgramTable),
+    ("[scenario.weight_on_bit]", scenario_tables.WeightProgramTable),
+    ("[scenario.bit_rock]", scenario_tables.RockProgramTable),
     ("[start]", tables.StartTable),
     ("[simulation]", tables.SimulationTable),
     ("[map]", tables.MapTable),

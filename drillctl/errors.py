@@ -75,6 +75,9 @@ def nearest(name: str, valid: Iterable[str]) -> str:
         For instance `did you mean 'inertia'? allowed: damping, inertia`.
     """
     words = sorted(valid)
-    close = difflib.get_close_matches(name, words, n=1, cutoff=0.5)
+    # A slip of the pen; else a word with an ending too many; else one of like letters.
+    close = difflib.get_close_matches(name, words, n=1, cutoff=0.85)
+    close = close or [w for w in words if w and name.startswith(w)]
+    close = close or difflib.get_close_matches(name, words, n=1, cutoff=0.5)
     hint = f"did you mean '{close[0]}'? " if close else ""
     return f"{hint}allowed: {', '.join(words) or 'none'}"

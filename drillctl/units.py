@@ -59,6 +59,9 @@ DRAG = Kind("drag per length", "N*s/rad", ("N*s/rad",))
 SLOWNESS = Kind("time per angle", "s/rad", ("s/rad",))
 PROPORTIONAL_GAIN = Kind("gain", "N*m*s/rad", ("N*m*s/rad",))
 WEIGHT_GAIN = Kind("weight per speed", "N*s/rad", ("kN*s/rad", "N*s/rad"))
+POWER = Kind("power", "W", ("kW", "MW", "W", "hp"))
+TORQUE_RATE = Kind("torque rate", "N*m/s", ("kN*m/s", "N*m/s"))
+FORCE_RATE = Kind("force rate", "N/s", ("kN/s", "N/s"))
 INTEGRAL_GAIN = Kind("gain", "N*m/rad", ("N*m/rad",))
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

@@ -16,6 +16,7 @@ calls them with symbols; hence the exponential comes in as an argument.
   them where it should stand still. They are here to be compared.
 """
 
+from drillctl.bit_rock.change import changed_rock
 from drillctl.bit_rock.contact import contact
 from drillctl.bit_rock.jansen_van_den_steen import JansenVanDenSteen
 from drillctl.bit_rock.navarro_lopez_suarez import NavarroLopezSuarez
@@ -35,6 +36,7 @@ __all__ = [
     "Tabulated",
     "TuckerWang",
     "WeightTable",
+    "changed_rock",
     "contact",
     "over_weight",
     "tabulated",

@@ -7,17 +7,21 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from drillctl.bit_rock import BitRockLaw
-from drillctl.design import parts
+from drillctl.design import drive, parts, weight
 from drillctl.design.merging import Tree, with_values
 from drillctl.design.tables import DesignTables
 from drillctl.design.validation import validated
+from drillctl.design.weight_tables import SurfaceObserverTable
 from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError
+from drillctl.program import Program
 from drillctl.top_drive import TopDriveLaw
 from drillctl.weight_on_bit import WeightLaw
 
 if TYPE_CHECKING:
     import control
+
+    from drillctl.linear.observer import Observer
 
 
 @dataclass(frozen=True)
@@ -84,12 +88,42 @@ class Design:
     @cached_property
     def top_drive(self) -> TopDriveLaw:
         """Top-drive law."""
-        return parts.top_drive(self.tables, lambda: self.string)
+        return drive.top_drive(self.tables, lambda: self.string)
 
     @cached_property
     def weight_on_bit(self) -> WeightLaw:
         """Weight-on-bit law."""
-        return parts.weight_on_bit(self.tables)
+        return weight.weight_on_bit(self.tables)
+
+    @cached_property
+    def bit_rock_before(self) -> BitRockLaw:
+        """Bit-rock law before the rock changes."""
+        return parts.bit_rock_before(self.tables)
+
+    @cached_property
+    def program(self) -> Program:
+        """What changes by the clock."""
+        return parts.program(self.tables)
+
+    @cached_property
+    def observer(self) -> Observer | None:
+        """Observer of the bit, where the weight law has one."""
+        if not isinstance(self.tables.weight_on_bit, SurfaceObserverTable):
+            return None
+        from drillctl.linear.observer import observer
+
+        return observer(self.string, self.tables.weight_on_bit.observer_modes)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What is allowed but hardly meant, told once when a design is used."""
+        return drive.warnings(self.tables, self.bit_rock.static_torque(self._weight_at_rest))
+
+    @property
+    def _weight_at_rest(self) -> float:
+        point = self.tables.operating_point
+        law: Any = self.weight_on_bit
+        return float(law.weight(0.0)) if law.moves else point.weight_on_bit
 
     @property
     def table_range(self) -> tuple[float, float]:

@@ -27,7 +27,8 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
 
     Tables merge key by key, sections by name (a new name is added at the bottom). A table
     whose `law` changes, a start whose `kind` or an uncertain parameter whose `distribution`
-    changes, drops what belonged to the old one.
+    changes, drops what belonged to the old one; the drive around a controller and the path of a
+    weight law stay.
 
     Parameters
     ----------
@@ -46,8 +47,11 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
     InputError
         Two sections of one layer bear the same name.
     """
-    if _changed(base, top, "law") or (path == "start" and _changed(base, top, "kind", "turning")):
+    if path == "start" and _changed(base, top, "kind", "turning"):
         return dict(top)
+    if _changed(base, top, "law"):
+        # The old law's numbers go; the drive it acts through, or the hoist, stays what it is.
+        return overlay({k: base[k] for k in ("drive", "path") if k in base}, top, path)
     if path.startswith("uncertain.") and _changed(base, top, "distribution"):
         return dict(top)
     if path == "uncertain":
@@ -115,7 +119,7 @@ def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
         if "controller" not in tree and path.startswith("controller."):
             # The default controller is what a gain alone is a change of.
             controller = DesignTables.model_fields["controller"].default
-            tree = {**tree, "controller": controller.model_dump()}
+            tree = {**tree, "controller": controller.model_dump(exclude={"drive"})}
         tree = overlay(tree, branch(path, values[path], tree))
     return tree
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from drillctl.bit_rock import (
     BitRockLaw,
@@ -12,31 +11,26 @@ from drillctl.bit_rock import (
     Stribeck,
     TuckerWang,
     WeightTable,
+    changed_rock,
     over_weight,
     tabulated,
 )
-from drillctl.design.tables import (
+from drillctl.design.bit_rock_tables import (
     BitRadiusFrictionTable,
-    ConstantTorqueTable,
-    ConstantWeightTable,
     CoulombTable,
-    DesignTables,
     FrictionRow,
     JansenVanDenSteenTable,
     NavarroLopezSuarezTable,
-    PITable,
-    SectionTable,
-    SoftTorqueTable,
-    StiffSpeedTable,
     StribeckTable,
     TabulatedFrictionTable,
     TuckerWangTable,
 )
+from drillctl.design.tables import DesignTables, SectionTable
+from drillctl.design.weight_tables import ConstantWeightTable
 from drillctl.drillstring import GRADES, PIPES, Drillstring, Section, assemble, polar_moment
 from drillctl.drillstring.section import torsional_yield
 from drillctl.errors import InputError
-from drillctl.top_drive import PI, ConstantTorque, TopDriveLaw
-from drillctl.weight_on_bit import ConstantWeight, FollowingSpeed, WeightLaw
+from drillctl.program import STILL, Program, Ramp
 
 STEEL_SHEAR_MODULUS = 79.3e9
 """Shear modulus (Pa) where a design gives none: drill-pipe steel."""
@@ -187,12 +181,37 @@ def bit_rock(tables: DesignTables) -> BitRockLaw:
     return Stribeck(static=law.a2, sliding=law.a1, decay=law.beta, sharpness=1.0 / over)
 
 
+def weight_moves(tables: DesignTables) -> bool:
+    """Whether the weight on bit changes while the bit drills, by its law or by the clock."""
+    by_law = not isinstance(tables.weight_on_bit, ConstantWeightTable)
+    return by_law or tables.scenario.weight_on_bit.start is not None
+
+
+def bit_rock_before(tables: DesignTables) -> BitRockLaw:
+    """Bit-rock law before the rock changes.
+
+    Raises
+    ------
+    InputError
+        The law cannot be changed so.
+    """
+    table = tables.scenario.bit_rock
+    law = bit_rock(tables)
+    if table.until == 0.0:
+        return law
+    factors = (table.static_factor, table.sliding_factor, table.decay_factor)
+    try:
+        return changed_rock(law, *factors)
+    except InputError as error:
+        raise InputError(error.problem, f"scenario.bit_rock.{error.where}") from None
+
+
 def _friction(tables: DesignTables) -> BitRockLaw:
     table = tables.bit_rock
     match table:
         case NavarroLopezSuarezTable():
             fixed = _navarro_lopez_suarez(table, tables.operating_point.weight_on_bit)
-            if table.table is None or isinstance(tables.weight_on_bit, ConstantWeightTable):
+            if table.table is None or not weight_moves(tables):
                 return fixed
             factors = (table.a1_factor, table.a2_factor, table.beta_factor)
             return over_weight(_rows(table.table), *factors)
@@ -275,52 +294,44 @@ def _coefficients(table: NavarroLopezSuarezTable, weight: float) -> NavarroLopez
     return rows.at(weight)
 
 
-def top_drive(tables: DesignTables, string: Callable[[], Drillstring]) -> TopDriveLaw:
-    """Top-drive law with its numbers; `string` is asked for by a law that is tuned to it.
+def torque_at_set_speed(tables: DesignTables) -> float:
+    """Torque of the rock at set speed and nominal weight (N m)."""
+    point = tables.operating_point
+    return float(bit_rock(tables).torque_and_slope(point.weight_on_bit, point.speed, math.exp)[0])
+
+
+def program(tables: DesignTables) -> Program:
+    """What changes by the clock in a run.
 
     Raises
     ------
     InputError
-        A law tuned to the pipe on a string whose uppermost section is a lumped spring.
+        A program without anything to start from, or one that outlasts the run.
     """
-    match tables.controller:
-        case PITable(kp=kp, ki=ki):
-            return PI(kp, ki)
-        case ConstantTorqueTable(torque=torque):
-            return ConstantTorque(torque)
-        case StiffSpeedTable(stiffness=stiffness, rate=rate):
-            from drillctl.linear.tuning import stiff_speed
-
-            return PI(*stiff_speed(string(), stiffness, rate))
-        case SoftTorqueTable(share=share):
-            from drillctl.linear.tuning import soft_torque
-
-            return PI(*soft_torque(string(), share))
-
-
-def weight_on_bit(tables: DesignTables) -> WeightLaw:
-    """Weight-on-bit law with its numbers.
-
-    Raises
-    ------
-    InputError
-        The nominal weight lies outside the limits of the law.
-    """
-    table, point = tables.weight_on_bit, tables.operating_point
-    if isinstance(table, ConstantWeightTable):
-        return ConstantWeight(point.weight_on_bit)
-    most = math.inf if table.maximum is None else table.maximum
-    if not table.minimum <= point.weight_on_bit <= most:
+    scenario, point = tables.scenario, tables.operating_point
+    duration = tables.simulation.duration
+    for name, table in (("speed", scenario.speed), ("weight_on_bit", scenario.weight_on_bit)):
+        if table.start is None and table.end > 0.0:
+            raise InputError("is missing: what the program starts from", f"scenario.{name}.start")
+        if table.end >= duration:
+            raise InputError(
+                f"{table.end:g} s: the run ends at {duration:g} s, before the final value",
+                f"scenario.{name}.end",
+            )
+    if scenario.bit_rock.until >= duration:
         raise InputError(
-            f"{point.weight_on_bit / 1e3:g} kN lies outside the limits of the weight-on-bit law, "
-            f"{table.minimum / 1e3:g} to {most / 1e3:g} kN",
-            "operating_point.weight_on_bit",
+            f"{scenario.bit_rock.until:g} s: the run ends at {duration:g} s",
+            "scenario.bit_rock.until",
         )
-    return FollowingSpeed(
-        nominal=point.weight_on_bit,
-        gain=table.gain,
-        set_speed=point.speed,
-        least=table.minimum,
-        # A number that no weight reaches: infinity times zero would be none.
-        most=min(most, HEAVIEST),
-    )
+    speed = weight = STILL
+    if scenario.speed.start is not None:
+        first = scenario.speed.start - point.speed
+        speed = Ramp(first, scenario.speed.begin, scenario.speed.end)
+    if scenario.weight_on_bit.start is not None:
+        if point.weight_on_bit == 0.0:
+            raise InputError(
+                "0 leads nowhere: a program needs a final weight", "operating_point.weight_on_bit"
+            )
+        first = scenario.weight_on_bit.start / point.weight_on_bit - 1.0
+        weight = Ramp(first, scenario.weight_on_bit.begin, scenario.weight_on_bit.end)
+    return Program(speed, weight, scenario.bit_rock.until)

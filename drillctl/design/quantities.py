@@ -80,6 +80,25 @@ def _count(check: Check) -> BeforeValidator:
     return BeforeValidator(read)
 
 
+def _limit(kind: Kind) -> BeforeValidator:
+    """A limit: infinity, in whatever form it is written, is none."""
+    read = _read(kind).func
+
+    def reads(value: object) -> float | None:
+        if value is None or (isinstance(value, float) and value == math.inf):
+            return None
+        if isinstance(value, str) and value.strip().lower().split(" ")[0] in ("inf", "infinity"):
+            return None
+        return float(read(value))  # type: ignore[call-arg]
+
+    return BeforeValidator(reads)
+
+
+def _share(found: float, written: object) -> None:
+    if not 0.0 <= found <= 1.0:
+        raise InputError(f"{shown(written)} is not allowed: it must lie between 0 and 1")
+
+
 # A float with the `Kind` it is read and written by, and the range it must lie in.
 Number = Annotated[float, _number()]
 PositiveNumber = Annotated[float, _number(_positive)]
@@ -108,3 +127,15 @@ Slowness = Annotated[float, units.SLOWNESS, _read(units.SLOWNESS, _not_negative)
 WeightGain = Annotated[float, units.WEIGHT_GAIN, _read(units.WEIGHT_GAIN, _not_negative)]
 ProportionalGain = Annotated[float, units.PROPORTIONAL_GAIN, _read(units.PROPORTIONAL_GAIN)]
 IntegralGain = Annotated[float, units.INTEGRAL_GAIN, _read(units.INTEGRAL_GAIN)]
+PositiveProportionalGain = Annotated[
+    float, units.PROPORTIONAL_GAIN, _read(units.PROPORTIONAL_GAIN, _positive)
+]
+PositiveIntegralGain = Annotated[float, units.INTEGRAL_GAIN, _read(units.INTEGRAL_GAIN, _positive)]
+PositiveWeight = Annotated[float, units.FORCE, _read(units.FORCE, _positive)]
+Share = Annotated[float, _number(_share)]
+
+# Limits: None where there is none.
+TorqueLimit = Annotated[float | None, units.TORQUE, _limit(units.TORQUE)]
+PowerLimit = Annotated[float | None, units.POWER, _limit(units.POWER)]
+TorqueRateLimit = Annotated[float | None, units.TORQUE_RATE, _limit(units.TORQUE_RATE)]
+WeightRateLimit = Annotated[float | None, units.FORCE_RATE, _limit(units.FORCE_RATE)]

@@ -6,8 +6,11 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from drillctl.design.bit_rock_tables import BitRockTable
+from drillctl.design.controller_tables import ControllerTable
 from drillctl.design.merging import Tree
-from drillctl.design.tables import BitRockTable, ControllerTable, DesignTables, WeightOnBitTable
+from drillctl.design.tables import DesignTables
+from drillctl.design.weight_tables import WeightOnBitTable
 from drillctl.errors import InputError, nearest, shown
 
 _LAWS = {"bit_rock": BitRockTable, "controller": ControllerTable, "weight_on_bit": WeightOnBitTable}
@@ -39,12 +42,17 @@ def validated(tree: Tree, origin: str) -> DesignTables:
     InputError
         The first thing wrong: file, key, what came, what is allowed, the nearest valid name.
     """
-    from drillctl.design import parts
+    from drillctl.design import drive, parts
 
     try:
         tables = DesignTables.model_validate(tree)
         parts.refuse_impossible_string(tables)
-        parts.bit_rock(tables)
+        parts.bit_rock_before(tables)
+        parts.program(tables)
+        if not tables.controller.drive.ideal:
+            drive.refuse_weak_drive(
+                tables, parts.drillstring(tables), parts.torque_at_set_speed(tables)
+            )
     except ValidationError as error:
         raise _told(_first(error.errors()), tree, origin) from None
     except InputError as error:

@@ -80,3 +80,31 @@ def soft_torque(string: Drillstring, share: float = 0.25) -> tuple[float, float]
         raise InputError(f"must be above 0 and at most 1, got {share:g}", "share")
     inertia = string.parts.top_inertia
     return pipe_impedance(string) / share, stick_slip_frequency(string) ** 2 * inertia
+
+
+def active_damping(string: Drillstring) -> tuple[float, float]:
+    r"""Damper and spring of an actively damped drive: c_f = 2 sqrt(k J_d), k_f = w_s^2 J_d.
+
+    Of the two-body model bit - pipe - drive - spring and damper, with k the stiffness of the whole
+    string and w_s its lowest frequency with the top held, the characteristic polynomial is then
+
+    .. math:: (s^2 + 2 \zeta w_s s + w_s^2)^2, \qquad \zeta = \frac{\sqrt{k / J_d}}{2 w_s}:
+
+    both pairs of poles coincide, which is as much damping as the softer of two modes can have.
+    After Jansen & van den Steen, J. Sound Vib. 179 (1995) 647-668, who tune their drive as an
+    absorber of the first mode; the rule is ours.
+
+    Parameters
+    ----------
+    string : Drillstring
+        Gives k, drive inertia J_d and w_s.
+
+    Returns
+    -------
+    tuple of float
+        c_f (N m s/rad) and k_f (N m/rad).
+    """
+    stiffness = 1.0 / float((1.0 / string.element_stiffness).sum())
+    inertia = string.parts.top_inertia
+    spring = stick_slip_frequency(string) ** 2 * inertia
+    return 2.0 * math.sqrt(stiffness * inertia), spring

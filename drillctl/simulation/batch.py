@@ -7,7 +7,7 @@ what they measured into arrays by name.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,14 @@ from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.propagator import StringStep, string_step
 from drillctl.simulation.scheme import Scheme, bit_inertia, choose_scheme
 from drillctl.simulation.start import start
+from drillctl.simulation.step_laws import (
+    drive_step,
+    observer_step,
+    program_step,
+    remembered,
+    weight_step,
+)
+from drillctl.top_drive import SampledDrive
 
 Array = NDArray[np.float64]
 
@@ -80,9 +88,27 @@ def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
         A given step is too long for the friction law.
     """
     inertia = bit_inertia(lanes.string)
-    scheme = choose_scheme(lanes.string, table, lanes.steepest_fall, inertia)
+    period = lanes.drive.period if isinstance(lanes.drive, SampledDrive) else None
+    scheme = choose_scheme(
+        lanes.string, table, lanes.steepest_fall, inertia, _shared(period), _turns(lanes)
+    )
     stepper = string_step(lanes.string, scheme.step, scheme.modes)
     return Prepared(stepper, scheme, table.duration, table.j1_from)
+
+
+def _shared(period: Array | None) -> float | None:
+    """Period of the controllers (s), the same in all lanes."""
+    return None if period is None else float(period[0])
+
+
+def _turns(lanes: Lanes) -> Array:
+    """Times (s) at which a program begins, ends or jumps, each once."""
+    program = lanes.program
+    moments = [np.where(program.rock_until > 0.0, program.rock_until, 0.0)]
+    for ramp in (program.speed, program.weight):
+        moments += [np.where(ramp.first != 0.0, time, 0.0) for time in (ramp.begin, ramp.end)]
+    found = np.unique(np.concatenate(moments))
+    return found[found > 0.0]
 
 
 def run_batch(lanes: Lanes, prepared: Prepared) -> Batch:
@@ -106,7 +132,7 @@ def run_batch(lanes: Lanes, prepared: Prepared) -> Batch:
 
 def warm_up(lanes: Lanes, prepared: Prepared) -> None:
     """Compile the kernel for these laws, or load it from disk, by a run of a single step."""
-    one = Scheme(prepared.scheme.step, 1, prepared.scheme.modes)
+    one = replace(prepared.scheme, steps=1)
     _run(lanes[:1], Prepared(prepared.stepper, one, one.step, 0.0), 0)
 
 
@@ -151,7 +177,8 @@ def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
     count = len(lanes)
     # Every block is full: the last one is filled up with copies of the last lane.
     padded = lanes[np.minimum(np.arange(-(-count // WIDTH) * WIDTH), count - 1)]
-    static = padded.friction.static_torque(padded.weight.weight(0.0))
+    rock = padded.before if np.any(padded.program.rock_until > 0.0) else padded.friction
+    static = rock.static_torque(padded.weight_at_rest)
     angle, speed = start(
         padded.string, padded.start, padded.set_speed, padded.turning_speed, static
     )
@@ -161,15 +188,31 @@ def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
     measures = np.empty((MEASURES, len(padded)))
     traces = np.empty((samples, len(padded), len(TRACED)))
     window = min(m.WINDOW, duration)
-    ticks = Clock(scheme.step, scheme.steps, prepared.j1_from, duration - window, every)
-    numbers = np.stack(
-        [padded.set_speed, speed[-1] + padded.set_speed, padded.table_low, padded.table_high]
-    )
+    observer = padded.observer
+    start_of_observer = np.zeros((0, 0)) if observer is None else observer.state(angle, speed)
+    ticks = Clock(
+        scheme.step, scheme.steps, prepared.j1_from, duration - window, every, scheme.sampling,
+        remembered(padded.weight, scheme.step), 0 if observer is None else observer.states,
+    )  # fmt: skip
+    numbers = np.stack([
+        padded.set_speed, speed[-1] + padded.set_speed, padded.table_low, padded.table_high,
+        speed[0],
+    ])  # fmt: skip
     run(
-        prepared.stepper.string, padded.friction, padded.drive, padded.weight,
+        prepared.stepper.string, padded.friction, padded.before,
+        drive_step(_at_whole_steps(padded.drive, scheme), scheme.step),
+        weight_step(padded.weight, scheme.step), program_step(padded.program),
+        observer_step(observer, scheme.step, start_of_observer),
         numbers, np.ascontiguousarray(state), ticks, measures, traces,
     )  # fmt: skip
     return measures[:, :count], traces[:, :count]
+
+
+def _at_whole_steps(drive: Any, scheme: Scheme) -> Any:
+    """A drive whose period is a whole number of steps."""
+    if not isinstance(drive, SampledDrive):
+        return drive
+    return drive._replace(period=np.full_like(drive.period, scheme.sampling * scheme.step))
 
 
 def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:

@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from drillctl.bit_rock import contact
 from drillctl.design import Design
 from drillctl.drillstring import Drillstring
+from drillctl.linear.observer import Observer
+from drillctl.program import Program
 from drillctl.simulation.start import Kind
+from drillctl.weight_on_bit import AlarmWeight
 
 Array = NDArray[np.float64]
 
@@ -38,6 +41,12 @@ class Lanes:
         Nominal weight on bit (N).
     table_low, table_high : ndarray, shape (lanes,)
         Range of the friction table (N).
+    before : NamedTuple
+        Bit-rock law before the rock changes, of the type of `friction`.
+    program : Program
+        What changes by the clock, with an array for each number.
+    observer : Observer or None
+        Of the bit, shared by all lanes.
     start : {'rest', 'turning', 'wound_up'}
         Kind of start.
     """
@@ -51,6 +60,9 @@ class Lanes:
     nominal_weight: Array
     table_low: Array
     table_high: Array
+    before: Any
+    program: Program
+    observer: Observer | None
     start: Kind
 
     def __len__(self) -> int:
@@ -72,29 +84,69 @@ class Lanes:
             nominal_weight=self.nominal_weight[chosen],
             table_low=self.table_low[chosen],
             table_high=self.table_high[chosen],
+            before=some(self.before),
+            program=Program(
+                some(self.program.speed), some(self.program.weight), self.program.rock_until[chosen]
+            ),
+            observer=self.observer,
             start=self.start,
         )
 
     @cached_property
     def steepest_fall(self) -> float:
         """Steepest falling slope of the rock in any lane (N m s/rad)."""
-        if not self.weight.moves:
-            return float(np.max(self.friction.steepest_fall(self.weight.weight(0.0))))
-        # The weight moves with the speed: looked for, up to far beyond any stick-slip.
+        return max(self._steepest(rock) for rock in (self.friction, self.before))
+
+    def _steepest(self, rock: Any) -> float:
+        if self.weight.moves:
+            # The weight moves with the speed: looked for, up to far beyond any stick-slip.
+            speeds = self.set_speed * np.linspace(0.0, 8.0, SPEEDS)[:, None]
+            _, slope = contact(rock, self.weight, speeds, np.exp)
+            return float(max(0.0, np.max(-slope)))
+        return float(np.max(rock.steepest_fall(self._weights())))
+
+    def _weights(self) -> Any:
+        """Weights (N) that a law which does not act at once may ask for."""
+        over = 1.0 + np.maximum(self.program.weight.first, 0.0)
+        if not hasattr(self.weight, "gain"):
+            return self.weight[0] * over
         speeds = self.set_speed * np.linspace(0.0, 8.0, SPEEDS)[:, None]
-        _, slope = contact(self.friction, self.weight, speeds, np.exp)
-        return float(max(0.0, np.max(-slope)))
+        return self.weight.command(speeds, self.weight.nominal * over)
+
+    @property
+    def weight_at_rest(self) -> Array:
+        """Weight on a bit at rest at time zero (N)."""
+        over = 1.0 + np.where(self.program.weight.end > 0.0, self.program.weight.first, 0.0)
+        nominal = self.weight[0] * over
+        if isinstance(self.weight, AlarmWeight):
+            return np.asarray(nominal)
+        if hasattr(self.weight, "command"):
+            return np.asarray(self.weight.command(0.0, nominal))
+        law = self.weight._replace(**{self.weight._fields[0]: nominal})
+        return np.asarray(law.weight(0.0))
+
+
+def kinds(design: Design) -> tuple[type, ...]:
+    """Types of a design's laws: lanes that run together have the same."""
+    laws = (design.bit_rock, design.top_drive, design.weight_on_bit)
+    return tuple(type(law) for law in laws)
 
 
 def lane_numbers(design: Design) -> dict[str, float]:
     """Every number of a design that may differ from lane to lane, by name."""
-    laws = {"friction": design.bit_rock, "drive": design.top_drive, "weight": design.weight_on_bit}
+    program = design.program
+    laws = {
+        "friction": design.bit_rock, "drive": design.top_drive, "weight": design.weight_on_bit,
+        "before": design.bit_rock_before, "speed_program": program.speed,
+        "weight_program": program.weight,
+    }  # fmt: skip
     numbers = {
         f"{part}.{field}": float(value)
         for part, law in laws.items()
         for field, value in law._asdict().items()  # type: ignore[attr-defined]
     }
     turning = design.tables.start.speed
+    numbers["rock_until"] = program.rock_until
     numbers["set_speed"] = design.speed
     numbers["turning_speed"] = design.speed if turning is None else turning
     numbers["nominal_weight"] = design.tables.operating_point.weight_on_bit
@@ -126,6 +178,13 @@ def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
         nominal_weight=numbers["nominal_weight"],
         table_low=numbers["table_low"],
         table_high=numbers["table_high"],
+        before=law("before", design.bit_rock_before),
+        program=Program(
+            law("speed_program", design.program.speed),
+            law("weight_program", design.program.weight),
+            numbers["rock_until"],
+        ),
+        observer=design.observer,
         start=design.tables.start.kind,
     )
 

@@ -203,6 +203,8 @@ def _blocks(modal: _Modal, step: float) -> tuple[dict[str, Any], Array] | None:
         "angle_by_bit": float(-push[:, 0, 1].sum()),
         "speed_by_top": float(push[:, 1, 0].sum()),
         "speed_by_bit": float(-push[:, 1, 1].sum()),
+        "top_speed_by_top": float(np.einsum("bi,bi->", others[1], push[:, :, 0])),
+        "top_speed_by_bit": float(-np.einsum("bi,bi->", others[1], push[:, :, 1])),
     }
     to_block = np.einsum("bij,bjk->bik", reading, inverse.reshape(count, 2, -1))
     return fields, to_block.reshape(2 * count, -1)
@@ -243,7 +245,7 @@ def _dense(modal: _Modal, step: float) -> tuple[dict[str, Any], Array]:
     """Fields of a `DenseString`, whose states are the modal ones."""
     free, push = _held(modal.a, modal.b, step)
     s = modal.signals
-    by = s[:2] @ push
+    by = s[[0, 1, 3]] @ push
     fields = {
         "free": free,
         "push": push,
@@ -256,5 +258,7 @@ def _dense(modal: _Modal, step: float) -> tuple[dict[str, Any], Array]:
         "angle_by_bit": float(-by[0, 1]),
         "speed_by_top": float(by[1, 0]),
         "speed_by_bit": float(-by[1, 1]),
+        "top_speed_by_top": float(by[2, 0]),
+        "top_speed_by_bit": float(-by[2, 1]),
     }
     return fields, np.eye(len(modal.a))

@@ -66,7 +66,7 @@ def _by_batch(design: Design, interval: float) -> Simulation:
     return Simulation(
         design=design,
         time=time,
-        signals=_signals(design, {name: values[:, 0] for name, values in traced.items()}),
+        signals=_signals({name: values[:, 0] for name, values in traced.items()}),
         events=(),
         measures=measures_of(batch, 0),
         status=m.STATUSES[batch.status[0]],
@@ -77,20 +77,18 @@ def _by_batch(design: Design, interval: float) -> Simulation:
     )
 
 
-def _signals(design: Design, traced: dict[str, Array]) -> dict[str, Array]:
+def _signals(traced: dict[str, Array]) -> dict[str, Array]:
     """The signals of a `Simulation` from those of a trace."""
     top_angle, top_speed = traced["top_angle"], traced["top_speed"]
-    torque = design.top_drive.torque(top_angle, top_speed - design.speed)
-    weight = design.weight_on_bit.weight(np.abs(traced["bit_speed"]))
     return {
         "top_speed": top_speed,
         "bit_speed": traced["bit_speed"],
         "twist": top_angle - traced["bit_angle"],
         "top_angle": top_angle,
         "bit_angle": traced["bit_angle"],
-        "top_torque": np.broadcast_to(torque, top_angle.shape).copy(),
+        "top_torque": traced["top_torque"],
         "pipe_torque": traced["pipe_torque"],
         "bit_torque": traced["bit_torque"],
-        "weight_on_bit": np.broadcast_to(weight, top_angle.shape).copy(),
+        "weight_on_bit": traced["weight_on_bit"],
         "stuck": traced["stuck"],
     }

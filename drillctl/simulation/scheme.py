@@ -5,10 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from drillctl.design.tables import SimulationTable
 from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError
 
+Array = NDArray[np.float64]
+
+NO_TURNS: Array = np.empty(0)
+WHOLE = 1e-7
+"""How far from a whole number of steps a moment may be that falls on the end of one."""
 STEEPEST = 0.5
 """Largest product of bit mobility over a step and falling slope: beyond it the inclusion at
 the bit could have more than one root."""
@@ -56,15 +64,23 @@ class Scheme:
         Number of steps.
     modes : int
         Lowest undamped modes carried, the rigid body included.
+    sampling : int
+        Steps to a period of a sampled controller; 0 for a continuous one.
     """
 
     step: float
     steps: int
     modes: int
+    sampling: int = 0
 
 
 def choose_scheme(
-    string: Drillstring, table: SimulationTable, steepest_fall: float, bit_inertia: float
+    string: Drillstring,
+    table: SimulationTable,
+    steepest_fall: float,
+    bit_inertia: float,
+    period: float | None = None,
+    turns: Array = NO_TURNS,
 ) -> Scheme:
     """Step and modes from the accuracy asked for, unless they are given.
 
@@ -78,6 +94,12 @@ def choose_scheme(
         Steepest falling slope of the friction in any lane (N m s/rad).
     bit_inertia : float
         Inertia that the bit alone sets in motion in a short step (kg m2).
+    period : float, optional
+        Of a sampled controller (s). Steps divide it; it is itself rounded, by a part in a
+        thousand at most, to go into the run a whole number of times.
+    turns : ndarray
+        Times (s) at which something jumps or turns; steps end there if they need be shorter by no
+        more than a quarter for it.
 
     Raises
     ------
@@ -105,17 +127,34 @@ def choose_scheme(
         )
     else:
         step = table.step
-    steps = max(1, math.ceil(table.duration / step * (1.0 - 1e-12)))
+    steps, sampling = _whole_steps(table.duration, step, period, turns)
     step = table.duration / steps
     modes = table.modes
     if modes is None:
         modes = int((frequency * step <= accuracy.phase).sum())
-    return Scheme(step, steps, min(max(modes, 2), string.nodes))
+    return Scheme(step, steps, min(max(modes, 2), string.nodes), sampling)
+
+
+def _whole_steps(
+    duration: float, step: float, period: float | None, turns: Array
+) -> tuple[int, int]:
+    """Number of steps in a run, and in a period of the controller."""
+    if period is not None:
+        periods = max(1, round(duration / period))
+        sampling = max(1, math.ceil(period / step * (1.0 - 1e-12)))
+        return periods * sampling, sampling
+    steps = max(1, math.ceil(duration / step * (1.0 - 1e-12)))
+    if len(turns) == 0:
+        return steps, 0
+    numbers = np.arange(steps, steps + steps // 4 + 1)
+    places = np.outer(numbers, turns / duration)
+    apart = np.abs(places - np.round(places)).max(axis=1)
+    exact = np.flatnonzero(apart < WHOLE)
+    return int(numbers[exact[0]] if exact.size else numbers[np.argmin(apart)]), 0
 
 
 def bit_inertia(string: Drillstring) -> float:
     """Inertia (kg m2) that resists a sudden torque at the bit: 1 / (M^-1) at the last node."""
-    import numpy as np
     import scipy.sparse.linalg
 
     unit = np.zeros(string.nodes)

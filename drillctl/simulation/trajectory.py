@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.simulation import measures as m
-from drillctl.simulation.phases import stick_phase
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, Piece
 
 if TYPE_CHECKING:
@@ -134,12 +133,12 @@ def sample(motion: Motion, interval: float = 0.01) -> Simulation:
     design = motion.design
     duration = design.tables.simulation.duration
     fine = _grid(duration, min(FINE, duration / FEWEST_SAMPLES))
-    fine_signals = _signals(design, *_states(motion.pieces, fine))
+    fine_signals = _signals(motion, fine)
     measured = _measures(motion, fine, fine_signals)
     time = _grid(duration, interval)
     signals = fine_signals
     if len(time) != len(fine):
-        signals = _signals(design, *_states(motion.pieces, time))
+        signals = _signals(motion, time)
     status = m.status_of(
         all(bool(np.isfinite(values).all()) for values in fine_signals.values()),
         _stuck_between(motion, duration - min(m.WINDOW, duration), duration),
@@ -170,16 +169,22 @@ def _states(pieces: tuple[Piece, ...], time: Array) -> tuple[Array, Array]:
     return np.concatenate(columns, axis=1), np.concatenate(directions)
 
 
-def _signals(design: Design, state: Array, direction: Array) -> dict[str, Array]:
+def _signals(motion: Motion, time: Array) -> dict[str, Array]:
+    design, system = motion.design, motion.system
+    state, direction = _states(motion.pieces, time)
     nodes = design.string.nodes
     angle, speed = state[:nodes], state[nodes : 2 * nodes]
     bit_speed = np.where(direction == 0.0, 0.0, speed[-1] + design.speed)
-    top_torque = np.asarray(design.top_drive.torque(angle[0], speed[0])) + 0.0 * angle[0]
-    weight = np.broadcast_to(design.weight_on_bit.weight(np.abs(bit_speed)), bit_speed.shape)
-    friction, _ = design.bit_rock.torque_and_slope(weight, np.abs(bit_speed), np.exp)
     turning = direction if design.bit_rock.set_valued else np.sign(bit_speed)
-    _, reaction = stick_phase(design.string, design.speed)
-    holding = reaction.motion @ state[: 2 * nodes] + reaction.load + reaction.top * top_torque
+    if system.simple:
+        top_torque = np.asarray(design.top_drive.torque(angle[0], speed[0])) + 0.0 * angle[0]
+        law: Any = design.weight_on_bit
+        weight = np.broadcast_to(law.weight(np.abs(bit_speed)), bit_speed.shape)
+        friction, _ = design.bit_rock.torque_and_slope(weight, np.abs(bit_speed), np.exp)
+        reaction = system.reaction
+        holding = reaction.motion @ state[: 2 * nodes] + reaction.load + reaction.top * top_torque
+    else:
+        top_torque, weight, friction, holding = _one_by_one(motion, time, state, direction)
     stiffness, damping = design.string.element_stiffness[0], design.string.element_damping[0]
     return {
         "top_speed": speed[0] + design.speed,
@@ -195,6 +200,25 @@ def _signals(design: Design, state: Array, direction: Array) -> dict[str, Array]
     }
 
 
+def _one_by_one(
+    motion: Motion, time: Array, state: Array, direction: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Top torque, weight, friction and holding torque of a rig with memory or program."""
+    system = motion.system
+    found = np.empty((4, len(time)))
+    for i, moment in enumerate(time):
+        here, way = state[:, i], int(direction[i])
+        speed = 0.0 if way == 0 else abs(system.bit_speed(here))
+        weight = float(system.weight_law(moment, here).weight(speed))
+        friction, _ = system.rock(moment).torque_and_slope(weight, speed, np.exp)
+        rock = 0.0 if way == 0 else way * float(friction)
+        phase = system.slip if way else system.stick
+        torque, _ = system.respond(moment, here, phase, rock)
+        held = 0.0 if way else system.holding_torque(moment, here)
+        found[:, i] = torque, weight, float(friction), held
+    return found[0], found[1], found[2], found[3]
+
+
 def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measures:
     design = motion.design
     duration = design.tables.simulation.duration
@@ -207,7 +231,7 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
     mean = design.speed + _bit_angle_change(motion, 0.0, duration) / duration
     late_mean = design.speed + _bit_angle_change(motion, duration - window, duration) / window
     j1 = deviation(motion, since, duration) / design.speed
-    weight = float(signals["weight_on_bit"].mean())
+    weight = float(np.trapezoid(signals["weight_on_bit"], time) / duration)
     return m.Measures(
         j1=j1,
         j1_rate=j1 / (duration - since),
@@ -258,15 +282,15 @@ def _settling(design: Design, time: Array, bit: Array, band: float) -> float | N
     return m.settled(moment, float(time[-1]))
 
 
-def _bit_angle(piece: Piece, time: Array | float) -> Array:
-    state = piece.solution(time)
-    return np.asarray(state[(state.shape[0] - 3) // 2 - 1])
+def _bit_angle(nodes: int, piece: Piece, time: Array | float) -> Array:
+    return np.asarray(piece.solution(time)[nodes - 1])
 
 
 def _bit_angle_change(motion: Motion, begin: float, end: float) -> float:
     """Angle of the bit in the frame between two times (rad)."""
     first = next(p for p in motion.pieces if p.end >= begin)
-    return float(_bit_angle(motion.pieces[-1], end) - _bit_angle(first, begin))
+    nodes = motion.system.nodes
+    return float(_bit_angle(nodes, motion.pieces[-1], end) - _bit_angle(nodes, first, begin))
 
 
 def deviation(motion: Motion, begin: float, end: float) -> float:
@@ -282,15 +306,15 @@ def deviation(motion: Motion, begin: float, end: float) -> float:
             continue
         inside = piece.crossings[(piece.crossings > low) & (piece.crossings < high)]
         knots = np.concatenate([[low], inside, [high]])
-        total += float(np.abs(np.diff(_bit_angle(piece, knots))).sum())
+        angle = _bit_angle(motion.system.nodes, piece, knots)
+        total += float(np.abs(np.diff(angle)).sum())
     return total
 
 
 def _sticks(motion: Motion) -> int:
     """Times the bit came to rest; a start at rest counts, even if it breaks loose at once."""
-    first = motion.pieces[0]
-    begins_at_rest = motion.design.tables.start.kind != "turning" and first.direction != 0
-    return begins_at_rest + sum(piece.direction == 0 for piece in motion.pieces)
+    at_rest = motion.pieces[0].direction == 0 or motion.design.tables.start.kind != "turning"
+    return int(at_rest) + sum(event.kind == "stick" for event in motion.events)
 
 
 def _stuck_between(motion: Motion, begin: float, end: float) -> float:
@@ -308,6 +332,6 @@ def _extremes(motion: Motion, since: float, samples: Array) -> tuple[float, floa
         moments = piece.extremes[piece.extremes >= since]
         if piece.direction != 0 and moments.size:
             state = piece.solution(moments)
-            speed = state[state.shape[0] - 4] + motion.design.speed
+            speed = state[2 * motion.system.nodes - 1] + motion.design.speed
             values += [float(speed.min()), float(speed.max())]
     return min(values), max(values)

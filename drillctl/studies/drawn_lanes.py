@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.simulation.lanes import Lanes, lane_numbers, lanes_of
+from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.studies.draws import Draws
 from drillctl.studies.grid import SHARED
 
@@ -61,7 +61,7 @@ class DrawnLanes:
     Attributes
     ----------
     groups : tuple of DrawnGroup
-        The possible ones; a single group unless a draw changes the string.
+        The possible ones; a single group unless a draw changes the string or a law's type.
     failures : tuple of Failures
         The impossible ones.
     """
@@ -94,6 +94,7 @@ def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
     apart = any(path.startswith(SHARED) for path in draws.values)
     possible: list[_Drawn] = []
     errors: list[InputError] = []
+    like: dict[tuple[type, ...], Design] = {}
     for number in range(len(draws)):
         values = {path: units.SI(column[number]) for path, column in draws.values.items()}
         try:
@@ -102,12 +103,15 @@ def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
         except InputError as error:
             errors.append(error)
         else:
-            # Thousands of designs would fill the memory; lanes on one string need but one.
-            kept = variant if apart or not possible else possible[0].design
+            # Thousands of designs would fill the memory; lanes that run together need but one.
+            kind = kinds(variant)
+            kept = variant if apart else like.setdefault(kind, variant)
             possible.append(_Drawn(number, kept, lane))
     if not possible:
         raise InputError(f"every draw is impossible; the first: {errors[0]}", "uncertain")
-    parts = [[one] for one in possible] if apart else [possible]
+    parts = [[one] for one in possible]
+    if not apart:
+        parts = [[one for one in possible if one.design is kept] for kept in like.values()]
     return DrawnLanes(tuple(_group(part) for part in parts), _told(errors))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -12,8 +13,8 @@ from drillctl.errors import InputError
 from drillctl.simulation.batch import FLOATS, Prepared, prepare, run_batch
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
-from drillctl.simulation.scheme import Scheme
 from drillctl.studies.drawn_lanes import DrawnLanes
+from drillctl.weight_on_bit import AlarmWeight, ConstantWeight
 
 Array = NDArray[np.float64]
 
@@ -97,10 +98,10 @@ def _after_start(lanes: Lanes, prepared: Prepared, whole: Array) -> Array:
     """
     scheme = prepared.scheme
     steps = round(start_up(prepared.duration) / scheme.step)
-    if not lanes.weight.moves or not 0 < steps < scheme.steps:
+    if isinstance(lanes.weight, ConstantWeight) or not 0 < steps < scheme.steps:
         return whole
     time = steps * scheme.step
-    beginning = Prepared(prepared.stepper, Scheme(scheme.step, steps, scheme.modes), time, 0.0)
+    beginning = Prepared(prepared.stepper, replace(scheme, steps=steps), time, 0.0)
     before = run_batch(lanes, beginning).measures["mean_weight_on_bit"]
     late: Array = (whole * prepared.duration - before * time) / (prepared.duration - time)
     return late
@@ -135,7 +136,7 @@ def equalising_shift(drawn: DrawnLanes, count: int) -> float:
     InputError
         The limits of the law, or jumps of the mean, do not let it come within `EQUAL_TO`.
     """
-    if not drawn.groups[0].lanes.weight.moves:
+    if isinstance(drawn.groups[0].lanes.weight, ConstantWeight):
         return 0.0
     target = float(np.mean(np.concatenate([g.lanes.nominal_weight for g in drawn.groups])))
     low, high = _allowed(drawn)
@@ -160,6 +161,8 @@ def _allowed(drawn: DrawnLanes) -> tuple[float, float]:
     """Shifts (N) that keep the nominal weight of every draw within the limits of its law."""
     laws = [group.lanes.weight for group in drawn.groups]
     low = max(float(np.max(law.least - law.nominal)) for law in laws)
+    if isinstance(laws[0], AlarmWeight):  # nothing limits its nominal weight from above
+        return low, math.inf
     high = min(float(np.min(law.most - law.nominal)) for law in laws)
     return low, high
 

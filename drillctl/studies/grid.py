@@ -13,12 +13,15 @@ from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
-from drillctl.simulation.lanes import Lanes, lane_numbers, lanes_of
+from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.studies.memory import refuse_too_large
 
 Array = NDArray[np.float64]
 
-SHARED = ("drillstring.", "top_drive.", "bha.", "simulation.")
+SHARED = (
+    "drillstring.", "top_drive.", "bha.", "simulation.", "controller.drive.sampling_period",
+    "weight_on_bit.observer_modes",
+)  # fmt: skip
 """Paths under these change what all lanes share; the others differ from lane to lane."""
 
 
@@ -51,12 +54,12 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """The cells of a grid that share a string.
+    """The cells of a grid that share a string and the types of their laws.
 
     Attributes
     ----------
     design : Design
-        With the values of the shared axes put in.
+        Of the first cell.
     lanes : Lanes
         One a cell.
     cells : ndarray of int, shape (lanes,)
@@ -117,14 +120,37 @@ def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
         A value on the grid is impossible; the message says which.
     """
     cells = np.arange(np.prod(shape_of(axes), dtype=int)).reshape(shape_of(axes))
-    shared = [i for i, a in enumerate(axes) if a.shared]
-    own = tuple(a for a in axes if not a.shared)
-    for where in itertools.product(*(range(len(axes[i])) for i in shared)):
-        chosen = dict(zip(shared, where, strict=True))
-        variant = _replaced(design, {axes[i].path: axes[i].values[k] for i, k in chosen.items()})
-        index = tuple(chosen.get(i, slice(None)) for i in range(len(axes)))
-        lanes = lanes_of(variant, _numbers(variant, own))
-        yield Group(variant, lanes, cells[index].ravel())
+    parts = [_singly(a) if a.shared else _by_kind(design, axes, a) for a in axes]
+    for chosen in itertools.product(*parts):
+        variant = _replaced(
+            design,
+            {a.path: a.values[p.start] for a, p in zip(axes, chosen, strict=True) if a.shared},
+        )
+        own = tuple(
+            Axis(a.path, a.unit, a.values[p])
+            for a, p in zip(axes, chosen, strict=True)
+            if not a.shared
+        )
+        like = _replaced(variant, {a.path: a.values[0] for a in own}) if own else variant
+        lanes = lanes_of(like, _numbers(variant, own))
+        yield Group(like, lanes, cells[chosen].ravel())
+
+
+def _singly(a: Axis) -> list[slice]:
+    return [slice(k, k + 1) for k in range(len(a))]
+
+
+def _by_kind(design: Design, axes: tuple[Axis, ...], a: Axis) -> list[slice]:
+    """Runs of an axis along which the laws keep their types, the other axes at their lowest.
+
+    A delay of zero is no delay, an infinite limit no limit: such laws take other kernels.
+    """
+    if not a.path.startswith(("controller.drive.", "weight_on_bit.path.", "scenario.")):
+        return [slice(0, len(a))]
+    low = {other.path: other.values[0] for other in axes}
+    kind = [kinds(_replaced(design, low | {a.path: value})) for value in a.values]
+    starts = [0, *(k for k in range(1, len(a)) if kind[k] != kind[k - 1])]
+    return [slice(i, j) for i, j in itertools.pairwise([*starts, len(a)])]
 
 
 def cell_design(design: Design, axes: tuple[Axis, ...], cell: int) -> Design:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.design.parts import weight_moves
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.studies.grid import Axis, axes_of
@@ -170,7 +171,7 @@ def regularisation(
 
 def _set_valued(design: Design) -> Design:
     """The design with its friction as a set, whatever it says."""
-    if design.weight_on_bit.moves:
+    if weight_moves(design.tables):
         raise InputError("friction under a weight that moves is not regularised", "weight_on_bit")
     if getattr(design.tables.bit_rock, "regularised_over", None) is None:
         return design

@@ -15,5 +15,6 @@ that both are zero in steady drilling.
 from drillctl.top_drive.constant_torque import ConstantTorque
 from drillctl.top_drive.pi import PI
 from drillctl.top_drive.protocol import TopDriveLaw
+from drillctl.top_drive.real_drive import RealDrive, SampledDrive
 
-__all__ = ["PI", "ConstantTorque", "TopDriveLaw"]
+__all__ = ["PI", "ConstantTorque", "RealDrive", "SampledDrive", "TopDriveLaw"]

@@ -1,4 +1,4 @@
-"""What a top-drive law must offer to run in both engines."""
+"""What every top-drive law offers; how it moves is in `top_drive` and in the engines."""
 
 from __future__ import annotations
 
@@ -6,14 +6,10 @@ from typing import Any, Protocol
 
 
 class TopDriveLaw(Protocol):
-    """Torque of the drive against angle and speed in the turning frame."""
+    """Torque of the drive against angle and speed in the turning frame, in steady motion."""
 
     def torque(self, angle: Any, speed: Any) -> Any:
         """Torque on the drive (N m) at `angle` (rad) and `speed` (rad/s)."""
-        ...
-
-    def mean_torque(self, angle: Any, rate: Any) -> tuple[Any, Any]:
-        """Offset (N m) and slope (N m/rad) of the mean torque over a step of 1 / `rate` (s)."""
         ...
 
     def gains(self) -> tuple[Any, Any]:

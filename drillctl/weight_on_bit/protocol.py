@@ -1,4 +1,4 @@
-"""What a weight-on-bit law must offer to run in both engines."""
+"""What every weight-on-bit law offers."""
 
 from __future__ import annotations
 
@@ -6,17 +6,13 @@ from typing import Any, Protocol
 
 
 class WeightLaw(Protocol):
-    """Weight on bit against bit speed."""
+    """Weight on bit; more is offered by a law that acts at once, and by one with a memory."""
 
     @property
     def moves(self) -> bool:
-        """Whether the weight changes with the bit speed."""
+        """Whether the weight changes at once with the bit speed."""
         ...
 
-    def weight(self, speed: Any) -> Any:
-        """Weight on bit (N) at bit speed `speed` >= 0 (rad/s)."""
-        ...
-
-    def slope(self, speed: Any) -> Any:
-        """Weight per bit speed (N s/rad) there."""
+    def _asdict(self) -> dict[str, Any]:
+        """The law's numbers by name."""
         ...

@@ -182,7 +182,7 @@ def test_unknown_key_is_told_with_the_nearest(told, text, key, suggestion):
 
 def test_unknown_key_without_a_neighbour_lists_what_is_allowed(told):
     message = told(rig(controller=CONTROLLER + "zzz = 1\n"))
-    assert message == "controller.zzz: unknown key; allowed: ki, kp, law"
+    assert message == "controller.zzz: unknown key; allowed: drive, ki, kp, law"
 
 
 def test_parameter_of_nearly_that_name():
@@ -511,21 +511,25 @@ def test_sections_named_twice_in_the_model(tmp_path):
     [
         (rig(controller='[controller]\nlaw = "pid"\nkp = 1\nki = 1\n'),
          "controller.law: no law 'pid'; did you mean 'pi'? "
-         "allowed: constant-torque, pi, soft-torque, stiff-speed"),
+         "allowed: active-damping, constant-torque, pi, soft-torque, "
+         "stiff-speed, torsional-rectification, z-torque"),
         (rig(controller="[controller]\nlaw = 3\n"),
-         "controller.law: no law 3; allowed: constant-torque, pi, soft-torque, stiff-speed"),
+         "controller.law: no law 3; allowed: active-damping, constant-torque, pi, soft-torque, "
+         "stiff-speed, torsional-rectification, z-torque"),
         (rig(controller="[controller]\nlaw = [3]\n"),
-         "controller.law: no law a list; allowed: constant-torque, pi, soft-torque, stiff-speed"),
+         "controller.law: no law a list; allowed: active-damping, constant-torque, pi, "
+         "soft-torque, stiff-speed, torsional-rectification, z-torque"),
         (rig(friction=FRICTION.replace("lopez-suarez", "lopes-suarez")),
          "bit_rock.law: no law 'navarro-lopes-suarez'; did you mean 'navarro-lopez-suarez'? "
          "allowed: bit-radius-friction, coulomb, jansen-van-den-steen, navarro-lopez-suarez, "
          "stribeck, tabulated, tucker-wang"),
         (rig(controller="[controller]\nkp = 1\n"),
-         "controller: law is missing; allowed: constant-torque, pi, soft-torque, stiff-speed"),
+         "controller: law is missing; allowed: active-damping, constant-torque, pi, soft-torque, "
+         "stiff-speed, torsional-rectification, z-torque"),
         (rig(friction=""), "bit_rock: is missing"),
         (rig(more='[weight_on_bit]\nlaw = "konstant"\n'),
          "weight_on_bit.law: no law 'konstant'; did you mean 'constant'? "
-         "allowed: constant, navarro-lopez-suarez"),
+         "allowed: constant, navarro-lopez-suarez, stick-slip-alarm, surface-observer"),
         (rig(more='[start]\nkind = "turn"\n'),
          "start.kind: got 'turn'; did you mean 'turning'? allowed: rest, turning, wound_up"),
         (rig(more='[simulation]\naccuracy = "finer"\n'),
@@ -534,7 +538,7 @@ def test_sections_named_twice_in_the_model(tmp_path):
         (rig(controller='[controller]\nlaw = "constant-torque"\n'),
          "controller.torque: is missing"),
         (rig(controller='[controller]\nlaw = "constant-torque"\nkp = 1\ntorque = "1 N*m"\n'),
-         "controller.kp: unknown key; allowed: law, torque"),
+         "controller.kp: unknown key; allowed: drive, law, torque"),
         (rig(friction=FRICTION.replace("beta = 0.1\n", "")),
          "bit_rock: beta missing: give a1, a2 and beta, or a table"),
         (rig(friction='[bit_rock]\nlaw = "navarro-lopez-suarez"\n'),

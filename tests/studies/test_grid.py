@@ -41,12 +41,17 @@ def plain():
 
 def lane(lanes, index):
     """What one lane holds, by the names of `lane_numbers`."""
-    laws = {"friction": lanes.friction, "drive": lanes.drive, "weight": lanes.weight}
+    laws = {
+        "friction": lanes.friction, "drive": lanes.drive, "weight": lanes.weight,
+        "before": lanes.before, "speed_program": lanes.program.speed,
+        "weight_program": lanes.program.weight,
+    }  # fmt: skip
     held = {
         f"{part}.{name}": values[index]
         for part, law in laws.items()
         for name, values in law._asdict().items()
     }
+    held["rock_until"] = lanes.program.rock_until[index]
     for name in ("set_speed", "turning_speed", "nominal_weight", "table_low", "table_high"):
         held[name] = getattr(lanes, name)[index]
     return held

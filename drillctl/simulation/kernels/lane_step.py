@@ -1,7 +1,7 @@
 """The step of the laws, lane by lane: everything that is not the string.
 
-With the mean top torque of the step affine in the top angle at its end, T_top = offset -
-slope angle+, both control and string can be eliminated. The bit speed at the end of the step
+With the mean top torque of the step affine in the top's motion at its end (`drive_step`), both
+control and string can be eliminated. The bit speed at the end of the step
 is then free - gain T_bit, and what is left is one scalar inclusion:
 
 - A stuck bit stays while the torque that holds it, free / gain, is within the static one.
@@ -21,15 +21,16 @@ from typing import Any
 
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.compiling import inlined, widest_vectors
+from drillctl.simulation.kernels.drive_step import drive_line
 from drillctl.simulation.kernels.laws import (
     at_lane,
     contact,
     kinetic_torque_at_rest,
-    mean_torque,
     static_torque,
     weight_at,
 )
 from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.weight_step import acting
 
 NEWTON_STEP = 3e-5
 """A lane has converged when Newton moves it less than this (rad/s, relative over 1 rad/s). What
@@ -44,10 +45,12 @@ def eliminate(string: Any, drive: Any, work: Any, rate: float) -> None:
     widest_vectors()
     for lane in range(WIDTH):
         drag = work[r.DRAG + lane]
-        offset, slope = mean_torque(at_lane(drive, work, r.DRIVE, lane), work[r.ANGLE + lane], rate)
-        shrink = 1.0 / (1.0 + slope * string.angle_by_top)
-        alone = (offset - slope * (work[r.TOP_FREE + lane] - string.angle_by_top * drag)) * shrink
-        share = slope * string.angle_by_bit * shrink
+        offset, slope, by_speed = drive_line(drive, string, work, lane, rate)
+        shrink = 1.0 / (1.0 + slope * string.angle_by_top + by_speed * string.top_speed_by_top)
+        angle = work[r.TOP_FREE + lane] - string.angle_by_top * drag
+        speed = work[r.TOP_SPEED_FREE + lane] - string.top_speed_by_top * drag
+        alone = (offset - slope * angle - by_speed * speed) * shrink
+        share = (slope * string.angle_by_bit + by_speed * string.top_speed_by_bit) * shrink
         free = (
             work[r.SET_SPEED + lane]
             + work[r.BIT_FREE + lane]
@@ -131,7 +134,7 @@ def solve_inclusion(friction: Any, weight: Any, work: Any) -> None:
             law = at_lane(friction, work, r.FRICTION, lane)
             u = work[r.SPEED + lane]
             half = 0.5 * work[r.GAIN + lane]
-            torque, slope = contact(law, at_lane(weight, work, r.WEIGHT, lane), u)
+            torque, slope = contact(law, acting(weight, work, lane), u)
             move = (work[r.RIGHT + lane] - u - half * torque) / (1.0 + half * slope)
             new = u + move
             new = new if new > 0.0 else 0.0
@@ -212,4 +215,4 @@ def conclude(string: Any, weight: Any, work: Any) -> None:
         speed = work[r.NEW_SPEED + lane]
         work[r.BIT_SPEED + lane] = speed
         work[r.LOAD_BEFORE + lane] = work[r.LOAD + lane]
-        work[r.LOAD + lane] = weight_at(at_lane(weight, work, r.WEIGHT, lane), abs(speed))
+        work[r.LOAD + lane] = weight_at(acting(weight, work, lane), abs(speed))

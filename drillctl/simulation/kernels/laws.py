@@ -42,8 +42,8 @@ def load_block(law: Any, work: Any, row: int, first: int) -> None:
 def _load_block(law, work, row, first):
     if not isinstance(law, types.BaseNamedTuple):
         return None
-    if len(law.fields) > MOST_FIELDS:
-        raise TypeError(f"{law.instance_class.__name__} has more than {MOST_FIELDS} numbers")
+    if len(law.fields) > max(MOST_FIELDS.values()):
+        raise TypeError(f"{law.instance_class.__name__} has more numbers than there is room for")
     lines = [
         f"        work[row + {k * WIDTH} + lane] = law[{k}][first + lane]"
         for k in range(len(law.fields))
@@ -53,6 +53,24 @@ def _load_block(law, work, row, first):
     )
     scope: dict[str, Any] = {}
     exec(text, scope)
+    return scope["load"]
+
+
+def load_lane(law: Any, work: Any, row: int, first: int, lane: int) -> None:
+    """Copy the parameters of one lane of the block from `first` on into `work[row:]`."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(load_lane)
+def _load_lane(law, work, row, first, lane):
+    if not isinstance(law, types.BaseNamedTuple):
+        return None
+    lines = [
+        f"    work[row + {k * WIDTH} + lane] = law[{k}][first + lane]"
+        for k in range(len(law.fields))
+    ]
+    scope: dict[str, Any] = {}
+    exec("\n".join(["def load(law, work, row, first, lane):", *lines]), scope)
     return scope["load"]
 
 
@@ -92,6 +110,17 @@ def mean_torque(law: Any, angle: float, rate: float) -> tuple[float, float]:
 def _mean_torque(law, angle, rate):
     method = _method(law, "mean_torque")
     return lambda law, angle, rate: method(law, angle, rate)
+
+
+def torque_at(law: Any, angle: float, speed: float) -> float:
+    """`law.torque(angle, speed)` of an ideal drive."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(torque_at)
+def _torque_at(law, angle, speed):
+    method = _method(law, "torque")
+    return lambda law, angle, speed: method(law, angle, speed)
 
 
 def weight_at(law: Any, speed: float) -> float:

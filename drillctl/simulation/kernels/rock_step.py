@@ -17,6 +17,7 @@ from drillctl.simulation.kernels.lane_step import (
 )
 from drillctl.simulation.kernels.laws import at_lane, contact
 from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.weight_step import acting
 
 BISECTIONS = 60
 """Most iterations of the safeguarded Newton method."""
@@ -79,7 +80,7 @@ def _creep(friction: Any, weight: Any, work: Any) -> None:
     for lane in range(WIDTH):
         sign, u = work[r.SIGN + lane], work[r.SPEED + lane]
         law = at_lane(friction, work, r.FRICTION, lane)
-        torque, slope = contact(law, at_lane(weight, work, r.WEIGHT, lane), u)
+        torque, slope = contact(law, acting(weight, work, lane), u)
         work[r.NEW_SPEED + lane] = sign * u
         work[r.NEW_DIRECTION + lane] = sign
         work[r.NEW_KINETIC + lane] = sign * torque
@@ -96,7 +97,7 @@ def _safeguarded_newton(friction: Any, weight: Any, work: Any) -> int:
     for lane in range(WIDTH):
         law = at_lane(friction, work, r.FRICTION, lane)
         u, share = work[r.SPEED + lane], work[r.SHARE_NEW + lane]
-        torque, slope = contact(law, at_lane(weight, work, r.WEIGHT, lane), u)
+        torque, slope = contact(law, acting(weight, work, lane), u)
         excess = u + share * torque - work[r.RIGHT + lane]
         low = u if excess < 0.0 else work[r.LOW_BOUND + lane]
         high = u if excess >= 0.0 else work[r.HIGH_BOUND + lane]

@@ -42,6 +42,8 @@ class BlockString(NamedTuple):
         a braking torque on the bit counts positive.
     speed_by_top, speed_by_bit : float
         Bit speed after one step per the same (rad/s per N m).
+    top_speed_by_top, top_speed_by_bit : float
+        Top speed after one step per the same.
     drag : float
         Torque of all damping to ground per set speed (N m s/rad).
     pipe_offset, twist_offset : float
@@ -57,6 +59,8 @@ class BlockString(NamedTuple):
     angle_by_bit: Any
     speed_by_top: Any
     speed_by_bit: Any
+    top_speed_by_top: Any
+    top_speed_by_bit: Any
     drag: Any
     pipe_offset: Any
     twist_offset: Any
@@ -80,6 +84,8 @@ class DenseString(NamedTuple):
     angle_by_bit: Any
     speed_by_top: Any
     speed_by_bit: Any
+    top_speed_by_top: Any
+    top_speed_by_bit: Any
     drag: Any
     pipe_offset: Any
     twist_offset: Any

@@ -133,13 +133,14 @@ def mean_torque_and_slope(
     )
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     # The bit turns forward up to the angle `turn` and backwards from there to half a period.
+    law: Any = design.weight_on_bit
     turn = np.arccos(-np.clip(mean / amplitude, -1.0, 1.0))[..., None]
     total, harmonic = np.zeros(mean.shape), np.zeros(mean.shape)
     for low, high, sign in ((0.0 * turn, turn, 1.0), (turn, np.pi + 0.0 * turn, -1.0)):
         half = 0.5 * (high - low)
         cosine = np.cos(low + half * (nodes + 1.0))
         speed = mean[..., None] + amplitude[..., None] * cosine
-        weight = design.weight_on_bit.weight(np.abs(speed))
+        weight = law.weight(np.abs(speed))
         torque, _ = design.bit_rock.torque_and_slope(weight, np.abs(speed), np.exp)
         part = sign * half * weights * torque
         total += part.sum(axis=-1)

@@ -15,6 +15,7 @@ motion is then told by the twists of the elements instead of the angles of the n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -24,12 +25,14 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import SimulationError
-from drillctl.simulation.reference import System, ending, integrate
+from drillctl.simulation.system import System, ending, integrate
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
 """Relative and absolute tolerance of the integrator (rad, rad/s)."""
+LATER = math.inf
+"""Time (s) at which cycles are looked at: when no program of the start acts any more."""
 MOST_PHASES = 2000
 """Give up beyond this many phases within one flight."""
 SPEED_STEP = 1e-5
@@ -113,8 +116,9 @@ class Flow:
         """Rates of angles and speeds in a phase."""
         system = self.system
         phase = system.slip if direction else system.stick
-        rock = system.slip_torque(state, direction) if direction else 0.0
-        inputs = np.concatenate([state, [system.top_torque(state), rock, 1.0]])
+        rock = system.slip_torque(LATER, state, direction) if direction else 0.0
+        top_torque, _ = system.respond(LATER, state, phase, rock)
+        inputs = np.concatenate([state, [top_torque, rock, 1.0]])
         return np.asarray(phase.first_order @ inputs)
 
     def tangents(self, state: Array, matrix: Array, direction: int) -> Array:
@@ -151,7 +155,7 @@ class Flow:
         """
         state = self.state(point)
         near = self.lifted.copy() if matrix else None
-        direction, time = self.system.direction_at(state), 0.0
+        direction, time = self.system.direction_at(LATER, state), 0.0
         legs: list[Leg] = []
         while True:
             leg, state, near = self._leg(time, duration, direction, state, near, dense)
@@ -161,7 +165,7 @@ class Flow:
                 break
             if len(legs) >= MOST_PHASES:
                 raise SimulationError(f"{MOST_PHASES} changes of phase by {time:g} s: chattering")
-            after = self.system.next_direction(direction, state)
+            after = self.system.next_direction(LATER, direction, state)
             if near is not None:
                 near = self._salted(state, near, direction, after)
             direction = after
@@ -209,14 +213,14 @@ class Flow:
 
     def _events(self, direction: int) -> list[Any]:
         system, size = self.system, 2 * self.nodes
-        limit = system.static_torque()
+        limit = system.static_torque(LATER, np.zeros(size))
 
         def comes_to_rest(time: float, both: Array) -> float:
             # Exactly zero is the release itself, in a step too short to move the bit.
             return direction * system.bit_speed(both[:size]) or 1e-300
 
         def breaks_loose(time: float, both: Array) -> float:
-            return limit - abs(system.holding_torque(both[:size]))
+            return limit - abs(system.holding_torque(LATER, both[:size]))
 
         def extreme(time: float, both: Array) -> float:
             return float(self.rates(both[:size], direction)[-1])
@@ -241,7 +245,8 @@ class Flow:
         ahead[-1] += SPEED_STEP
         behind[-1] -= SPEED_STEP
         torque = self.system.slip_torque
-        return (torque(ahead, direction) - torque(behind, direction)) / (2.0 * SPEED_STEP)
+        change = torque(LATER, ahead, direction) - torque(LATER, behind, direction)
+        return change / (2.0 * SPEED_STEP)
 
 
 def _jacobian(first_order: Array, drive: Array) -> Array:

@@ -19,6 +19,8 @@ from drillctl.simulation.limit_cycle.describing import (
 from drillctl.simulation.limit_cycle.returns import Returns, judge, long_run
 from drillctl.simulation.limit_cycle.shooting import Orbit
 from drillctl.simulation.start import Kind
+from drillctl.top_drive import RealDrive, SampledDrive
+from drillctl.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -151,16 +153,28 @@ def limit_cycle(
     Raises
     ------
     InputError
-        Too few periods, or an unknown start.
+        Too few periods, an unknown start, or a law with a memory.
     SimulationError
         The reference solver could not finish.
     """
+    _refuse_memory(design)
     if periods < FEWEST_PERIODS:
         raise InputError(f"at least {FEWEST_PERIODS} periods, not {periods}", "periods")
     harmonic = harmonic_cycles(design, modes)
     simulated = long_run(design, expected_period(design, harmonic), periods, start, tolerance)
     status, orbit = judge(design, simulated)
     return LimitCycle(design, status, harmonic, orbit, simulated)
+
+
+def _refuse_memory(design: Design) -> None:
+    """Cycles are found for laws that are functions of the motion (`InputError`)."""
+    why = "has a memory or changes by the clock; cycles are found without. Simulate it instead"
+    if isinstance(design.top_drive, (RealDrive, SampledDrive)):
+        raise InputError(f"this drive {why}", "controller")
+    if isinstance(design.weight_on_bit, PATHS):
+        raise InputError(f"this weight on bit {why}", "weight_on_bit")
+    if design.program.moves:
+        raise InputError(f"this rig {why}", "scenario")
 
 
 def expected_period(design: Design, harmonic: tuple[HarmonicCycle, ...]) -> float:

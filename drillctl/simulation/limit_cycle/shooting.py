@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.simulation.limit_cycle.describing import HarmonicCycle, mean_torque_and_slope
-from drillctl.simulation.limit_cycle.flow import Flow, Leg
+from drillctl.simulation.limit_cycle.flow import LATER, Flow, Leg
 
 Array = NDArray[np.float64]
 
@@ -193,7 +193,7 @@ class _Place:
 
     def start_rates(self) -> Array:
         state = self.flow.state(self.point)
-        direction = self.flow.system.direction_at(state)
+        direction = self.flow.system.direction_at(LATER, state)
         return np.asarray(self.flow.told @ self.flow.rates(state, direction))
 
 

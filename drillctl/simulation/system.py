@@ -1,0 +1,295 @@
+"""The equations of one design as SciPy wants them: string, drive, weight and rock together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from drillctl.bit_rock import contact
+from drillctl.design import Design
+from drillctl.errors import SimulationError
+from drillctl.simulation.drive_in_time import Top, drive_in_time
+from drillctl.simulation.phases import Phase, damping_power, slip_phase, stick_phase
+from drillctl.simulation.start import start
+from drillctl.simulation.weight_in_time import Moment, weight_in_time
+
+Array = NDArray[np.float64]
+Method = Literal["DOP853", "RK45", "Radau", "BDF"]
+"""Integrators of SciPy; not LSODA, whose dense output does not meet its own steps closely
+enough to locate events on."""
+
+LONGEST_STEP = 0.05
+"""Longest step (s): a touch of zero speed shorter than that could go unseen."""
+WORKS = 3
+"""Integrals of power that every state carries: work of the drive, of the bit, of damping."""
+
+
+class System:
+    """A rig in motion.
+
+    Its state: angles and speeds of the nodes in the frame, the works of drive, bit and damping,
+    then the memories of drive and weight.
+    """
+
+    def __init__(self, design: Design) -> None:
+        self.nodes = design.string.nodes
+        self.set_speed = design.speed
+        self.string = design.string
+        self.program = design.program
+        self.drive = drive_in_time(design.top_drive, design.speed, design.program.speed)
+        self.weight = weight_in_time(design.weight_on_bit, design.program.weight, design.observer)
+        self.rocks = (design.bit_rock_before, design.bit_rock)
+        self.slip = slip_phase(design.string, design.speed)
+        self.stick, self.reaction = stick_phase(design.string, design.speed)
+        self.damping_power = damping_power(design.string)
+        self.drag = float(design.string.ground_damping.sum()) * design.speed
+        self.pieces: list[Any] = []
+        works = 2 * self.nodes + WORKS
+        self.of_drive = slice(works, works + self.drive.states)
+        self.of_weight = slice(self.of_drive.stop, self.of_drive.stop + self.weight.states)
+        self.size = self.of_weight.stop
+        self._begin: Array = np.empty(0)
+
+    @property
+    def simple(self) -> bool:
+        """Whether all laws are functions of the motion alone, at any time the same."""
+        return not (self.drive.states or self.weight.states or self.program.moves)
+
+    def start(self, design: Design) -> Array:
+        """State at time zero."""
+        table = design.tables.start
+        turning = design.speed if table.speed is None else table.speed
+        static = self.rock(0.0).static_torque(self.weight_at_rest(design))
+        angle, speed = (
+            x[:, 0]
+            for x in start(
+                self.string, table.kind, *(np.array([x]) for x in (design.speed, turning, static))
+            )
+        )
+        bit = float(speed[-1]) + self.set_speed
+        memories = (self.drive.start(float(speed[0])), self.weight.start(bit, angle, speed))
+        self._begin = np.concatenate([angle, speed, np.zeros(WORKS), *memories])
+        return self._begin
+
+    def weight_at_rest(self, design: Design) -> float:
+        """Weight on a bit at rest at time zero (N)."""
+        still = np.zeros(self.nodes)
+        memory = self.weight.start(0.0, still, still - self.set_speed)
+        first = Moment(0.0, 0.0, lambda time: np.zeros_like(np.asarray(time, dtype=float)))
+        return float(self.weight.law(first, memory).weight(0.0))
+
+    def rock(self, time: float) -> Any:
+        """Bit-rock law of the moment."""
+        return self.rocks[0 if time < self.program.rock_until else 1]
+
+    def bit_speed(self, state: Array) -> float:
+        """Absolute speed of the bit (rad/s)."""
+        return float(state[2 * self.nodes - 1]) + self.set_speed
+
+    def past(self, time: Any) -> Array:
+        """The signal of the weight law at times (s) before; before the start, that of the start."""
+        times = np.atleast_1d(np.asarray(time, dtype=float))
+        signals = np.empty(len(times))
+        for i, moment in enumerate(times):
+            state = self._begin if moment <= 0.0 else self._piece_at(moment).solution(moment)
+            signals[i] = self.weight.signal(state[self.of_weight], np.array(self.bit_speed(state)))
+        return signals if np.ndim(time) else signals[0]
+
+    def _piece_at(self, time: float) -> Any:
+        low, high = 0, len(self.pieces) - 1
+        while low < high:
+            middle = (low + high) // 2
+            if self.pieces[middle].end < time:
+                low = middle + 1
+            else:
+                high = middle
+        return self.pieces[low]
+
+    def weight_law(self, time: float, state: Array) -> Any:
+        """Weight law of the moment."""
+        return self.weight.law(self._moment(time, state), state[self.of_weight])
+
+    def _moment(self, time: float, state: Array) -> Moment:
+        return Moment(time, self.bit_speed(state), self.past)
+
+    def static_torque(self, time: float, state: Array) -> float:
+        """Largest torque on a bit at rest (N m)."""
+        law = self.weight_law(time, state)
+        return float(self.rock(time).static_torque(law.weight(0.0)))
+
+    def slip_torque(self, time: float, state: Array, direction: int) -> float:
+        """Torque on a bit that turns (N m)."""
+        speed = self.bit_speed(state)
+        rock = self.rock(time)
+        if not rock.set_valued:
+            direction = 1 if speed >= 0.0 else -1
+        # Past zero speed a set-valued law is continued smoothly, so that the event can be located.
+        torque, _ = contact(rock, self.weight_law(time, state), direction * speed, _exp)
+        return direction * float(torque)
+
+    def respond(self, time: float, state: Array, phase: Phase, bit: float) -> tuple[float, Array]:
+        """Torque of the drive (N m) and the rates of its memory, under a bit torque (N m)."""
+        nodes = self.nodes
+        free = gain = 0.0
+        if self.drive.states:
+            free = phase.motion[0] @ state[: 2 * nodes] + phase.load[0] - phase.bit[0] * bit
+            gain = phase.top[0]
+        top = Top(time, float(state[0]), float(state[nodes]), float(free), float(gain))
+        return self.drive.respond(state[self.of_drive], top)
+
+    def holding_torque(self, time: float, state: Array) -> float:
+        """Torque that holds a bit at rest (N m)."""
+        top_torque, _ = self.respond(time, state, self.stick, 0.0)
+        return self.reaction.torque(state[: 2 * self.nodes], top_torque)
+
+    def rates(self, time: float, state: Array, direction: int) -> Array:
+        """Time derivative of the state; `direction` 0 for a bit that is stuck."""
+        end = 2 * self.nodes
+        motion = state[:end]
+        if direction == 0:
+            phase = self.stick
+            top_torque, drive = self.respond(time, state, phase, 0.0)
+            bit_torque = self.reaction.torque(motion, top_torque)
+        else:
+            phase = self.slip
+            bit_torque = self.slip_torque(time, state, direction)
+            top_torque, drive = self.respond(time, state, phase, bit_torque)
+        inputs = np.empty(end + 3)
+        inputs[:end] = motion
+        inputs[end:] = top_torque, bit_torque, 1.0
+        rates = np.empty(self.size)
+        np.dot(phase.first_order, inputs, out=rates[:end])
+        rates[end] = top_torque * (state[self.nodes] + self.set_speed)
+        rates[end + 1] = bit_torque * (state[end - 1] + self.set_speed)
+        rates[end + 2] = self.damping_power(state[self.nodes : end] + self.set_speed)
+        rates[self.of_drive] = drive
+        if self.weight.states:
+            rates[self.of_weight] = self.weight.rates(
+                self._moment(time, state),
+                state[self.of_weight],
+                float(state[self.nodes]),
+                top_torque - self.drag,
+            )
+        return rates
+
+    def direction_at(self, time: float, state: Array) -> int:
+        """Phase at the very start: +1 or -1 turning, 0 stuck; under a smooth law always +1."""
+        if not self.rock(time).set_valued:
+            return 1
+        speed = self.bit_speed(state)
+        if speed != 0.0:
+            return 1 if speed > 0.0 else -1
+        return self.next_direction(time, 1, state)
+
+    def next_direction(self, time: float, direction: int, state: Array) -> int:
+        """What follows a phase: a stuck bit slips, a bit at zero speed sticks if it can."""
+        holding = self.holding_torque(time, state)
+        if direction != 0 and abs(holding) <= self.static_torque(time, state):
+            return 0
+        return 1 if holding > 0.0 else -1
+
+    def after_stop(self, time: float, direction: int, state: Array) -> int:
+        """Phase after a stop: a stuck bit may be loose at once, by a jump of weight or torque."""
+        if direction != 0:
+            return direction
+        holding = self.holding_torque(time, state)
+        if abs(holding) <= self.static_torque(time, state) * (1.0 + 1e-12):
+            return 0
+        return 1 if holding > 0.0 else -1
+
+    def next_stop(self, time: float) -> float:
+        """Next time (s) at which a controller works, a signal is read or a program turns."""
+        stops = [self.weight.next_stop(time)]
+        if math.isfinite(self.drive.period):
+            stops.append(
+                (math.floor(time / self.drive.period * (1 + 1e-12)) + 1) * self.drive.period
+            )
+        stops += [t for t in self.program.breaks() if t > time][:1]
+        return min(stops)
+
+    def stop(self, time: float, direction: int, state: Array) -> Array:
+        """State after what happens at a stop."""
+        state = state.copy()
+        if math.isfinite(self.drive.period):
+            turns = time / self.drive.period
+            if abs(turns - round(turns)) < 1e-6:
+                phase = self.slip if direction else self.stick
+                top = Top(time, float(state[0]), float(state[self.nodes]), 0.0, float(phase.top[0]))
+                state[self.of_drive] = self.drive.sample(state[self.of_drive], top)
+        if self.weight.states:
+            state[self.of_weight] = self.weight.read(time, state[self.of_weight], self.past)
+        return state
+
+    def equations(self, direction: int) -> Equations:
+        """Right-hand side and events of a phase."""
+        return self._sticking() if direction == 0 else self._slipping(direction)
+
+    def _slipping(self, direction: int) -> Equations:
+        def rates(time: float, state: Array) -> Array:
+            return self.rates(time, state, direction)
+
+        def comes_to_rest(time: float, state: Array) -> float:
+            if not self.rocks[1].set_valued:
+                return 1.0
+            # Exactly zero is the release itself, in a step too short to move the bit.
+            return direction * self.bit_speed(state) or 1e-300
+
+        def at_set_speed(time: float, state: Array) -> float:
+            return float(state[2 * self.nodes - 1])
+
+        def extreme(time: float, state: Array) -> float:
+            return float(rates(time, state)[2 * self.nodes - 1])
+
+        return Equations(rates, ending(comes_to_rest), [at_set_speed, extreme])
+
+    def _sticking(self) -> Equations:
+        def rates(time: float, state: Array) -> Array:
+            return self.rates(time, state, 0)
+
+        def breaks_loose(time: float, state: Array) -> float:
+            return self.static_torque(time, state) - abs(self.holding_torque(time, state))
+
+        def never(time: float, state: Array) -> float:
+            return 1.0
+
+        return Equations(rates, ending(breaks_loose), [never, never])
+
+
+def _exp(x: float) -> float:
+    """exp(x), finite: a trial step far past zero speed is to be rejected, not to raise."""
+    return math.exp(min(x, 100.0))
+
+
+def integrate(*arguments: Any, **options: Any) -> Any:
+    """`solve_ivp` with steps of at most `LONGEST_STEP`; a little shorter if an event is missed.
+
+    SciPy finds events on its dense output, which at the ends of a step may differ from the step
+    itself by rounding; an event that lies just there is then not bracketed. Other steps move it
+    inside.
+    """
+    for share in (1.0, 0.83, 0.71, 0.59, 0.47):
+        try:
+            return solve_ivp(*arguments, max_step=share * LONGEST_STEP, **options)
+        except ValueError as error:
+            failure = error
+    raise SimulationError(f"an event could not be located: {failure}") from failure
+
+
+class Equations:
+    """Right-hand side and events of one phase; the first event ends it."""
+
+    def __init__(self, rates: Callable[[float, Array], Array], end: Any, others: list[Any]) -> None:
+        self.rates = rates
+        self.events = [end, *others]
+
+
+def ending(event: Any) -> Any:
+    """Mark an event as the end of its phase, reached from above."""
+    event.terminal = True
+    event.direction = -1
+    return event
