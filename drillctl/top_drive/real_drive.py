@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 
@@ -149,29 +148,3 @@ def _impedance(drive: RealDrive | SampledDrive, s: Any, held: Any) -> Any:
     # T = -follows C [seen w + felt (T - J s seen w)]
     given = follows * controller
     return given * seen * (1.0 - felt * drive.sensed_inertia * s) / (1.0 + given * felt)
-
-
-def limits(drive: RealDrive | SampledDrive, speed: float) -> tuple[float, float]:
-    """Least and largest torque (N m) that a drive gives at an absolute speed (rad/s)."""
-    by_power = drive.power / max(abs(speed), 1e-9)
-    return max(drive.least, -by_power), min(drive.most, by_power)
-
-
-def clipped(value: float, low: float, high: float) -> float:
-    """The value within its limits."""
-    return min(max(value, low), high)
-
-
-def integral_rate(
-    drive: RealDrive | SampledDrive, error: float, command: float, given: float
-) -> float:
-    """Rate of the integral (rad/s) at an error (rad/s), a command and what is given of it (N m)."""
-    if drive.ki == 0.0:
-        return error
-    return error + drive.tracking * (given - command) / drive.ki
-
-
-def motor_rate(drive: RealDrive | SampledDrive, command: float, torque: float) -> float:
-    """Rate of the motor torque (N m/s) of a drive with a lag."""
-    wanted = (command - torque) / drive.lag
-    return clipped(wanted, -drive.rate, drive.rate) if math.isfinite(drive.rate) else wanted
