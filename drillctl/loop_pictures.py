@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drillctl.linear import (
     LoopAnalysis,
@@ -19,12 +20,15 @@ from drillctl.linear import (
 from drillctl.linear.boundary import WINDOW, Window
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.tuning import stick_slip_frequency
+from drillctl.linear.weight_path import BitSide
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from drillctl.design import Design
     from drillctl.studies import Axis
+
+Array = NDArray[np.float64]
 
 MOST_NODES = 120
 """Nodes of a string up to which its poles are computed over and over, for maps and loci."""
@@ -53,7 +57,8 @@ def loop_figures(result: LoopAnalysis) -> dict[str, Figure]:
     """
     from drillctl import plots
 
-    design, slope = result.design, result.operating_point.slope
+    design = result.design
+    bit = result.bit_side
     frequencies = telling_frequencies(design.string)
     models = ["finite-elements"]
     if design.string.parts.modal_damping == 0.0:
@@ -62,21 +67,31 @@ def loop_figures(result: LoopAnalysis) -> dict[str, Figure]:
     closed = frequency_response(design, frequencies, "closed_loop")
     figures = {"mobility": plots.mobility([*strings, closed])}
     if any(design.top_drive.gains()):
-        drilling = frequency_response(design, frequencies, "closed_loop", slope=slope)
-        figures["closed-loop"] = plots.bode(drilling)
-        grid = pole_grid(ends_of(design.string), result.poles) / (2.0 * math.pi)
-        cut = frequency_response(design, grid, "open_loop", slope=slope)
-        figures |= {
-            "nyquist": plots.nyquist(cut, analysis=result),
-            "nichols": plots.nichols(cut, analysis=result),
-            "sensitivity": plots.sensitivity(cut, analysis=result),
-        }
-        figures |= _over_gains(design, slope)
+        if bit.path is None or bit.path.observer is None:
+            figures |= _of_loop(result, bit, frequencies)
+        if design.simple_drive and bit.path is None:
+            figures |= _over_gains(design, bit.slope)
     first = design.string.parts.sections[0]
     if first.inertia > 0.0:
         mark = stick_slip_frequency(design.string) / (2.0 * math.pi)
         figures["impedance"] = plots.drive_impedance(drive_impedance(design), marks=(mark,))
     return figures
+
+
+def _of_loop(result: LoopAnalysis, bit: BitSide, frequencies: Array) -> dict[str, Figure]:
+    """Bode plot from the set speed, and what tells the margins at the top."""
+    from drillctl import plots
+
+    design, closed = result.design, {"slope": bit.slope, "path": bit.path}
+    drilling = frequency_response(design, frequencies, "closed_loop", **closed)  # type: ignore[arg-type]
+    grid = pole_grid(ends_of(design.string), result.poles) / (2.0 * math.pi)
+    cut = frequency_response(design, grid, "open_loop", **closed)  # type: ignore[arg-type]
+    return {
+        "closed-loop": plots.bode(drilling),
+        "nyquist": plots.nyquist(cut, analysis=result),
+        "nichols": plots.nichols(cut, analysis=result),
+        "sensitivity": plots.sensitivity(cut, analysis=result),
+    }
 
 
 def _over_gains(design: Design, slope: float) -> dict[str, Figure]:

@@ -121,11 +121,13 @@ def read_loop(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> 
         operating_point=OperatingPoint(
             summary["operating_speed"], summary["bit_torque"], summary["slope"]
         ),
+        stable=summary["stable"],
         poles=data["pole_real"].values + 1j * data["pole_imag"].values,
-        slope_margin=summary["slope_margin"],
-        deciding_frequency_hz=summary["deciding_frequency_hz"],
+        slope_margin=float(data.attrs["slope_margin"]),
+        deciding_frequency_hz=float(data.attrs["deciding_frequency_hz"]),
         continuum_slope_margin=summary["continuum_slope_margin"],
         margins=None if found is None else Margins(**found),
+        weight_delay_margin=summary["weight_delay_margin"],
         critical_speed=summary["critical_speed"],
         critical_weight_on_bit=summary["critical_weight_on_bit"],
     )

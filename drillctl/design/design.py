@@ -15,7 +15,7 @@ from drillctl.design.weight_tables import SurfaceObserverTable
 from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError
 from drillctl.program import Program
-from drillctl.top_drive import TopDriveLaw
+from drillctl.top_drive import PI, ConstantTorque, TopDriveLaw
 from drillctl.weight_on_bit import WeightLaw
 
 if TYPE_CHECKING:
@@ -124,6 +124,11 @@ class Design:
         point = self.tables.operating_point
         law: Any = self.weight_on_bit
         return float(law.weight(0.0)) if law.moves else point.weight_on_bit
+
+    @property
+    def simple_drive(self) -> bool:
+        """Whether the drive is ideal: two gains, or a constant torque, tell all of it."""
+        return isinstance(self.top_drive, (PI, ConstantTorque))
 
     @property
     def table_range(self) -> tuple[float, float]:

@@ -16,11 +16,14 @@ from drillctl.linear.state_space import (
     INPUTS,
     LOOP_OUTPUTS,
     OUTPUTS,
+    StateMatrices,
+    closed_loop,
     closed_loop_matrices,
     open_loop_matrices,
     plant_matrices,
     state_names,
 )
+from drillctl.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     import control
@@ -57,10 +60,14 @@ def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearI
     Raises
     ------
     InputError
-        A width that is not more than zero.
+        A width that is not more than zero, or laws with a memory.
     """
     import control
 
+    if not design.simple_drive or isinstance(design.weight_on_bit, PATHS):
+        raise InputError(
+            "takes an ideal drive and a weight that acts at once; use drillctl.simulate", "law"
+        )
     if not (0.0 < width < np.inf):
         raise InputError(f"must be more than 0 rad/s, got {width:g}", "width")
     matrices = plant_matrices(design.string)
@@ -108,10 +115,10 @@ def write_matrices(design: Design, path: str | Path) -> Path:
     Returns
     -------
     Path
-        The file. It holds `plant`, `open_loop` and `closed_loop` as A, B, C, D (the last also
-        with the slope of the rock, `closed_loop_with_slope`), M, C and K of the string, the
-        slope (N m s/rad), names of states, inputs and outputs. SI units, radians. In `.mat`
-        each system is a struct, so that `ss(plant.A, plant.B, plant.C, plant.D)` is the plant;
+        The file. It holds `plant`, `open_loop` (of an ideal drive) and `closed_loop` as A, B,
+        C, D (the last also with the slope of the rock, `closed_loop_with_slope`), M, C and K of
+        the string, the slope (N m s/rad), names of states, inputs and outputs. SI units,
+        radians. In `.mat` each system is a struct, so that `ss(plant.A, plant.B, plant.C, plant.D)` is the plant;
         in `.npz` names are joined by a dot, as in `plant.A`.
 
     Raises
@@ -137,26 +144,14 @@ def write_matrices(design: Design, path: str | Path) -> Path:
 
 def _content(design: Design) -> dict[str, Any]:
     string = design.string
-    kp, ki = design.top_drive.gains()
     slope = operating_point(design).slope
-    closed = closed_loop_matrices(string, kp, ki)
-    loop_states = state_names(string.nodes, ki)
-    rows = {
-        "plant": (plant_matrices(string), state_names(string.nodes, 0.0), INPUTS, OUTPUTS),
-        "open_loop": (
-            open_loop_matrices(string, kp, ki),
-            loop_states,
-            ("speed_error", "bit_torque"),
-            LOOP_OUTPUTS,
-        ),
-        "closed_loop": (closed, loop_states, ("set_speed", "bit_torque"), LOOP_OUTPUTS),
-        "closed_loop_with_slope": (
-            with_slope(closed, slope),
-            loop_states,
-            ("set_speed", "bit_torque"),
-            LOOP_OUTPUTS,
-        ),
+    plant_states = state_names(string.nodes, 0.0)
+    rows: dict[str, Row] = {
+        "plant": (plant_matrices(string), plant_states, INPUTS, OUTPUTS),
+        **(_of_gains(design) if design.simple_drive else _of_any(design)),
     }
+    closed, states, inputs, outputs = rows["closed_loop"]
+    rows["closed_loop_with_slope"] = (with_slope(closed, slope), states, inputs, outputs)
     systems = {
         name: dict(zip("ABCD", matrices, strict=True))
         | {"states": _names(states), "inputs": _names(inputs), "outputs": _names(outputs)}
@@ -171,10 +166,34 @@ def _content(design: Design) -> dict[str, Any]:
         **systems,
         "string": string_matrices,
         "slope": slope,
-        "kp": float(kp),
-        "ki": float(ki),
+        "kp": float(design.top_drive.gains()[0]),
+        "ki": float(design.top_drive.gains()[1]),
         "design": design.name,
     }
+
+
+Row = tuple[StateMatrices, list[str], tuple[str, ...], tuple[str, ...]]
+"""Matrices of a system, its states, inputs and outputs."""
+
+
+def _of_gains(design: Design) -> dict[str, Row]:
+    """Loops of a drive that two gains tell."""
+    kp, ki = design.top_drive.gains()
+    states = state_names(design.string.nodes, ki)
+    opened = open_loop_matrices(design.string, kp, ki)
+    closed = closed_loop_matrices(design.string, kp, ki)
+    return {
+        "open_loop": (opened, states, ("speed_error", "bit_torque"), LOOP_OUTPUTS),
+        "closed_loop": (closed, states, ("set_speed", "bit_torque"), LOOP_OUTPUTS),
+    }
+
+
+def _of_any(design: Design) -> dict[str, Row]:
+    """The loop of a drive with filters, lags or torque feedback; it is not cut open."""
+    system = closed_loop(design)
+    matrices = StateMatrices(*(np.asarray(x) for x in (system.A, system.B, system.C, system.D)))
+    signals = ("set_speed", "bit_torque"), LOOP_OUTPUTS
+    return {"closed_loop": (matrices, list(system.state_labels), *signals)}
 
 
 def _names(names: tuple[str, ...] | list[str]) -> NDArray[np.str_]:

@@ -88,6 +88,8 @@ def drive_impedance(
     parts = design.string.parts
     impedance = design.top_drive.impedance(s) + s * parts.top_inertia + parts.top_damping
     if label is None:
-        kp, ki = design.top_drive.gains()
-        label = f"{design.tables.controller.law}, Kp {kp:.4g}, Ki {ki:.4g}"
+        label = design.tables.controller.law
+        if design.simple_drive:
+            kp, ki = design.top_drive.gains()
+            label += f", Kp {kp:.4g}, Ki {ki:.4g}"
     return DriveImpedance(frequency, impedance, pipe_impedance(design.string), label)

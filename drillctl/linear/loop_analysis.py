@@ -15,9 +15,13 @@ from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_margins import Margins, margins
+from drillctl.linear.loop_model import model_poles
 from drillctl.linear.loop_poles import loop_poles
 from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
 from drillctl.linear.slope_margin import slope_margin
+from drillctl.linear.weight_path import BitSide, weight_path
+from drillctl.linear.whole_margins import weight_delay_margin, whole_crossings
+from drillctl.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,6 +31,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
+ROUNDING = 1e-11
+"""Real part of a pole over the largest pole that is rounding."""
 SPEEDS = np.geomspace(1e-3, 20.0, 401)
 """Speeds at which a critical one is looked for, over the set speed."""
 WEIGHTS = np.geomspace(1e-3, 20.0, 201)
@@ -43,16 +49,23 @@ class LoopAnalysis:
         The rig.
     operating_point : OperatingPoint
         Steady drilling about which the loop is linear.
+    stable : bool
+        Whether the equilibrium is stable: the slope is under its margin. Not read from the poles:
+        of an undamped string the damping of the highest modes is below their rounding.
     poles : ndarray of complex, shape (states,)
         Of the loop with the slope of the rock (1/s), by magnitude.
     slope_margin : float
-        D*: falling slope that the loop tolerates (N m s/rad).
+        D*: falling slope that the loop tolerates (N m s/rad); NaN where it is not stable even
+        without slope, infinite where it tolerates any.
     deciding_frequency_hz : float
         Frequency of the poles that decide it (Hz); 0 for a real pole.
     continuum_slope_margin : float or None
         D* of the exact continuum, as far as its lowest modes; None where it has none.
     margins : Margins or None
         Broken at the top torque; None for a loop that is not stable.
+    weight_delay_margin : float or None
+        Further delay of a moving weight on bit that the loop bears (s), infinite if any; None
+        without one, or for a loop that is not stable.
     critical_speed : float or None
         Speed nearest to the set speed at which stability changes (rad/s).
     critical_weight_on_bit : float or None
@@ -62,22 +75,20 @@ class LoopAnalysis:
 
     design: Design
     operating_point: OperatingPoint
+    stable: bool
     poles: ComplexArray
     slope_margin: float
     deciding_frequency_hz: float
     continuum_slope_margin: float | None
     margins: Margins | None
+    weight_delay_margin: float | None
     critical_speed: float | None
     critical_weight_on_bit: float | None
 
     @property
-    def stable(self) -> bool:
-        """Whether the equilibrium is stable: the slope is under its margin.
-
-        Not read from the poles: of an undamped string the damping of the highest modes is
-        below their rounding.
-        """
-        return self.operating_point.slope < self.slope_margin
+    def bit_side(self) -> BitSide:
+        """What closes the loop at the bit; a weight that moves at once is in the slope."""
+        return _bit_side(self.design, self.operating_point)
 
     @property
     def spectral_abscissa(self) -> float:
@@ -97,8 +108,8 @@ class LoopAnalysis:
             "stable": self.stable,
             "spectral_abscissa": self.spectral_abscissa,
             "slope": self.operating_point.slope,
-            "slope_margin": self.slope_margin,
-            "deciding_frequency_hz": self.deciding_frequency_hz,
+            "slope_margin": _finite(self.slope_margin),
+            "deciding_frequency_hz": _finite(self.deciding_frequency_hz),
             "disk_margin": None
             if found is None
             else {"gain_db": _finite(found.gain_db), "phase_deg": found.phase_deg},
@@ -108,6 +119,7 @@ class LoopAnalysis:
             if found is None
             else {name: _finite(value) for name, value in asdict(found).items()},
             "continuum_slope_margin": self.continuum_slope_margin,
+            "weight_delay_margin": _finite(self.weight_delay_margin),
             "critical_speed": self.critical_speed,
             "critical_weight_on_bit": self.critical_weight_on_bit,
             "operating_speed": self.operating_point.speed,
@@ -160,6 +172,13 @@ def loop(design: Design) -> LoopAnalysis:
         There is no steady drilling: the drive cannot turn the bit.
     """
     point = operating_point(design)
+    if design.simple_drive and not isinstance(design.weight_on_bit, PATHS):
+        return _of_gains(design, point)
+    return _of_any(design, point)
+
+
+def _of_gains(design: Design, point: OperatingPoint) -> LoopAnalysis:
+    """A drive that two gains tell, and a weight that acts at once, in the slope already."""
     kp, ki = design.top_drive.gains()
     ends = ends_of(design.string)
     tolerated, omega = slope_margin(ends, kp, ki)
@@ -168,14 +187,82 @@ def loop(design: Design) -> LoopAnalysis:
     return LoopAnalysis(
         design=design,
         operating_point=point,
+        stable=stable,
         poles=poles,
         slope_margin=tolerated,
         deciding_frequency_hz=omega / (2.0 * math.pi),
         continuum_slope_margin=_continuum(design, kp, ki),
-        margins=margins(ends, design.top_drive, point.slope, poles) if stable else None,
+        margins=margins(ends, design.top_drive, BitSide(point.slope), poles) if stable else None,
+        weight_delay_margin=_delay_margin(design, point) if stable else None,
         critical_speed=critical_speed(design, tolerated),
         critical_weight_on_bit=critical_weight_on_bit(design, tolerated),
     )
+
+
+def _of_any(design: Design, point: OperatingPoint) -> LoopAnalysis:
+    """Any drive and any moving weight; what takes gains alone is left out."""
+    ends = ends_of(design.string)
+    bit = _bit_side(design, point)
+    poles = model_poles(design, bit)
+    tolerated, omega = tolerated_slope(design, point.speed)
+    stable = bool(point.slope < tolerated)
+    return LoopAnalysis(
+        design=design,
+        operating_point=point,
+        stable=stable,
+        poles=poles,
+        slope_margin=tolerated,
+        deciding_frequency_hz=omega / (2.0 * math.pi),
+        continuum_slope_margin=None,
+        margins=margins(ends, design.top_drive, bit, poles) if stable else None,
+        weight_delay_margin=_delay_margin(design, point) if stable else None,
+        critical_speed=None,
+        critical_weight_on_bit=None,
+    )
+
+
+def _bit_side(design: Design, point: OperatingPoint) -> BitSide:
+    if not isinstance(design.weight_on_bit, PATHS):
+        return BitSide(point.slope)
+    return BitSide(point.slope, weight_path(design, point.speed))
+
+
+def tolerated_slope(design: Design, speed: float) -> tuple[float, float]:
+    """Slope margin of any loop about steady drilling at a speed (rad/s).
+
+    Returns
+    -------
+    slope : float
+        D* (N m s/rad) on the scale of the slope at constant weight, unless the weight moves at
+        once; NaN for a loop that is not stable without slope, infinite for one that bears any.
+    omega : float
+        Angular frequency of the poles that decide (rad/s).
+    """
+    ends = ends_of(design.string)
+    at_once = not isinstance(design.weight_on_bit, PATHS)
+    if design.simple_drive and at_once:
+        return slope_margin(ends, *design.top_drive.gains())
+    # A weight that moves at once is in the slope, not in the margin.
+    bit = BitSide(0.0, None if at_once else weight_path(design, speed))
+    poles = model_poles(design, bit)
+    if poles.real.max() >= ROUNDING * np.abs(poles).max():
+        return math.nan, math.nan
+    found = whole_crossings(ends, design.top_drive, bit)
+    over = np.flatnonzero(found.slope > 0.0)
+    if len(over) == 0:
+        return math.inf, math.nan
+    return float(found.slope[over[0]]), float(found.omega[over[0]])
+
+
+def _delay_margin(design: Design, point: OperatingPoint) -> float | None:
+    """Further delay of the moving weight that the loop bears (s); None without one."""
+    path = weight_path(design, point.speed)
+    if path is None:
+        return None
+    held = point.slope
+    if design.weight_on_bit.moves:  # its part in the slope is the path's here
+        held += path.gain
+    return weight_delay_margin(ends_of(design.string), design.top_drive, BitSide(held, path))[0]
 
 
 def _continuum(design: Design, kp: float, ki: float) -> float | None:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.linear.ends import Ends, telling_grid
+from drillctl.linear.weight_path import BitSide
 from drillctl.top_drive import TopDriveLaw
 
 Array = NDArray[np.float64]
@@ -69,7 +70,7 @@ class Margins:
     delay_hz: float | None
 
 
-def margins(ends: Ends, drive: TopDriveLaw, slope: float, poles: ComplexArray) -> Margins:
+def margins(ends: Ends, drive: TopDriveLaw, bit: BitSide, poles: ComplexArray) -> Margins:
     """Margins of a loop that is stable.
 
     Parameters
@@ -78,12 +79,12 @@ def margins(ends: Ends, drive: TopDriveLaw, slope: float, poles: ComplexArray) -
         The string.
     drive : TopDriveLaw
         Linearised law of the drive.
-    slope : float
-        Falling slope of the rock (N m s/rad), under the slope margin.
+    bit : BitSide
+        Slope of the rock, under the slope margin, and the moving weight.
     poles : ndarray of complex
         Of the loop (1/s), so that no peak is stepped over.
     """
-    loop = _Loop(ends, drive, slope)
+    loop = _Loop(ends, drive, bit)
     grid = pole_grid(ends, poles)
     peak, peak_at = _largest(lambda w: np.abs(loop.sensitivity(w)), grid)
     balance, disk_at = _largest(lambda w: np.abs(loop.balance(w)), grid)
@@ -144,12 +145,12 @@ def _around(poles: ComplexArray, sides: Array, within: Array) -> Array:
 class _Loop:
     """Sensitivities of one loop at angular frequencies (rad/s)."""
 
-    def __init__(self, ends: Ends, drive: TopDriveLaw, slope: float) -> None:
-        self.ends, self.drive, self.slope = ends, drive, slope
+    def __init__(self, ends: Ends, drive: TopDriveLaw, bit: BitSide) -> None:
+        self.ends, self.drive, self.bit = ends, drive, bit
 
     def impedances(self, omega: Array) -> tuple[ComplexArray, ComplexArray]:
         s = 1j * omega
-        return self.ends.top_impedance(s, -self.slope), self.drive.impedance(s)
+        return self.bit.top_impedance(self.ends, s), self.drive.impedance(s)
 
     def sensitivity(self, omega: Array) -> ComplexArray:
         string, drive = self.impedances(omega)

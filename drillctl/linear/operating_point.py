@@ -13,6 +13,7 @@ from drillctl.bit_rock import contact
 from drillctl.bit_rock.contact import by_weight
 from drillctl.design import Design
 from drillctl.errors import InputError
+from drillctl.weight_on_bit import PATHS, AlarmWeight
 
 Array = NDArray[np.float64]
 
@@ -116,7 +117,7 @@ def _folds(design: Design, speeds: Array, surplus: Array) -> list[tuple[float, f
 
 def at_speed(design: Design, speed: float) -> OperatingPoint:
     """Torque and slope of the rock at a speed (rad/s), be it steady or not."""
-    torque, slope = _rock(design, speed)
+    torque, slope = rock_at(design.bit_rock, design.weight_on_bit, speed)
     return OperatingPoint(speed, float(torque), -float(slope))
 
 
@@ -143,14 +144,35 @@ def cancelling_weight_gain(design: Design) -> float:
     return float(-slope / by_weight(moving.bit_rock, weight, point.speed, np.exp))
 
 
-def _rock(design: Design, speed: float | Array) -> tuple[Any, Any]:
-    return contact(design.bit_rock, design.weight_on_bit, speed, np.exp)
+def rock_at(friction: Any, weight: Any, speed: Any) -> tuple[Any, Any]:
+    """Torque of the rock and its slope in steady motion.
+
+    Parameters
+    ----------
+    friction, weight : NamedTuple
+        Laws with numbers, or arrays of them.
+    speed : float or ndarray
+        Of the bit, not negative (rad/s).
+
+    Returns
+    -------
+    torque, slope
+        N m and N m s/rad. The slope counts a weight that moves at once with the bit; one that
+        comes late it holds constant: see `weight_path`.
+    """
+    if not isinstance(weight, PATHS):
+        return contact(friction, weight, speed, np.exp)
+    steady = weight.nominal + 0.0 * speed
+    if not isinstance(weight, AlarmWeight):
+        steady = weight.command(speed, weight.nominal)
+    return friction.torque_and_slope(steady, speed, np.exp)
 
 
 def _surplus(design: Design, speed: float | Array) -> Any:
     """Torque (N m) that drive gives beyond what rock and drag take at a steady speed."""
     drag = float(design.string.ground_damping.sum()) * speed
-    return design.top_drive.torque(0.0, speed - design.speed) - drag - _rock(design, speed)[0]
+    rock, _ = rock_at(design.bit_rock, design.weight_on_bit, speed)
+    return design.top_drive.torque(0.0, speed - design.speed) - drag - rock
 
 
 def _zero(design: Design, low: float, high: float) -> float:

@@ -15,6 +15,7 @@ from drillctl.linear.counting import natural_frequencies
 from drillctl.linear.ends import Route, ends_of
 from drillctl.linear.state_space import INPUTS, LOOP_OUTPUTS, OUTPUTS
 from drillctl.linear.transmission import EndMobility
+from drillctl.linear.weight_path import WeightPath
 
 if TYPE_CHECKING:
     import control
@@ -149,6 +150,7 @@ def frequency_response(
     loop: Loop = "plant",
     model: Route = "finite-elements",
     slope: float = 0.0,
+    path: WeightPath | None = None,
 ) -> FrequencyResponse:
     """Response of the string, alone or with its drive, at given frequencies.
 
@@ -168,6 +170,8 @@ def frequency_response(
     slope : float
         Falling slope of the rock (N m s/rad) closed around the bit; `bit_torque` is then what
         acts beside it.
+    path : WeightPath, optional
+        Of a weight on bit that follows a measured bit speed, closed with it.
 
     Returns
     -------
@@ -177,7 +181,8 @@ def frequency_response(
     Raises
     ------
     InputError
-        No frequency, or one that is not finite and more than zero; unknown loop or model.
+        No frequency, or one that is not finite and more than zero; unknown loop or model; a path
+        through an observer, which acts on the top too: see `linear.loop_model`.
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     refuse_frequencies(frequency)
@@ -193,7 +198,12 @@ def frequency_response(
             raise InputError(f"a bare string has no {loop}; give a design", "loop")
         drive = drive + subject.top_drive.impedance(s)
     closed = drive if loop == "closed_loop" else 0.0
-    seen = ends_of(string, model).mobility(s, closed, -slope)
+    at_bit = -slope + 0.0 * s
+    if path is not None:
+        if path.observer is not None:
+            raise InputError("takes a measured bit speed; see drillctl.linear.loop_model", "path")
+        at_bit = at_bit + path.feedback(s).bit
+    seen = ends_of(string, model).mobility(s, closed, at_bit)
     inputs, outputs = LOOPS[loop]
     columns = _columns(seen, s)
     response = columns if loop == "plant" else _driven(columns, drive, loop)

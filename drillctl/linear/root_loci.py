@@ -11,8 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.errors import InputError
+from drillctl.linear.loop_model import model_poles
 from drillctl.linear.loop_poles import loop_poles
 from drillctl.linear.operating_point import operating_point
+from drillctl.linear.weight_path import BitSide, weight_path
+from drillctl.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     import xarray
@@ -88,9 +91,12 @@ def root_locus(design: Design, path: str, values: ArrayLike, count: int = 12) ->
 
 
 def _lowest(design: Design, count: int) -> ComplexArray:
-    kp, ki = design.top_drive.gains()
-    poles = loop_poles(design.string, kp, ki, operating_point(design).slope)
-    return poles[:count]
+    point = operating_point(design)
+    at_once = not isinstance(design.weight_on_bit, PATHS)
+    if design.simple_drive and at_once:
+        return loop_poles(design.string, *design.top_drive.gains(), point.slope)[:count]
+    path = None if at_once else weight_path(design, point.speed)
+    return model_poles(design, BitSide(point.slope, path))[:count]
 
 
 def _followed(before: ComplexArray, now: ComplexArray, width: int) -> ComplexArray:

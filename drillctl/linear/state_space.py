@@ -14,6 +14,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from drillctl.drillstring import Drillstring
+from drillctl.errors import InputError
 
 if TYPE_CHECKING:
     import control
@@ -188,6 +189,12 @@ def open_loop(design: Design) -> control.StateSpace:
         under negative feedback. States of the plant and, with integral action, `integral`
         (rad, of the speed error).
     """
+    if not design.simple_drive:
+        raise InputError(
+            "a drive that feels its own torque or has filters is not cut at the speed error; see "
+            "closed_loop",
+            "controller",
+        )
     kp, ki = design.top_drive.gains()
     inputs = ("speed_error", "bit_torque")
     return _named(
@@ -218,8 +225,10 @@ def closed_loop(design: Design) -> control.StateSpace:
         plant and `top_torque` (N m). States of the plant and, with integral action, `integral`
         (rad, of the speed error).
     """
-    kp, ki = design.top_drive.gains()
     inputs = ("set_speed", "bit_torque")
+    if not design.simple_drive:
+        return _whole_loop(design)
+    kp, ki = design.top_drive.gains()
     return _named(
         closed_loop_matrices(design.string, kp, ki),
         "closed_loop",
@@ -227,6 +236,18 @@ def closed_loop(design: Design) -> control.StateSpace:
         LOOP_OUTPUTS,
         state_names(design.string.nodes, ki),
     )
+
+
+def _whole_loop(design: Design) -> control.StateSpace:
+    """The loop of a drive with filters and lags; its states beyond the string are numbered."""
+    from drillctl.linear.loop_model import loop_model
+    from drillctl.linear.weight_path import BitSide
+
+    matrices = loop_model(design, BitSide(0.0))
+    strings = _string_states(design.string.nodes)
+    others = [f"drive_{i}" for i in range(1, len(matrices.a) - len(strings) + 1)]
+    inputs = ("set_speed", "bit_torque")
+    return _named(matrices, "closed_loop", inputs, LOOP_OUTPUTS, [*strings, *others])
 
 
 def _string_states(nodes: int) -> list[str]:

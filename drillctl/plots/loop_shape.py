@@ -223,14 +223,15 @@ def _loop(result: FrequencyResponse, analysis: LoopAnalysis | None) -> ComplexAr
         raise InputError("the drive does not react to speed: there is no loop to look at")
     if analysis is not None:
         first = int(np.argmin(result.frequency_hz))
-        slope = analysis.operating_point.slope
-        frequency = result.frequency_hz[first]
-        own = frequency_response(analysis.design, frequency, "open_loop", slope=slope)
+        bit, frequency = analysis.bit_side, result.frequency_hz[first]
+        own = frequency_response(
+            analysis.design, frequency, "open_loop", slope=bit.slope, path=bit.path
+        )
         expected = own.between("speed_error", "top_speed")[0]
         # Elements and continuum agree at the lowest frequency; other gains or slopes do not.
         if abs(loop[first] - expected) > 1e-2 * abs(expected):
             raise InputError(
-                f"the response is not that of the analysed loop, whose slope is {slope:.6g} "
+                f"the response is not that of the analysed loop, whose slope is {bit.slope:.6g} "
                 f"N m s/rad: L is {loop[first]:.4g} at {frequency:.3g} Hz, not {expected:.4g}",
                 "analysis",
             )
@@ -334,7 +335,7 @@ def _times(count: int) -> str:
 
 def _turns(loop: ComplexArray, analysis: LoopAnalysis | None) -> str:
     """Growing poles and turns about -1; empty unless curve and poles tell the same."""
-    if analysis is None:
+    if analysis is None or not analysis.design.simple_drive or analysis.bit_side.path is not None:
         return ""
     design = analysis.design
     free = loop_poles(design.string, 0.0, 0.0, analysis.operating_point.slope)

@@ -15,10 +15,10 @@ from drillctl.linear.counting import natural_frequencies
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_margins import peak_sensitivities
 from drillctl.linear.loop_poles import many_loop_poles
-from drillctl.linear.slope_margin import slope_margins
 from drillctl.progress import SILENT, Progress
 from drillctl.studies.grid import Axis, Group, axes_of, groups, shape_of
-from drillctl.studies.steady import gains_of, steady_drilling
+from drillctl.studies.steady import gains_of, slopes_tolerated, steady_drilling
+from drillctl.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -157,11 +157,9 @@ def _figures(
     design: Design, axes: tuple[Axis, ...], group: Group, wanted: set[str]
 ) -> dict[str, Array]:
     """Each wanted figure of the cells that share a string."""
-    lanes, string = group.lanes, group.design.string
-    kp, ki = gains_of(lanes)
-    slope = steady_drilling(design, axes, group).slope
-    ends = ends_of(string)
-    margin = slope_margins(ends, kp, ki)
+    drilling = steady_drilling(design, axes, group)
+    slope = drilling.slope
+    margin = slopes_tolerated(design, axes, group, drilling.speed)
     steady = np.isfinite(slope)
     found = {
         "slope": slope,
@@ -169,16 +167,23 @@ def _figures(
         "deciding_frequency": np.where(steady, margin.omega / (2.0 * np.pi), np.nan),
     }
     if wanted & {"spectral_abscissa", "low_damping", "peak_sensitivity"}:
-        found |= _of_poles(group, kp, ki, slope, slope < margin.slope, wanted)
+        found |= _of_poles(group, slope, slope < margin.slope, wanted)
     return found
 
 
 def _of_poles(
-    group: Group, kp: Array, ki: Array, slope: Array, stable: NDArray[np.bool_], wanted: set[str]
+    group: Group, slope: Array, stable: NDArray[np.bool_], wanted: set[str]
 ) -> dict[str, Array]:
     import numba
 
+    if not group.design.simple_drive or isinstance(group.lanes.weight, PATHS):
+        raise InputError(
+            "maps of poles take an ideal drive and a weight that acts at once; slope_margin is "
+            "mapped for all",
+            "quantities",
+        )
     string = group.design.string
+    kp, ki = gains_of(group.lanes)
     steady = np.isfinite(slope)
     poles = many_loop_poles(
         string, kp, ki, np.where(steady, slope, 0.0), threads=numba.get_num_threads()

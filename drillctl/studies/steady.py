@@ -7,12 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.bit_rock import contact
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.operating_point import operating_point
+from drillctl.linear.ends import ends_of
+from drillctl.linear.loop_analysis import tolerated_slope
+from drillctl.linear.operating_point import operating_point, rock_at
+from drillctl.linear.slope_margin import SlopeMargins, slope_margins
 from drillctl.simulation.lanes import Lanes
 from drillctl.studies.grid import Axis, Group, cell_design
+from drillctl.weight_on_bit import PATHS
 
 Array = NDArray[np.float64]
 
@@ -58,8 +61,26 @@ def steady_drilling(design: Design, axes: tuple[Axis, ...], group: Group) -> Ste
             speed[lane] = operating_point(cell).speed
         except InputError:  # there is none
             speed[lane] = np.nan
-    _, slope = contact(lanes.friction, lanes.weight, speed, np.exp)
+    _, slope = rock_at(lanes.friction, lanes.weight, speed)
     return Steady(speed, np.where(np.isnan(speed), np.nan, -slope))
+
+
+def slopes_tolerated(
+    design: Design, axes: tuple[Axis, ...], group: Group, speed: Array
+) -> SlopeMargins:
+    """Slope margins of the cells of a group that drill steadily at `speed`, shape (lanes,).
+
+    All at once where two gains tell the loop, one by one for other drives and for a weight that
+    comes late.
+    """
+    lanes = group.lanes
+    if group.design.simple_drive and not isinstance(lanes.weight, PATHS):
+        return slope_margins(ends_of(group.design.string), *gains_of(lanes))
+    slope, omega = np.full((2, len(lanes)), np.nan)
+    for lane in np.flatnonzero(np.isfinite(speed)):
+        cell = cell_design(design, axes, int(group.cells[lane]))
+        slope[lane], omega[lane] = tolerated_slope(cell, float(speed[lane]))
+    return SlopeMargins(slope, omega)
 
 
 def gains_of(lanes: Lanes) -> tuple[Array, Array]:

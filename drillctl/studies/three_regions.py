@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.ends import ends_of
-from drillctl.linear.slope_margin import slope_margins
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.measures import NARROW_BAND, WINDOW
 from drillctl.studies.attraction import (
@@ -28,7 +26,7 @@ from drillctl.studies.attraction import (
     long_runs,
 )
 from drillctl.studies.grid import Axis, Group, axes_of, groups, shape_of
-from drillctl.studies.steady import gains_of, steady_drilling
+from drillctl.studies.steady import slopes_tolerated, steady_drilling
 from drillctl.studies.sweeps import sweep
 
 if TYPE_CHECKING:
@@ -287,7 +285,7 @@ def _fill(
     """Put the linear answer and the long runs of a group into the flat arrays."""
     cells = group.cells
     steady = steady_drilling(design, axes, group)
-    margin = slope_margins(ends_of(group.design.string), *gains_of(group.lanes))
+    margin = slopes_tolerated(design, axes, group, steady.speed)
     fields["reference_speed"][cells] = steady.speed
     fields["slope"][cells] = steady.slope
     fields["slope_margin"][cells] = margin.slope

@@ -1,0 +1,215 @@
+"""The whole linear loop of any design in state space: string, drive, rock and moving weight.
+
+The equations are those of the physics rooms, written once there; with limits away they are
+linear, and each column of the state matrix is their answer to one unit of state.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.linear.state_space import StateMatrices, plant_matrices
+from drillctl.linear.weight_path import BitSide, WeightPath
+from drillctl.top_drive import RealDrive, SampledDrive
+from drillctl.top_drive.motion import MEMORY, respond
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+PADE = 6
+"""Order of the rational function that stands for the delay of a weight path."""
+HELD_PADE = 3
+"""The same for the mean delay of a sampled controller, which is short."""
+
+
+@dataclass(frozen=True, eq=False)
+class Delay:
+    """x' = a x + b u, y = c x: a delay as a strictly proper rational function.
+
+    Attributes
+    ----------
+    a, b, c : ndarray
+        Matrices, (order, order), (order,), (order,).
+    """
+
+    a: Array
+    b: Array
+    c: Array
+
+
+def pade(delay: float, order: int) -> Delay:
+    """The Pade approximation of a delay (s) with a numerator of one order less.
+
+    Strictly proper, so that no torque acts on itself at once.
+    """
+    n, m = order, order - 1
+
+    # Of exp(-x), numerator of degree m, denominator of degree n, lowest power first.
+    def weights(k: int, first: int, second: int) -> float:
+        top = math.factorial(first + second - k) * math.factorial(first)
+        bottom = math.factorial(first + second) * math.factorial(k) * math.factorial(first - k)
+        return top / bottom
+
+    numerator = [(-1) ** k * weights(k, m, n) * delay**k for k in range(m + 1)]
+    denominator = [weights(k, n, m) * delay**k for k in range(n + 1)]
+    lead = denominator[-1]
+    a = np.eye(n, k=1)
+    a[-1] = -np.array(denominator[:-1]) / lead
+    b = np.zeros(n)
+    b[-1] = 1.0
+    c = np.zeros(n)
+    c[: m + 1] = np.array(numerator) / lead
+    return Delay(a, b, c)
+
+
+class _Drive:
+    """A drive without its limits: torque and rates from its states, linear."""
+
+    def __init__(self, law: Any, gain: float) -> None:
+        self.gain = gain
+        self.held: Delay | None = None
+        kp, ki = law.gains()
+        if isinstance(law, (RealDrive, SampledDrive)):
+            numbers = {name: getattr(law, name) for name in RealDrive._fields}
+            free = {"least": -math.inf, "most": math.inf, "power": math.inf, "rate": math.inf}
+            self.law = RealDrive(**(numbers | free | {"feedforward": 0.0, "tracking": 0.0}))
+            if isinstance(law, SampledDrive):
+                self.held = pade((0.5 + law.late) * law.period, HELD_PADE)
+        else:
+            self.law = RealDrive(
+                0.0, kp, ki, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+                -math.inf, math.inf, math.inf, math.inf, 0.0,
+            )  # fmt: skip
+
+    @property
+    def states(self) -> int:
+        return len(MEMORY) + (0 if self.held is None else len(self.held.b))
+
+    def respond(self, memory: Array, speed: float, lead: float, free: float) -> tuple[float, Array]:
+        own, waiting = memory[: len(MEMORY)], memory[len(MEMORY) :]
+        if self.held is None:
+            return respond(self.law, own, speed, lead, 0.0, (free, self.gain))
+        # What is given out has waited; the motor follows that, with its own lag if it has one.
+        given = float(self.held.c @ waiting)
+        torque = float(own[4]) if self.law.lag > 0.0 else given
+        # A controller that acts on a torque known to it: its motor is a state.
+        known = self.law._replace(lag=max(self.law.lag, 1.0))
+        _, rates = respond(known, np.array([*own[:4], torque]), speed, lead, 0.0, (free, self.gain))
+        command = rates[4] * known.lag + torque
+        rates[4] = (given - torque) / self.law.lag if self.law.lag > 0.0 else 0.0
+        return torque, np.concatenate([rates, self.held.a @ waiting + self.held.b * command])
+
+
+class _Weight:
+    """The path of a moving weight: its torque and rates from its states, linear."""
+
+    def __init__(self, path: WeightPath | None) -> None:
+        self.path = path
+        self.delay: Delay | None = None
+        if path is not None and path.delay > 0.0:
+            self.delay = pade(path.delay, PADE)
+
+    @property
+    def states(self) -> int:
+        if self.path is None:
+            return 0
+        sensor = 1 if self.path.observer is None else self.path.observer.states
+        return sensor + (0 if self.delay is None else PADE) + 1
+
+    def respond(self, memory: Array, bit: float, top: float, torque: float) -> tuple[float, Array]:
+        """Torque of the rock by the weight (N m), and rates."""
+        if self.path is None:
+            return 0.0, memory
+        path, observer = self.path, self.path.observer
+        first = 1 if observer is None else observer.states
+        signal_rates = np.zeros(first)
+        if observer is not None:
+            own = memory[:first]
+            signal = float(observer.read @ own)
+            signal_rates = observer.free @ own
+            signal_rates += observer.by_torque * torque + observer.by_speed * top
+        elif path.sensor > 0.0:
+            signal = float(memory[0])
+            signal_rates[0] = (bit - signal) / path.sensor
+        else:
+            signal = bit
+        waiting, hoisted = memory[first:-1], float(memory[-1])
+        seen, waits = signal, np.zeros(0)
+        if self.delay is not None:
+            seen = float(self.delay.c @ waiting)
+            waits = self.delay.a @ waiting + self.delay.b * signal
+        if path.hoist == 0.0:
+            return path.gain * seen, np.array([*signal_rates, *waits, 0.0])
+        moved = (seen - hoisted) / path.hoist
+        return path.gain * hoisted, np.array([*signal_rates, *waits, moved])
+
+
+def loop_model(design: Design, bit: BitSide) -> StateMatrices:
+    """The loop of a design in state space.
+
+    Parameters
+    ----------
+    design : Design
+        Any drive and weight law, without its limits. Delays are rational approximations of order
+        `PADE`; a sampled controller counts as its mean delay.
+    bit : BitSide
+        What closes the loop at the bit; `BitSide(0.0)` leaves it open.
+
+    Returns
+    -------
+    StateMatrices
+        Inputs: change of the set speed (rad/s), further torque on the bit (N m, braking). Outputs
+        as in `state_space.LOOP_OUTPUTS`. States that nothing depends on are left out.
+    """
+    plant = plant_matrices(design.string)
+    size = len(plant.a)
+    top, bit_row = plant.c[0], plant.c[1]
+    drive = _Drive(design.top_drive, float(top @ plant.b[:, 0]))
+    weight = _Weight(bit.path)
+    ends = np.cumsum([size, drive.states, weight.states])
+
+    def answer(state: Array, lead: float, load: float) -> tuple[Array, Array]:
+        x, memory, path = np.split(state, ends[:2])
+        speed, turning = float(top @ x), float(bit_row @ x)
+        # The torque of the top reaches an observer after that of the rock is known.
+        by_weight, _ = weight.respond(path, turning, speed, 0.0)
+        rock = load - bit.slope * turning + by_weight
+        free = float(top @ (plant.a @ x + plant.b[:, 1] * rock))
+        torque, drive_rates = drive.respond(memory, speed, lead, free)
+        _, weight_rates = weight.respond(path, turning, speed, torque)
+        rates = plant.a @ x + plant.b @ np.array([torque, rock])
+        outputs = np.array([*(plant.c @ x), torque])
+        return np.concatenate([rates, drive_rates, weight_rates]), outputs
+
+    total = int(ends[-1])
+    zero = np.zeros(total)
+    columns = [answer(unit, 0.0, 0.0) for unit in np.eye(total)]
+    inputs = [answer(zero, 1.0, 0.0), answer(zero, 0.0, 1.0)]
+    return _seen_only(StateMatrices(
+        np.column_stack([rates for rates, _ in columns]),
+        np.column_stack([rates for rates, _ in inputs]),
+        np.column_stack([outputs for _, outputs in columns]),
+        np.column_stack([outputs for _, outputs in inputs]),
+    ))  # fmt: skip
+
+
+def _seen_only(matrices: StateMatrices) -> StateMatrices:
+    """Without the states that act on nothing but themselves and on no output."""
+    a, b, c, d = matrices
+    others = a - np.diag(np.diag(a))
+    kept = np.flatnonzero(np.any(others != 0.0, axis=0) | np.any(c != 0.0, axis=0))
+    if len(kept) == len(a):
+        return matrices
+    return _seen_only(StateMatrices(a[np.ix_(kept, kept)], b[kept], c[:, kept], d))
+
+
+def model_poles(design: Design, bit: BitSide) -> ComplexArray:
+    """Poles of the loop (1/s), by magnitude."""
+    poles = np.linalg.eigvals(loop_model(design, bit).a)
+    return np.asarray(poles[np.argsort(np.abs(poles), kind="stable")])
