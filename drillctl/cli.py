@@ -104,9 +104,13 @@ def common(
 
 
 def _load(name: str, sets: list[str] | None) -> Design:
+    from drillctl import console
     from drillctl.design import load, parse_setting
 
-    return load(name, **dict(parse_setting(text) for text in sets or []))
+    found = load(name, **dict(parse_setting(text) for text in sets or []))
+    for warning in found.warnings:
+        console.note(f"warning: {warning}")
+    return found
 
 
 def _shelf(shelf: Literal["models", "designs"], as_json: bool) -> None:

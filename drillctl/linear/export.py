@@ -118,8 +118,8 @@ def write_matrices(design: Design, path: str | Path) -> Path:
         The file. It holds `plant`, `open_loop` (of an ideal drive) and `closed_loop` as A, B,
         C, D (the last also with the slope of the rock, `closed_loop_with_slope`), M, C and K of
         the string, the slope (N m s/rad), names of states, inputs and outputs. SI units,
-        radians. In `.mat` each system is a struct, so that `ss(plant.A, plant.B, plant.C, plant.D)` is the plant;
-        in `.npz` names are joined by a dot, as in `plant.A`.
+        radians. In `.mat` each system is a struct, so that `ss(plant.A, plant.B, plant.C,
+        plant.D)` is the plant; in `.npz` names are joined by a dot, as in `plant.A`.
 
     Raises
     ------
