@@ -21,8 +21,14 @@ from drillctl.bit_rock import (
     tabulated,
 )
 from drillctl.linear import tuning
-from drillctl.top_drive import PI, ConstantTorque
-from drillctl.weight_on_bit import ConstantWeight, FollowingSpeed
+from drillctl.top_drive import PI, ConstantTorque, RealDrive, SampledDrive
+from drillctl.weight_on_bit import (
+    AlarmWeight,
+    ConstantWeight,
+    FollowingSpeed,
+    ObservedWeight,
+    RealWeight,
+)
 
 HERE = Path(__file__).resolve().parent
 
@@ -43,16 +49,34 @@ BIT_ROCK = (
 DRIVES = (
     (PI, '`law = "pi"` (kp, ki)', "Speed control as in the paper."),
     (ConstantTorque, '`law = "constant-torque"` (torque)', "A drive at its torque limit."),
-)
+    (RealDrive, '`[controller.drive]` around any law (torque_limit, minimum_torque, power_limit, '
+     'torque_rate_limit, lag, encoder_lag, torque_lag, anti_windup, tracking_time), and '
+     '`law = "z-torque"`, `"torsional-rectification"`, `"active-damping"` with or without it',
+     "Where limits are met, where filters cost damping, and wherever the drive feels a torque."),
+    (SampledDrive, '`[controller.drive]` with `sampling_period` (10 ms is usual) and '
+     '`one_sample_delay`', "For what a digital drive does to fast modes."),
+)  # fmt: skip
 TUNED = (
     (tuning.stiff_speed, '`law = "stiff-speed"` (stiffness, rate)', "A PI; reflects all waves."),
     (tuning.soft_torque, '`law = "soft-torque"` (share)', "A PI; takes waves at the stick-slip "
      "frequency."),
+    (tuning.z_torque, '`law = "z-torque"` (absorption, high_pass, stiffness, rate)',
+     "Impedance matching; takes waves of all frequencies above the high-pass."),
+    (tuning.torsional_rectification, '`law = "torsional-rectification"` (high_pass, stiffness, '
+     'rate)', "The ideal limit of impedance matching."),
+    (tuning.active_damping, '`law = "active-damping"` (spring, damper, stiffness, rate)',
+     "Damping of the lowest modes through the motor torque."),
 )  # fmt: skip
 WEIGHTS = (
     (ConstantWeight, '`law = "constant"`', "The default."),
     (FollowingSpeed, '`law = "navarro-lopez-suarez"` (gain, minimum, maximum)',
      "What dynamic weight on bit could do at best: no delay, no hoist."),
+    (RealWeight, '`law = "navarro-lopez-suarez"` with `[weight_on_bit.path]` (delay, '
+     'sampling_period, sensor_lag, hoist_lag, rate_limit)', "What it can do on a rig."),
+    (ObservedWeight, '`law = "surface-observer"` (gain, minimum, maximum, observer_modes) with '
+     '`[weight_on_bit.path]`', "Where nothing is sent up from the bit."),
+    (AlarmWeight, '`law = "stick-slip-alarm"` (alarm, calm, reduction, window, minimum) with '
+     '`[weight_on_bit.path]`', "What a driller does by hand."),
 )  # fmt: skip
 
 
@@ -87,10 +111,13 @@ def page() -> str:
         ("Bit-rock laws", "Torque T (N m) on a bit that turns at speed w (rad/s) under the weight "
          "W (N). Positive torque brakes. *Set-valued* laws hold a bit at rest; smooth ones let it "
          "creep.\n\n![Torque over speed](laws.png)", BIT_ROCK),
-        ("Top-drive laws", "Torque (N m) of the drive from the speed of its own inertia.", DRIVES),
-        ("Top drives tuned to the string", "A PI whose gains follow from pipe impedance, drive "
+        ("Top-drive laws", "Torque (N m) of the drive from the speed of its own inertia. All of them are "
+         "published laws but for the tuning rule of active damping.\n\n"
+         "![Impedance and reflection of six drives](drives.png)", DRIVES),
+        ("Top drives tuned to the string", "Numbers that follow from pipe impedance, drive "
          "inertia and the lowest frequency of the string.", TUNED),
-        ("Weight-on-bit laws", "Weight W (N) on a bit that turns at speed w (rad/s).", WEIGHTS),
+        ("Weight-on-bit laws", "Weight W (N) on a bit that turns at speed w (rad/s).\n\n"
+         "![Weight against a bit speed that falls to zero](weights.png)", WEIGHTS),
     )  # fmt: skip
     parts = ["# Laws", "Every law of rock, drive and weight: its equation, symbols, source and "
              "how a design names it. Made from the docstrings by `docs/make_laws.py`."]  # fmt: skip
@@ -127,6 +154,66 @@ def picture(path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
+SIX = {
+    "PI, Kp 625, Ki 125": {"law": "pi", "kp": 625.0, "ki": 125.0},
+    "stiff speed control": {"law": "stiff-speed"},
+    "soft torque": {"law": "soft-torque"},
+    "Z-torque, a = 0.5": {"law": "z-torque", "absorption": 0.5},
+    "torsional rectification": {"law": "torsional-rectification"},
+    "active damping": {"law": "active-damping"},
+}
+
+
+def drives(path: Path) -> None:
+    """Impedance and reflection of six drives on the paper's string."""
+    import drillctl
+    from drillctl.linear import drive_impedance
+    from drillctl.linear.tuning import stick_slip_frequency
+
+    designs = {
+        name: drillctl.load("monteiro-trindade-100kn", controller=law) for name, law in SIX.items()
+    }
+    found = [drive_impedance(design, label=name) for name, design in designs.items()]
+    mark = stick_slip_frequency(designs["soft torque"].string) / (2.0 * np.pi)
+    drillctl.plots.drive_impedance(found, marks=(mark,)).savefig(path, dpi=110)
+
+
+def weights(path: Path) -> None:
+    """Weight of each law in one run of stick-slip, beside the bit speed."""
+    import drillctl
+    from drillctl.plots import style
+    from drillctl.units import RPM
+
+    limits = {"minimum": "42 kN", "maximum": "182 kN"}
+    following = {"law": "navarro-lopez-suarez", "gain": "2 kN*s/rad"} | limits
+    late = {"delay": "1 s", "hoist_lag": "0.5 s"}
+    laws = {
+        "ideal": following,
+        "1 s late, hoist 0.5 s": following | {"path": late},
+        "observed, hoist 0.5 s": following
+        | {"law": "surface-observer", "path": {"hoist_lag": "0.5 s"}},
+        "alarm": {"law": "stick-slip-alarm", "path": {"hoist_lag": "0.5 s"}},
+    }
+    gains = {"controller.kp": 200.0, "controller.ki": 100.0, "simulation.duration": "60 s"}
+    figure, grid = style.grid_or_new(None, len(laws), 1, 8.0, 9.0, share_x=True)
+    panels = np.ravel(grid)
+    for number, (name, law) in enumerate(laws.items()):
+        design = drillctl.load("monteiro-trindade-140kn", weight_on_bit=law, **gains)
+        run = drillctl.simulate(design, engine="batch", interval=0.05)
+        ax = panels[number]
+        ax.plot(run.time, run.signals["weight_on_bit"] / 1e3, linewidth=style.LINE,
+                color=style.COLOURS[0])  # fmt: skip
+        beside = ax.twinx()
+        beside.plot(run.time, run.signals["bit_speed"] / RPM, linewidth=1.0, color=style.COLOURS[1],
+                    linestyle=style.DASHES[1])  # fmt: skip
+        beside.set_ylabel("bit (rpm)", fontsize=style.SMALL, color=style.COLOURS[1])
+        style.dress(ax, "time (s)" if number == len(laws) - 1 else "", "WOB (kN)", name)
+        ax.set_ylim(0.0, 200.0)
+    figure.savefig(path, dpi=110)
+
+
 if __name__ == "__main__":
     (HERE / "laws.md").write_text(page(), encoding="utf-8")
     picture(HERE / "laws.png")
+    drives(HERE / "drives.png")
+    weights(HERE / "weights.png")

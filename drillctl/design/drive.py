@@ -68,16 +68,14 @@ def _controller(tables: DesignTables, string: Callable[[], Drillstring]) -> Cont
             return Controller(*soft_torque(string(), table.share))
         case StiffSpeedTable():
             return Controller(*_stiff(table, string))
-        case ZTorqueTable() | TorsionalRectificationTable():
-            from drillctl.linear.tuning import pipe_impedance
+        case ZTorqueTable():
+            from drillctl.linear.tuning import z_torque
 
-            share = table.absorption if isinstance(table, ZTorqueTable) else 1.0
-            return Controller(
-                *_stiff(table, string),
-                mobility=share / pipe_impedance(string()),
-                sensed_inertia=inertia,
-                corner=2.0 * math.pi / table.high_pass,
-            )
+            return _matched(table, string, z_torque(string(), table.absorption), inertia)
+        case TorsionalRectificationTable():
+            from drillctl.linear.tuning import torsional_rectification
+
+            return _matched(table, string, torsional_rectification(string()), inertia)
         case ActiveDampingTable():
             from drillctl.linear.tuning import active_damping
 
@@ -85,6 +83,19 @@ def _controller(tables: DesignTables, string: Callable[[], Drillstring]) -> Cont
             damper = damper if table.damper is None else table.damper
             spring = spring if table.spring is None else table.spring
             return Controller(*_stiff(table, string), mobility=1.0 / damper, corner=spring / damper)
+
+
+def _matched(
+    table: ZTorqueTable | TorsionalRectificationTable,
+    string: Callable[[], Drillstring],
+    mobility: float,
+    inertia: float,
+) -> Controller:
+    """A stiff controller that gives way to the torque of the pipe."""
+    corner = 2.0 * math.pi / table.high_pass
+    return Controller(
+        *_stiff(table, string), mobility=mobility, sensed_inertia=inertia, corner=corner
+    )
 
 
 def _stiff(

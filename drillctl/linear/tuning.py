@@ -82,6 +82,54 @@ def soft_torque(string: Drillstring, share: float = 0.25) -> tuple[float, float]
     return pipe_impedance(string) / share, stick_slip_frequency(string) ** 2 * inertia
 
 
+def z_torque(string: Drillstring, absorption: float = 1.0) -> float:
+    r"""Mobility of an impedance-matched drive (Z-torque): m = a / zeta.
+
+    The set speed of a stiff speed controller gives way to the torque that the pipe takes,
+
+    .. math:: e = \Omega - \omega - \frac{a}{\zeta} (T_p - \bar T_p), \qquad
+              T_p = T - J_d \dot\omega,
+
+    so that above the high-pass of that torque the drive looks like the resistor zeta / a, its own
+    inertia compensated, and reflects (1 - a) / (1 + a) of every wave from below. The filters of a
+    public model of it: motor lag 5 ms, encoder 2 ms, high-pass 20 s, as periods (time constant:
+    that over 2 pi).
+
+    Parameters
+    ----------
+    string : Drillstring
+        Gives pipe impedance zeta.
+    absorption : float
+        a, from 0 (stiff) to 1 (absorbs every wave).
+
+    Returns
+    -------
+    float
+        m (rad/s per N m).
+    """
+    return absorption / pipe_impedance(string)
+
+
+def torsional_rectification(string: Drillstring) -> float:
+    """Mobility of torsional rectification: that of `z_torque` with a = 1.
+
+    After Tucker & Wang, J. Sound Vib. 224 (1999) 123-165: the top speed is made to follow the set
+    speed less (pipe torque - its mean) / zeta, which absorbs each up-going wave. With an ideal
+    drive it is the limit of impedance matching, and runs as such here.
+
+    Parameters
+    ----------
+    string : Drillstring
+        Gives pipe impedance zeta.
+
+    Returns
+    -------
+    float
+        m (rad/s per N m).
+    """
+    return z_torque(string, 1.0)
+
+
 def active_damping(string: Drillstring) -> tuple[float, float]:
     r"""Damper and spring of an actively damped drive: c_f = 2 sqrt(k J_d), k_f = w_s^2 J_d.
 
