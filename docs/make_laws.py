@@ -111,8 +111,8 @@ def page() -> str:
         ("Bit-rock laws", "Torque T (N m) on a bit that turns at speed w (rad/s) under the weight "
          "W (N). Positive torque brakes. *Set-valued* laws hold a bit at rest; smooth ones let it "
          "creep.\n\n![Torque over speed](laws.png)", BIT_ROCK),
-        ("Top-drive laws", "Torque (N m) of the drive from the speed of its own inertia. All of them are "
-         "published laws but for the tuning rule of active damping.\n\n"
+        ("Top-drive laws", "Torque (N m) of the drive from the speed of its own inertia. All of "
+         "them are published laws but for the tuning rule of active damping.\n\n"
          "![Impedance and reflection of six drives](drives.png)", DRIVES),
         ("Top drives tuned to the string", "Numbers that follow from pipe impedance, drive "
          "inertia and the lowest frequency of the string.", TUNED),

@@ -105,6 +105,16 @@ class OverWeight(NamedTuple):
         falling = (static - level) * exp(-decay * speed)
         return level + falling, -decay * falling
 
+    def held(self, weight: Any) -> tuple[Any, Any, Any]:
+        """Torque at high speed, static torque (N m) and decay (s/rad) under `weight` (N)."""
+        level, static, decay = self.p0 * weight, self.q0 * weight, self.b0
+        for k in range(7):
+            over = (weight > self[k]) * (weight - self[k])
+            level = level + self[8 + k] * over
+            static = static + self[16 + k] * over
+            decay = decay + self[24 + k] * over
+        return level, static, decay
+
     def torque_by_weight(self, weight: Any, speed: Any, exp: Exp) -> Any:
         """Torque per weight at constant speed, dT/dW (m); at a row the mean of both sides."""
         spread, decay = (self.q0 - self.p0) * weight, self.b0

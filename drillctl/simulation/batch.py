@@ -200,7 +200,9 @@ def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
     ])  # fmt: skip
     run(
         prepared.stepper.string, padded.friction, padded.before,
-        drive_step(_at_whole_steps(padded.drive, scheme), scheme.step),
+        drive_step(
+            _at_whole_steps(padded.drive, scheme), scheme.step, prepared.stepper.string
+        ),
         weight_step(padded.weight, scheme.step), program_step(padded.program),
         observer_step(observer, scheme.step, start_of_observer),
         numbers, np.ascontiguousarray(state), ticks, measures, traces,

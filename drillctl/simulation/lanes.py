@@ -126,10 +126,10 @@ class Lanes:
         return np.asarray(law.weight(0.0))
 
 
-def kinds(design: Design) -> tuple[type, ...]:
-    """Types of a design's laws: lanes that run together have the same."""
+def kinds(design: Design) -> tuple[Any, ...]:
+    """What lanes that run together have in common: types of the laws, and whether they sample."""
     laws = (design.bit_rock, design.top_drive, design.weight_on_bit)
-    return tuple(type(law) for law in laws)
+    return (*(type(law) for law in laws), getattr(design.weight_on_bit, "period", 0.0) > 0.0)
 
 
 def lane_numbers(design: Design) -> dict[str, float]:

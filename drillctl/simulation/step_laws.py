@@ -36,40 +36,75 @@ def ramp_followed(lag: Array, step: float) -> Array:
     return 1.0 - mean_kept(lag, step)
 
 
-def drive_step(drive: Any, step: float) -> Any:
-    """The kernel's form of a drive law; an ideal one as it is."""
+def drive_step(drive: Any, step: float, string: Any) -> Any:
+    """The kernel's form of a drive law on a string made ready; an ideal one as it is."""
     if not isinstance(drive, (RealDrive, SampledDrive)):
         return drive
-    from drillctl.simulation.kernels.drive_step import RealStep, SampledStep
-
-    numbers = (
-        drive.feedforward, drive.kp, drive.ki, drive.mobility, drive.sensed_inertia,
-        drive.least, drive.most, drive.power, drive.rate, drive.tracking,
+    made = _real_step(drive, step, string) if isinstance(drive, RealDrive) else _sampled_step(
+        drive, step
     )  # fmt: skip
-    seen = (kept(drive.encoder, step), ramp_followed(drive.encoder, step))
-    motor = (kept(drive.lag, step), mean_kept(drive.lag, step))
-    if isinstance(drive, RealDrive):
-        take = 1.0 - np.exp(-drive.corner * step)
-        with np.errstate(invalid="ignore"):
-            mean = np.where(drive.corner > 0.0, 1.0 - take / (drive.corner * step), 0.0)
-        made: Any = RealStep(
-            *numbers, drive.encoder, drive.torque_filter, *seen,
-            kept(drive.torque_filter, step), take, mean, *motor,
-        )  # fmt: skip
-    else:
-        made = SampledStep(
-            *numbers, drive.encoder, *seen, *motor,
-            kept(drive.torque_filter, drive.period), 1.0 - np.exp(-drive.corner * drive.period),
-            drive.period, drive.late,
-        )  # fmt: skip
-    return type(made)(*(np.ascontiguousarray(x, dtype=float) for x in made))
+    shape = drive.kp.shape
+    return type(made)(*(np.ascontiguousarray(np.broadcast_to(x, shape), dtype=float) for x in made))
+
+
+def _real_step(drive: RealDrive, step: float, string: Any) -> Any:
+    from drillctl.simulation.kernels.drive_numbers import RealStep
+
+    keep, ramp = kept(drive.encoder, step), ramp_followed(drive.encoder, step)
+    filter_mean, motor_mean = mean_kept(drive.torque_filter, step), mean_kept(drive.lag, step)
+    take = 1.0 - np.exp(-drive.corner * step)
+    with np.errstate(invalid="ignore"):
+        slow_mean = np.where(drive.corner > 0.0, 1.0 - take / (drive.corner * step), 0.0)
+        back = np.where(drive.ki != 0.0, drive.tracking / drive.ki, 0.0)
+    through = drive.mobility * (1.0 - slow_mean)
+    by_torque = through * (1.0 - filter_mean)
+    by_change = (drive.encoder + by_torque * drive.sensed_inertia) / step
+    follows = (1.0 - motor_mean) * (drive.kp + 0.5 * drive.ki * step)
+    shrink = 1.0 / (1.0 + follows * by_torque)
+    slope, speed_slope = follows * shrink / step, follows * shrink * by_change * ramp
+    forecast = 1.0 + slope * string.angle_by_top - speed_slope * string.top_speed_by_top
+    return RealStep(
+        feedforward=drive.feedforward, kp=drive.kp, ki=drive.ki, half=0.5 * drive.ki * step,
+        by_seen=by_change * (keep - 1.0), by_begin=by_change * (1.0 - keep - ramp),
+        by_felt=-through * filter_mean, by_slow=through,
+        by_speed=by_change * ramp, by_torque=by_torque,
+        of_fixed=(1.0 - motor_mean) * shrink, of_error=follows * shrink,
+        of_motor=motor_mean * shrink, forecast=1.0 / forecast,
+        mean=motor_mean, per_command=1.0 / (1.0 - motor_mean),
+        least=drive.least, most=drive.most, power=drive.power, most_moved=drive.rate * step,
+        back=back, back_shrink=1.0 / (1.0 + 0.5 * np.where(drive.ki != 0.0, drive.tracking, 0.0)
+                                      * step),
+        seen_keep=keep, seen_ramp=ramp, inertia=drive.sensed_inertia / step,
+        felt_keep=kept(drive.torque_filter, step), felt_mean=filter_mean,
+        slow_take=take, motor_take=1.0 - kept(drive.lag, step),
+    )  # fmt: skip
+
+
+def _sampled_step(drive: SampledDrive, step: float) -> Any:
+    from drillctl.simulation.kernels.drive_numbers import SampledStep
+
+    motor_mean = mean_kept(drive.lag, step)
+    return SampledStep(
+        feedforward=drive.feedforward, kp=drive.kp, ki=drive.ki, mobility=drive.mobility,
+        sensed_inertia=drive.sensed_inertia, least=drive.least, most=drive.most,
+        power=drive.power, tracking=drive.tracking, period=drive.period, late=drive.late,
+        felt_keep=kept(drive.torque_filter, drive.period),
+        slow_take=1.0 - np.exp(-drive.corner * drive.period),
+        seen_keep=kept(drive.encoder, step), seen_ramp=ramp_followed(drive.encoder, step),
+        mean=motor_mean, per_command=1.0 / (1.0 - motor_mean),
+        motor_take=1.0 - kept(drive.lag, step), most_moved=drive.rate * step,
+    )  # fmt: skip
 
 
 def weight_step(weight: Any, step: float) -> Any:
     """The kernel's form of a weight law; one that acts at once as it is."""
     if not isinstance(weight, PATHS):
         return weight
-    from drillctl.simulation.kernels.weight_step import AlarmWeightStep, RealWeightStep
+    from drillctl.simulation.kernels.weight_step import (
+        AlarmWeightStep,
+        ReadWeightStep,
+        RealWeightStep,
+    )
 
     seen = (kept(weight.sensor, step), ramp_followed(weight.sensor, step))
     hoist = (kept(weight.hoist, step), ramp_followed(weight.hoist, step))
@@ -78,12 +113,19 @@ def weight_step(weight: Any, step: float) -> Any:
             weight.nominal, weight.least, weight.delay, weight.window, weight.alarm, weight.calm,
             weight.reduction, *seen, *hoist, weight.rate * step,
         )  # fmt: skip
-    else:
+    elif np.any(weight.period > 0.0):
         with np.errstate(divide="ignore"):
             decay = np.minimum(step / weight.hoist, INSTANT)
-        made = RealWeightStep(
-            *weight[:5], weight.delay / step, weight.period / step, *seen, *hoist, decay,
+        made = ReadWeightStep(
+            *weight[:5], weight.delay / step, weight.period / step, decay, *seen, *hoist,
             weight.rate * step,
+        )  # fmt: skip
+    else:
+        # Seen at the end of step n is the signal at n + 1 - delay, at n - back + share.
+        late = weight.delay / step - 1.0
+        back = np.maximum(np.ceil(late - 1e-9), 1.0)
+        made = RealWeightStep(
+            *weight[:5], back, back - late, *seen, *hoist, weight.rate * step
         )  # fmt: skip
     return type(made)(*(np.ascontiguousarray(x, dtype=float) for x in made))
 
@@ -94,7 +136,8 @@ def remembered(weight: Any, step: float) -> int:
         return 0
     if isinstance(weight, AlarmWeight):
         return 1
-    return math.ceil(float(np.max(weight.delay + weight.period)) / step) + 3
+    steps = math.ceil(float(np.max(weight.delay + weight.period)) / step) + 3
+    return 1 << (steps - 1).bit_length()  # a power of two
 
 
 def observer_step(observer: Observer | None, step: float, start: Array) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +94,7 @@ def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
     apart = any(path.startswith(SHARED) for path in draws.values)
     possible: list[_Drawn] = []
     errors: list[InputError] = []
-    like: dict[tuple[type, ...], Design] = {}
+    like: dict[tuple[Any, ...], Design] = {}
     for number in range(len(draws)):
         values = {path: units.SI(column[number]) for path, column in draws.values.items()}
         try:

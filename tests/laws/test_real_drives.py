@@ -165,7 +165,7 @@ def test_both_engines_agree_and_keep_the_limits():
         if drive is LIMITED:
             for run in (batch, reference):
                 torque, speed = run.signals["top_torque"], run.signals["top_speed"]
-                assert -1e-6 <= torque.min()
+                assert torque.min() >= -1e-6
                 assert torque.max() == pytest.approx(13e3, rel=1e-6)
                 assert np.abs(np.diff(torque)).max() <= 20e3 * 0.02 * (1 + 1e-6)
                 # The motor lags behind a power limit that falls with a speed that rises.
@@ -199,7 +199,9 @@ def test_a_sampled_drive_agrees_in_both_engines():
         "torque_limit": "14 kN*m",
     }  # fmt: skip
     design = rig(drive=drive, **{"simulation.step": "5 ms", "simulation.duration": "40 s"})
-    batch, reference = (drillctl.simulate(design, engine=e).measures for e in ("batch", "reference"))
+    batch, reference = (
+        drillctl.simulate(design, engine=e).measures for e in ("batch", "reference")
+    )
     assert batch.j1 == pytest.approx(reference.j1, rel=2e-4)
 
 

@@ -12,6 +12,7 @@ to come nearer as the step is halved:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -123,7 +124,7 @@ def difference(case, **values):
 def shortest_stick(reference):
     """Shortest time at rest between two events (s)."""
     times = [(event.time, event.kind) for event in reference.events]
-    sticks = [b - a for (a, kind), (b, _) in zip(times, times[1:], strict=False) if kind == "stick"]
+    sticks = [b - a for (a, kind), (b, _) in pairwise(times) if kind == "stick"]
     return min(sticks, default=np.inf)
 
 
@@ -134,7 +135,13 @@ def name_of(case, batch, reference):
     if batch.measures.sticks != reference.measures.sticks:
         return "grazing"
     controller = dict(case.values["controller"])
-    key = "kp" if "kp" in controller else "stiffness" if controller["law"] != "soft-torque" else "share"
+    key = (
+        "kp"
+        if "kp" in controller
+        else "stiffness"
+        if controller["law"] != "soft-torque"
+        else "share"
+    )
     default = {"stiffness": 50.0, "share": 0.25}
     controller[key] = controller.get(key, default.get(key)) * (1.0 + 1e-6)
     beside = run(case, "reference", controller=controller).measures.j1

@@ -29,7 +29,9 @@ ROCK = {"scenario.bit_rock": {"until": "30 s", "static_factor": 0.9, "sliding_fa
 def test_engines_agree(name):
     values = {"start-up": SPEED | WEIGHT, "weight step": STEP, "speed step": JUMP, "rock": ROCK}
     design = rig(**values[name], **{"simulation.step": "5 ms"})
-    batch, reference = (drillctl.simulate(design, engine=e).measures for e in ("batch", "reference"))
+    batch, reference = (
+        drillctl.simulate(design, engine=e).measures for e in ("batch", "reference")
+    )
     assert batch.j1 == pytest.approx(reference.j1, rel=5e-5)
     assert batch.peak_bit_speed == pytest.approx(reference.peak_bit_speed, rel=1e-4)
     assert batch.mean_weight_on_bit == pytest.approx(reference.mean_weight_on_bit, rel=1e-4)

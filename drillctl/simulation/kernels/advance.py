@@ -14,11 +14,10 @@ from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined, wi
 from drillctl.simulation.kernels.drive_step import (
     begin_drive,
     follow_drive,
-    follow_top,
     sample_drive,
     top_torque_now,
-    track_top,
 )
+from drillctl.simulation.kernels.held_rock import hold_rock
 from drillctl.simulation.kernels.lane_step import conclude, eliminate
 from drillctl.simulation.kernels.laws import at_lane, contact, load_block, weight_at
 from drillctl.simulation.kernels.measure_step import (
@@ -161,7 +160,7 @@ def advance_block(
     state = np.zeros(2 * start.shape[0] * WIDTH)
     looks = np.zeros((2, WIDTH))
     memory = Memory(
-        np.zeros((clock.remembered, WIDTH)),
+        np.zeros(clock.remembered * WIDTH),
         np.zeros((clock.estimated, WIDTH)),
         np.zeros((clock.estimated, WIDTH)),
     )
@@ -181,19 +180,18 @@ def advance_block(
         sampled = clock.every > 0 and n % clock.every == 0
         if sampled:
             _look_around(string, state, work, looks)
-        complete_and_propagate(string, state, work)
+        complete_and_propagate(string, drive, observer, state, work)
         measure_pipe(work)
         if sampled:
             _sample(string, drive, work, looks, traces, n // clock.every, first)
         if n == clock.steps:
             break
-        track_top(drive, observer, string, state, work)
         sample_drive(drive, work, clock.sampling > 0 and n % clock.sampling == 0)
         raise_weight(weight, program, work, memory, n, clock.step)
+        hold_rock(friction, weight, work)
         eliminate(string, drive, work, rate)
         meet_rock(friction, weight, work)
-        conclude(string, weight, work)
-        follow_top(drive, observer, string, work)
+        conclude(string, drive, weight, observer, work)
         follow_drive(drive, work, rate)
         follow_weight(weight, observer, work, memory, n, clock.step)
         in_j1 = _share_after(begin, clock.step, clock.j1_from)

@@ -22,14 +22,15 @@ from typing import Any
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.compiling import inlined, widest_vectors
 from drillctl.simulation.kernels.drive_step import drive_line
+from drillctl.simulation.kernels.held_rock import rock
 from drillctl.simulation.kernels.laws import (
-    at_lane,
     contact,
     kinetic_torque_at_rest,
     static_torque,
     weight_at,
 )
 from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.top_motion import move_top
 from drillctl.simulation.kernels.weight_step import acting
 
 NEWTON_STEP = 3e-5
@@ -65,13 +66,13 @@ def eliminate(string: Any, drive: Any, work: Any, rate: float) -> None:
 
 
 @inlined
-def set_up(friction: Any, work: Any) -> int:
+def set_up(friction: Any, weight: Any, work: Any) -> int:
     """Set the inclusion at the bit up; returns how many lanes break loose."""
     widest_vectors()
     releases = 0
     for lane in range(WIDTH):
         free, gain, load = work[r.FREE + lane], work[r.GAIN + lane], work[r.REST_LOAD + lane]
-        law = at_lane(friction, work, r.FRICTION, lane)
+        law = rock(friction, weight, work, lane)
         kinetic = kinetic_torque_at_rest(law, load)
         direction = work[r.DIRECTION + lane]
         forward = 1.0 if free > 0.0 else -1.0
@@ -99,7 +100,7 @@ def set_up(friction: Any, work: Any) -> int:
 
 
 @inlined
-def time_releases(friction: Any, work: Any) -> None:
+def time_releases(friction: Any, weight: Any, work: Any) -> None:
     """Date the moment a stuck bit breaks loose, and give it no friction torque before it.
 
     The torque that would hold it rises along the line through the holding torques of this step
@@ -110,7 +111,7 @@ def time_releases(friction: Any, work: Any) -> None:
     """
     widest_vectors()
     for lane in range(WIDTH):
-        law = at_lane(friction, work, r.FRICTION, lane)
+        law = rock(friction, weight, work, lane)
         load = work[r.REST_LOAD + lane]
         static, kinetic = static_torque(law, load), kinetic_torque_at_rest(law, load)
         holding, last = work[r.NEW_HOLDING + lane], work[r.HOLDING + lane]
@@ -131,7 +132,7 @@ def solve_inclusion(friction: Any, weight: Any, work: Any) -> None:
     for _ in range(NEWTON_LIMIT):
         still_open = 0  # an integer: the compiler may not reorder a sum of doubles
         for lane in range(WIDTH):
-            law = at_lane(friction, work, r.FRICTION, lane)
+            law = rock(friction, weight, work, lane)
             u = work[r.SPEED + lane]
             half = 0.5 * work[r.GAIN + lane]
             torque, slope = contact(law, acting(weight, work, lane), u)
@@ -149,12 +150,12 @@ def solve_inclusion(friction: Any, weight: Any, work: Any) -> None:
 
 
 @inlined
-def decide(friction: Any, work: Any) -> int:
+def decide(friction: Any, weight: Any, work: Any) -> int:
     """Stick or slip, and the bit torque of the step; returns how many lanes come to rest."""
     widest_vectors()
     stops = 0
     for lane in range(WIDTH):
-        law = at_lane(friction, work, r.FRICTION, lane)
+        law = rock(friction, weight, work, lane)
         static = static_torque(law, work[r.REST_LOAD + lane])
         free, per_gain = work[r.FREE + lane], work[r.PER_GAIN + lane]
         holding = work[r.NEW_HOLDING + lane]
@@ -175,14 +176,14 @@ def decide(friction: Any, work: Any) -> int:
 
 
 @inlined
-def time_stops(friction: Any, work: Any) -> None:
+def time_stops(friction: Any, weight: Any, work: Any) -> None:
     """Share of the step spent stuck in lanes that come to rest.
 
     The bit is followed in a straight line from its speed before through zero.
     """
     widest_vectors()
     for lane in range(WIDTH):
-        law = at_lane(friction, work, r.FRICTION, lane)
+        law = rock(friction, weight, work, lane)
         half = 0.5 * work[r.GAIN + lane]
         direction = work[r.DIRECTION + lane]
         past_zero = direction * (work[r.FREE + lane] - half * work[r.KINETIC + lane])
@@ -194,7 +195,7 @@ def time_stops(friction: Any, work: Any) -> None:
 
 
 @inlined
-def conclude(string: Any, weight: Any, work: Any) -> None:
+def conclude(string: Any, drive: Any, weight: Any, observer: Any, work: Any) -> None:
     """Top torque of the step, and the state at its end."""
     widest_vectors()
     for lane in range(WIDTH):
@@ -207,6 +208,7 @@ def conclude(string: Any, weight: Any, work: Any) -> None:
             + string.angle_by_top * net_torque
             - string.angle_by_bit * bit_torque
         )
+        move_top(drive, observer, string, work, lane)
         stayed = work[r.DIRECTION + lane] == 0.0 and work[r.NEW_DIRECTION + lane] == 0.0
         work[r.HOLDING + lane] = work[r.NEW_HOLDING + lane] if stayed else -1.0
         work[r.DIRECTION + lane] = work[r.NEW_DIRECTION + lane]

@@ -8,6 +8,7 @@ from numba.extending import overload
 
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.compiling import inlined, widest_vectors
+from drillctl.simulation.kernels.held_rock import rock
 from drillctl.simulation.kernels.lane_step import (
     decide,
     set_up,
@@ -15,7 +16,7 @@ from drillctl.simulation.kernels.lane_step import (
     time_releases,
     time_stops,
 )
-from drillctl.simulation.kernels.laws import at_lane, contact
+from drillctl.simulation.kernels.laws import contact
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.kernels.weight_step import acting
 
@@ -42,11 +43,11 @@ def _meet_rock(friction, weight, work):
 def _stick_or_slip(friction: Any, weight: Any, work: Any) -> None:
     # What takes divisions and happens rarely is done when some lane needs it; it leaves the
     # other lanes as they are.
-    if set_up(friction, work) > 0:
-        time_releases(friction, work)
+    if set_up(friction, weight, work) > 0:
+        time_releases(friction, weight, work)
     solve_inclusion(friction, weight, work)
-    if decide(friction, work) > 0:
-        time_stops(friction, work)
+    if decide(friction, weight, work) > 0:
+        time_stops(friction, weight, work)
 
 
 @inlined
@@ -79,7 +80,7 @@ def _creep(friction: Any, weight: Any, work: Any) -> None:
             break
     for lane in range(WIDTH):
         sign, u = work[r.SIGN + lane], work[r.SPEED + lane]
-        law = at_lane(friction, work, r.FRICTION, lane)
+        law = rock(friction, weight, work, lane)
         torque, slope = contact(law, acting(weight, work, lane), u)
         work[r.NEW_SPEED + lane] = sign * u
         work[r.NEW_DIRECTION + lane] = sign
@@ -95,7 +96,7 @@ def _safeguarded_newton(friction: Any, weight: Any, work: Any) -> int:
     widest_vectors()
     still_open = 0
     for lane in range(WIDTH):
-        law = at_lane(friction, work, r.FRICTION, lane)
+        law = rock(friction, weight, work, lane)
         u, share = work[r.SPEED + lane], work[r.SHARE_NEW + lane]
         torque, slope = contact(law, acting(weight, work, lane), u)
         excess = u + share * torque - work[r.RIGHT + lane]

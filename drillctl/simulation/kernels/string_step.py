@@ -22,6 +22,7 @@ from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import fma
 from drillctl.simulation.kernels.compiling import inlined, widest_vectors
 from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.top_motion import asks_for_top
 
 
 class BlockString(NamedTuple):
@@ -91,11 +92,12 @@ class DenseString(NamedTuple):
     twist_offset: Any
 
 
-def complete_and_propagate(string: Any, state: Any, work: Any) -> None:
+def complete_and_propagate(string: Any, drive: Any, observer: Any, state: Any, work: Any) -> None:
     """Add the held torques to `state`, read the pipe torque, propagate freely, sum up.
 
     `state` comes as the free part of z and leaves as the free part of the next z: flat, state
-    after state, `WIDTH` lanes each; its second half is scratch of the dense form.
+    after state, `WIDTH` lanes each; its second half is scratch of the dense form. The top speed
+    is summed up where `drive` or `observer` asks for it.
     """
     raise NotImplementedError("compiled only")
 
@@ -106,32 +108,42 @@ def _clear_sums(work: Any) -> None:
     for lane in range(WIDTH):
         work[r.TOP_FREE + lane] = 0.0
         work[r.BIT_FREE + lane] = 0.0
+        work[r.TOP_SPEED_FREE + lane] = 0.0
         work[r.PIPE + lane] = 0.0
 
 
-@inlined
-def _by_blocks(string: Any, state: Any, work: Any) -> None:
-    widest_vectors()
-    _clear_sums(work)
-    for block in range(string.free.shape[0]):
-        a11, a12 = string.free[block, 0], string.free[block, 1]
-        a21, a22 = string.free[block, 2], string.free[block, 3]
-        b11, b12 = string.push[block, 0], string.push[block, 1]
-        b21, b22 = string.push[block, 2], string.push[block, 3]
-        p1, p2 = string.pipe[block, 0], string.pipe[block, 1]
-        at_x = 2 * block * WIDTH
-        at_y = at_x + WIDTH
-        for lane in range(WIDTH):
-            top, bit = work[r.TOP_TORQUE + lane], work[r.BIT_TORQUE + lane]
-            x = fma(b12, bit, fma(b11, top, state[at_x + lane]))
-            y = fma(b22, bit, fma(b21, top, state[at_y + lane]))
-            work[r.PIPE + lane] = fma(p2, y, fma(p1, x, work[r.PIPE + lane]))
-            x_free = fma(a12, y, a11 * x)
-            y_free = fma(a22, y, a21 * x)
-            state[at_x + lane] = x_free
-            state[at_y + lane] = y_free
-            work[r.TOP_FREE + lane] += x_free
-            work[r.BIT_FREE + lane] += y_free
+def _by_blocks(tracks_top: bool) -> Any:
+    # The closed-over constant prunes a branch of the compiled loop: a sum of its own would be
+    # taken lane by lane.
+    @inlined
+    def step(string: Any, state: Any, work: Any) -> None:
+        widest_vectors()
+        _clear_sums(work)
+        for block in range(string.free.shape[0]):
+            a11, a12 = string.free[block, 0], string.free[block, 1]
+            a21, a22 = string.free[block, 2], string.free[block, 3]
+            b11, b12 = string.push[block, 0], string.push[block, 1]
+            b21, b22 = string.push[block, 2], string.push[block, 3]
+            p1, p2 = string.pipe[block, 0], string.pipe[block, 1]
+            c1, c2 = string.top_speed[block, 0], string.top_speed[block, 1]
+            at_x = 2 * block * WIDTH
+            at_y = at_x + WIDTH
+            for lane in range(WIDTH):
+                top, bit = work[r.TOP_TORQUE + lane], work[r.BIT_TORQUE + lane]
+                x = fma(b12, bit, fma(b11, top, state[at_x + lane]))
+                y = fma(b22, bit, fma(b21, top, state[at_y + lane]))
+                work[r.PIPE + lane] = fma(p2, y, fma(p1, x, work[r.PIPE + lane]))
+                x_free = fma(a12, y, a11 * x)
+                y_free = fma(a22, y, a21 * x)
+                state[at_x + lane] = x_free
+                state[at_y + lane] = y_free
+                work[r.TOP_FREE + lane] += x_free
+                work[r.BIT_FREE + lane] += y_free
+                if tracks_top:
+                    sped = fma(c2, y_free, fma(c1, x_free, work[r.TOP_SPEED_FREE + lane]))
+                    work[r.TOP_SPEED_FREE + lane] = sped
+
+    return step
 
 
 @inlined
@@ -157,18 +169,20 @@ def _by_matrix(string: Any, state: Any, work: Any) -> None:
             other = complete + j * WIDTH
             for lane in range(WIDTH):
                 state[at + lane] = fma(a, state[other + lane], state[at + lane])
-        c_top, c_bit = string.top_angle[i], string.bit_speed[i]
+        c_top, c_bit, c_speed = string.top_angle[i], string.bit_speed[i], string.top_speed[i]
         for lane in range(WIDTH):
             z = state[at + lane]
             work[r.TOP_FREE + lane] = fma(c_top, z, work[r.TOP_FREE + lane])
             work[r.BIT_FREE + lane] = fma(c_bit, z, work[r.BIT_FREE + lane])
+            work[r.TOP_SPEED_FREE + lane] = fma(c_speed, z, work[r.TOP_SPEED_FREE + lane])
 
 
 @overload(complete_and_propagate)
-def _complete_and_propagate(string, state, work):
-    if string.instance_class is BlockString:
-        return lambda string, state, work: _by_blocks(string, state, work)
-    return lambda string, state, work: _by_matrix(string, state, work)
+def _complete_and_propagate(string, drive, observer, state, work):
+    if string.instance_class is DenseString:
+        return lambda string, drive, observer, state, work: _by_matrix(string, state, work)
+    step = _by_blocks(asks_for_top(drive, observer))
+    return lambda string, drive, observer, state, work: step(string, state, work)
 
 
 def look(string: Any, state: Any, work: Any, lane: int) -> tuple[float, float]:

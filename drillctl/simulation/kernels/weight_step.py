@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined
+from drillctl.simulation.kernels.compiling import inlined, widest_vectors
 from drillctl.simulation.kernels.exponential import exp
 from drillctl.simulation.kernels.laws import at_lane, weight_at
 from drillctl.simulation.kernels.observer_step import move_observer, read_observer, start_observer
@@ -33,15 +33,16 @@ class RealWeightStep(NamedTuple):
     ----------
     nominal, gain, set_speed, least, most : ndarray
         As in the law.
-    delay, period : ndarray
-        In steps; a period of zero for a continuous signal.
+    back : ndarray
+        Whole steps to the older of the two signals that are seen at the end of a step, which is
+        at the soonest the one before the last.
+    share : ndarray
+        Share of the newer one; over 1 where the delay is under a step.
     seen_keep, seen_ramp : ndarray
         Share of its value that the sensor keeps over a step; share of the change of a straight
         input that it has followed at the end.
     hoist_keep, hoist_ramp : ndarray
         The same of the hoist.
-    hoist_decay : ndarray
-        By how much it decays in a step, as the exponent: step over time constant.
     most_moved : ndarray
         Largest change of the weight in a step (N).
     """
@@ -51,13 +52,42 @@ class RealWeightStep(NamedTuple):
     set_speed: Any
     least: Any
     most: Any
-    delay: Any
-    period: Any
+    back: Any
+    share: Any
     seen_keep: Any
     seen_ramp: Any
     hoist_keep: Any
     hoist_ramp: Any
+    most_moved: Any
+
+
+class ReadWeightStep(NamedTuple):
+    """`RealWeight` with a signal that is read at equal intervals, for steps of one length.
+
+    Attributes
+    ----------
+    nominal, gain, set_speed, least, most : ndarray
+        As in the law.
+    delay, period : ndarray
+        In steps.
+    hoist_decay : ndarray
+        By how much the hoist decays in a step, as the exponent: step over time constant.
+    seen_keep, seen_ramp, hoist_keep, hoist_ramp, most_moved : ndarray
+        As in `RealWeightStep`.
+    """
+
+    nominal: Any
+    gain: Any
+    set_speed: Any
+    least: Any
+    most: Any
+    delay: Any
+    period: Any
     hoist_decay: Any
+    seen_keep: Any
+    seen_ramp: Any
+    hoist_keep: Any
+    hoist_ramp: Any
     most_moved: Any
 
 
@@ -91,8 +121,9 @@ class Memory(NamedTuple):
 
     Attributes
     ----------
-    ring : ndarray, shape (steps, WIDTH)
-        Signals of the last steps.
+    ring : ndarray, shape (steps x WIDTH,)
+        Signals of the last steps, step after step; a power of two of them, so that a place in the
+        ring is a mask away. Places before the start hold the first signal.
     estimate, moved : ndarray, shape (states, WIDTH)
         States of the observer, and room for them.
     """
@@ -104,7 +135,7 @@ class Memory(NamedTuple):
 
 def has_memory(weight: Any) -> bool:
     """Whether a weight law, as numba knows it, keeps a memory."""
-    return weight.instance_class in (RealWeightStep, AlarmWeightStep)
+    return weight.instance_class in (RealWeightStep, ReadWeightStep, AlarmWeightStep)
 
 
 def acting(weight: Any, work: Any, lane: int) -> Any:
@@ -126,7 +157,7 @@ def begin_weight(weight: Any, observer: Any, work: Any, memory: Any, first: int)
 
 @overload(begin_weight)
 def _begin_weight(weight, observer, work, memory, first):
-    if weight.instance_class is RealWeightStep:
+    if weight.instance_class in (RealWeightStep, ReadWeightStep):
         return lambda weight, observer, work, memory, first: _begin_real(
             weight, observer, work, memory, first
         )
@@ -143,8 +174,8 @@ def _begin_real(weight: Any, observer: Any, work: Any, memory: Any, first: int) 
     read_observer(observer, memory, work)
     for lane in range(WIDTH):
         signal = work[r.SIGNAL + lane]
-        work[r.SIGNAL_FIRST + lane] = signal
-        memory.ring[0, lane] = signal
+        for place in range(0, memory.ring.shape[0], WIDTH):
+            memory.ring[place + lane] = signal
         law = at_lane(weight, work, r.WEIGHT, lane)
         asked = _asked(law, signal, law.nominal)
         work[r.CALLED + lane] = asked
@@ -183,6 +214,8 @@ def raise_weight(weight: Any, program: Any, work: Any, memory: Any, n: int, step
 def _raise_weight(weight, program, work, memory, n, step):
     if weight.instance_class is RealWeightStep:
         return lambda weight, program, work, memory, n, step: _raise_real(weight, work, memory, n)
+    if weight.instance_class is ReadWeightStep:
+        return lambda weight, program, work, memory, n, step: _raise_read(weight, work, memory, n)
     if weight.instance_class is AlarmWeightStep:
         return lambda weight, program, work, memory, n, step: _raise_alarm(
             weight, work, (n + 1) * step
@@ -195,6 +228,7 @@ def _raise_weight(weight, program, work, memory, n, step):
 @inlined
 def _rest(weight: Any, work: Any) -> None:
     """Weight on a bit at rest, on the mean over the step."""
+    widest_vectors()
     for lane in range(WIDTH):
         end = weight_at(acting(weight, work, lane), 0.0)
         work[r.REST_LOAD + lane] = 0.5 * (work[r.REST_END + lane] + end)
@@ -216,36 +250,39 @@ def _hoist(law: Any, work: Any, lane: int, asked: float, followed: float) -> Non
 
 @inlined
 def _raise_real(weight: Any, work: Any, memory: Any, n: int) -> None:
+    widest_vectors()
+    mask = memory.ring.shape[0] // WIDTH - 1
     for lane in range(WIDTH):
         law = at_lane(weight, work, r.WEIGHT, lane)
-        place = n + 1.0 - law.delay
-        followed = law.hoist_ramp
-        if law.period > 0.0:
-            # A reading whose time falls on the end of a step is there, but for rounding.
-            reading = math.floor(place / law.period + 1e-9) * law.period
-            # It jumps within the step: the hoist follows for the rest of it.
-            share = place - reading
-            followed = 1.0 - exp(-law.hoist_decay * (share if share < 1.0 else 1.0))
-            place = reading
-        seen = _look_up(memory.ring, work, lane, n, place)
-        _hoist(law, work, lane, _asked(law, seen, law.nominal), followed)
+        older = (n - int(law.back)) & mask
+        left = memory.ring[older * WIDTH + lane]
+        right = memory.ring[((older + 1) & mask) * WIDTH + lane]
+        # A signal that is not known yet continues the last ones; a speed is not negative.
+        seen = left + law.share * (right - left)
+        seen = seen if seen > 0.0 else 0.0
+        _hoist(law, work, lane, _asked(law, seen, law.nominal), law.hoist_ramp)
     _rest(weight, work)
 
 
 @inlined
-def _look_up(ring: Any, work: Any, lane: int, n: int, place: float) -> float:
-    """Signal at a place in steps, which may lie before the start or after step `n`."""
-    if place <= 0.0:
-        return work[r.SIGNAL_FIRST + lane]
-    size = ring.shape[0]
-    left = int(place)
-    if left >= n:  # not known yet: the last signal, continued
-        now = ring[n % size, lane]
-        rise = now - ring[(n - 1) % size, lane] if n > 0 else 0.0
-        ahead = now + rise * (place - n)
-        return ahead if ahead > 0.0 else 0.0
-    share = place - left
-    return (1.0 - share) * ring[left % size, lane] + share * ring[(left + 1) % size, lane]
+def _raise_read(weight: Any, work: Any, memory: Any, n: int) -> None:
+    mask = memory.ring.shape[0] // WIDTH - 1
+    for lane in range(WIDTH):
+        law = at_lane(weight, work, r.WEIGHT, lane)
+        place = n + 1.0 - law.delay
+        # A reading whose time falls on the end of a step is there, but for rounding.
+        reading = math.floor(place / law.period + 1e-9) * law.period
+        # It jumps within the step: the hoist follows for the rest of it.
+        share = place - reading
+        followed = 1.0 - exp(-law.hoist_decay * (share if share < 1.0 else 1.0))
+        reading = reading if reading > 0.0 else 0.0
+        older = min(int(reading), n - 1)
+        left = memory.ring[(older & mask) * WIDTH + lane]
+        right = memory.ring[((older + 1) & mask) * WIDTH + lane]
+        seen = left + (reading - older) * (right - left)
+        seen = seen if seen > 0.0 else 0.0
+        _hoist(law, work, lane, _asked(law, seen, law.nominal), followed)
+    _rest(weight, work)
 
 
 @inlined
@@ -265,7 +302,7 @@ def follow_weight(weight: Any, observer: Any, work: Any, memory: Any, n: int, st
 
 @overload(follow_weight)
 def _follow_weight(weight, observer, work, memory, n, step):
-    if weight.instance_class is RealWeightStep:
+    if weight.instance_class in (RealWeightStep, ReadWeightStep):
         return lambda weight, observer, work, memory, n, step: _follow_real(
             weight, observer, work, memory, n
         )
@@ -288,13 +325,14 @@ def _sense(law: Any, work: Any, lane: int) -> float:
 
 @inlined
 def _follow_real(weight: Any, observer: Any, work: Any, memory: Any, n: int) -> None:
+    widest_vectors()
     for lane in range(WIDTH):
         _sense(at_lane(weight, work, r.WEIGHT, lane), work, lane)
     move_observer(observer, memory, work)
     read_observer(observer, memory, work)
-    slot = (n + 1) % memory.ring.shape[0]
+    slot = ((n + 1) & (memory.ring.shape[0] // WIDTH - 1)) * WIDTH
     for lane in range(WIDTH):
-        memory.ring[slot, lane] = work[r.SIGNAL + lane]
+        memory.ring[slot + lane] = work[r.SIGNAL + lane]
 
 
 @inlined

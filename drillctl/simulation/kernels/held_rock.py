@@ -1,0 +1,106 @@
+"""Friction over a table, under a weight that is known before the step: looked up once a step.
+
+A law over the weight on bit costs more than a string of modes where each of Newton's steps walks
+through the rows of its table. Where the weight has a memory it is a number within a step, and so
+are the torques and the decay that follow from it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numba.extending import overload
+
+from drillctl.bit_rock import OverWeight
+from drillctl.bit_rock.protocol import Exp
+from drillctl.simulation.kernels import rows as r
+from drillctl.simulation.kernels.compiling import inlined, widest_vectors
+from drillctl.simulation.kernels.laws import at_lane
+from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.weight_step import has_memory
+
+
+class HeldRock(NamedTuple):
+    """`OverWeight` at the weights of one step.
+
+    Attributes
+    ----------
+    rest : float
+        Static torque under the mean weight of the step (N m).
+    level, spread : float
+        Torque at high speed, and what the static torque is above it, at the end of the step (N m).
+    decay : float
+        Decay with speed (s/rad).
+    """
+
+    rest: Any
+    level: Any
+    spread: Any
+    decay: Any
+
+    @property
+    def set_valued(self) -> bool:
+        """A bit can stand still under this law."""
+        return True
+
+    def static_torque(self, weight: Any) -> Any:
+        """Largest torque of a bit at rest (N m)."""
+        return self.rest
+
+    def kinetic_torque_at_rest(self, weight: Any) -> Any:
+        """Torque of a bit that just turns (N m)."""
+        return self.rest
+
+    def torque_and_slope(self, weight: Any, speed: Any, exp: Exp) -> tuple[Any, Any]:
+        """Torque (N m) and slope (N m s/rad) at `speed` >= 0 (rad/s)."""
+        falling = self.spread * exp(-self.decay * speed)
+        return self.level + falling, -self.decay * falling
+
+
+_held = inlined(OverWeight.held)
+
+
+def _is_held(friction: Any, weight: Any) -> bool:
+    return friction.instance_class is OverWeight and has_memory(weight)
+
+
+def rock(friction: Any, weight: Any, work: Any, lane: int) -> Any:
+    """The bit-rock law that a lane meets in this step."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(rock)
+def _rock(friction, weight, work, lane):
+    if _is_held(friction, weight):
+        return lambda friction, weight, work, lane: HeldRock(
+            work[r.HELD_REST + lane],
+            work[r.HELD_LEVEL + lane],
+            work[r.HELD_SPREAD + lane],
+            work[r.HELD_DECAY + lane],
+        )
+    return lambda friction, weight, work, lane: at_lane(friction, work, r.FRICTION, lane)
+
+
+def hold_rock(friction: Any, weight: Any, work: Any) -> None:
+    """Look the table up at the weights of this step, where they are numbers."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(hold_rock)
+def _hold_rock(friction, weight, work):
+    if _is_held(friction, weight):
+        return lambda friction, weight, work: _look_up(friction, work)
+    return lambda friction, weight, work: None
+
+
+@inlined
+def _look_up(friction: Any, work: Any) -> None:
+    widest_vectors()
+    for lane in range(WIDTH):
+        law = at_lane(friction, work, r.FRICTION, lane)
+        _, rest, _ = _held(law, work[r.REST_LOAD + lane])
+        level, static, decay = _held(law, work[r.HOISTED + lane])
+        work[r.HELD_REST + lane] = rest
+        work[r.HELD_LEVEL + lane] = level
+        work[r.HELD_SPREAD + lane] = static - level
+        work[r.HELD_DECAY + lane] = decay
