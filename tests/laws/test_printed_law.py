@@ -98,6 +98,10 @@ def test_every_branch_has_the_torque_that_is_printed():
     static = law.a2 * 140e3
     seen = set()
     for piece in motion.pieces:
+        assert (piece.direction == 0) == (piece.phase not in (1, -1))
+        along = piece.phase in (FORWARD_EDGE, BACKWARD_EDGE)
+        system = motion.system
+        assert system.string_in(piece.phase) is (system.stick if along else system.slip)
         for time in np.linspace(piece.begin, piece.end, 5)[1:-1]:
             state = piece.solution(time)
             pipe = string.element_stiffness[-1] * (
