@@ -38,6 +38,7 @@ TABLES = (
     ("[top_drive]", tables.TopDriveTable),
     ("[bha]", tables.BhaTable),
     ('[bit_rock] law = "navarro-lopez-suarez"', bit_rock_tables.NavarroLopezSuarezTable),
+    ('[bit_rock] law = "printed-three-branch"', bit_rock_tables.PrintedThreeBranchTable),
     ("rows of bit_rock.table", bit_rock_tables.FrictionRow),
     ('[bit_rock] law = "bit-radius-friction"', bit_rock_tables.BitRadiusFrictionTable),
     ('[bit_rock] law = "jansen-van-den-steen"', bit_rock_tables.JansenVanDenSteenTable),

@@ -15,6 +15,7 @@ from drillctl.bit_rock import (
     JansenVanDenSteen,
     NavarroLopezSuarez,
     OverWeight,
+    PrintedThreeBranch,
     Stribeck,
     Tabulated,
     TuckerWang,
@@ -38,6 +39,10 @@ BIT_ROCK = (
      "The paper's law and the default of the shipped designs."),
     (OverWeight, '`law = "navarro-lopez-suarez"` with a `table` and a weight on bit that moves',
      "Taken by itself wherever the weight changes while the bit drills."),
+    (PrintedThreeBranch, '`law = "printed-three-branch"` (a1, a2, beta, or a table over the weight '
+     'on bit; tolerance, by default `"1e-4 rad/s"`)',
+     "To see what the paper's own numerical stand-in does beside the set, one run at a time: the "
+     "reference solver locates where its torque jumps; the batch engine refuses it by name."),
     (JansenVanDenSteen, '`law = "jansen-van-den-steen"` (a1, a2), `law = "coulomb"` (a)',
      "To tell what the static peak does from what the falling slope does."),
     (Tabulated, '`law = "tabulated"` (points, static)', "For measured torque over speed."),

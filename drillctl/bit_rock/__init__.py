@@ -13,7 +13,8 @@ calls them with symbols; hence the exponential comes in as an argument.
   sign. A set-valued law takes, at zero speed, any value between minus and plus the static
   torque.
 - `set_valued`: whether it is one. The smooth laws of the literature are not: a bit creeps under
-  them where it should stand still. They are here to be compared.
+  them where it should stand still. They are here to be compared. The printed law of
+  Monteiro & Trindade is another stand-in, which the reference solver alone can run.
 """
 
 from drillctl.bit_rock.change import changed_rock
@@ -21,6 +22,7 @@ from drillctl.bit_rock.contact import contact
 from drillctl.bit_rock.jansen_van_den_steen import JansenVanDenSteen
 from drillctl.bit_rock.navarro_lopez_suarez import NavarroLopezSuarez
 from drillctl.bit_rock.over_weight import OverWeight, over_weight
+from drillctl.bit_rock.printed_three_branch import PrintedThreeBranch
 from drillctl.bit_rock.protocol import BitRockLaw
 from drillctl.bit_rock.stribeck import Stribeck
 from drillctl.bit_rock.tabulated import Tabulated, tabulated
@@ -32,6 +34,7 @@ __all__ = [
     "JansenVanDenSteen",
     "NavarroLopezSuarez",
     "OverWeight",
+    "PrintedThreeBranch",
     "Stribeck",
     "Tabulated",
     "TuckerWang",

@@ -7,6 +7,7 @@ from typing import Any
 from drillctl.bit_rock.jansen_van_den_steen import JansenVanDenSteen
 from drillctl.bit_rock.navarro_lopez_suarez import NavarroLopezSuarez
 from drillctl.bit_rock.over_weight import OverWeight
+from drillctl.bit_rock.printed_three_branch import PrintedThreeBranch
 from drillctl.bit_rock.stribeck import Stribeck
 from drillctl.bit_rock.tabulated import Tabulated
 from drillctl.bit_rock.tucker_wang import TuckerWang
@@ -14,6 +15,7 @@ from drillctl.errors import InputError
 
 _TORQUES = {
     NavarroLopezSuarez: (("a2",), ("a1",), ("beta",)),
+    PrintedThreeBranch: (("a2",), ("a1",), ("beta",)),
     JansenVanDenSteen: (("a2",), ("a1",), ()),
     Stribeck: (("static",), ("sliding",), ("decay",)),
     OverWeight: (
@@ -67,6 +69,6 @@ def changed_rock(law: Any, static: float, sliding: float, decay: float) -> Any:
 
 
 def _rising(law: Any) -> bool:
-    if isinstance(law, NavarroLopezSuarez):
+    if isinstance(law, (NavarroLopezSuarez, PrintedThreeBranch)):
         return bool(law.a2 < law.a1)
     return isinstance(law, Stribeck) and bool(law.static < law.sliding)

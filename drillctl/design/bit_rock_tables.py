@@ -37,10 +37,10 @@ def _refuse_rising(a1: float, a2: float) -> None:
         raise InputError(f"a2 = {a2:g} must not be less than a1 = {a1:g}")
 
 
-class NavarroLopezSuarezTable(Table):
-    """Friction of Navarro-Lopez & Suarez: coefficients, or a table of them over WOB."""
+class FrictionCoefficients(Table):
+    """What laws have in common that decay exponentially: coefficients, or a table over WOB."""
 
-    law: Literal["navarro-lopez-suarez"]
+    law: str
     a1: q.NonNegativeNumber | None = None
     a2: q.NonNegativeNumber | None = None
     beta: q.NonNegativeNumber | None = None
@@ -48,7 +48,6 @@ class NavarroLopezSuarezTable(Table):
     a1_factor: q.PositiveNumber = 1.0
     a2_factor: q.PositiveNumber = 1.0
     beta_factor: q.PositiveNumber = 1.0
-    regularised_over: q.PositiveSpeed | None = None
     outside_table: Literal["refuse", "extrapolate"] = "refuse"
 
     @field_validator("table")
@@ -67,7 +66,7 @@ class NavarroLopezSuarezTable(Table):
         return table
 
     @model_validator(mode="after")
-    def _coefficients_or_table(self) -> NavarroLopezSuarezTable:
+    def _coefficients_or_table(self) -> FrictionCoefficients:
         numbers = {"a1": self.a1, "a2": self.a2, "beta": self.beta}
         given = [key for key, value in numbers.items() if value is not None]
         if self.table is not None and given:
@@ -80,6 +79,20 @@ class NavarroLopezSuarezTable(Table):
             assert self.a2 is not None
             _refuse_rising(self.a1 * self.a1_factor, self.a2 * self.a2_factor)
         return self
+
+
+class NavarroLopezSuarezTable(FrictionCoefficients):
+    """Friction of Navarro-Lopez & Suarez: coefficients, or a table of them over WOB."""
+
+    law: Literal["navarro-lopez-suarez"]
+    regularised_over: q.PositiveSpeed | None = None
+
+
+class PrintedThreeBranchTable(FrictionCoefficients):
+    """The same in three branches as Monteiro & Trindade print it; reference solver only."""
+
+    law: Literal["printed-three-branch"]
+    tolerance: q.PositiveSpeed = 1e-4
 
 
 class BitRadiusFrictionTable(Table):
@@ -186,6 +199,7 @@ class TabulatedFrictionTable(Table):
 
 BitRockTable = Annotated[
     NavarroLopezSuarezTable
+    | PrintedThreeBranchTable
     | BitRadiusFrictionTable
     | JansenVanDenSteenTable
     | CoulombTable

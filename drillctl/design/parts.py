@@ -8,6 +8,7 @@ from drillctl.bit_rock import (
     BitRockLaw,
     JansenVanDenSteen,
     NavarroLopezSuarez,
+    PrintedThreeBranch,
     Stribeck,
     TuckerWang,
     WeightTable,
@@ -18,9 +19,11 @@ from drillctl.bit_rock import (
 from drillctl.design.bit_rock_tables import (
     BitRadiusFrictionTable,
     CoulombTable,
+    FrictionCoefficients,
     FrictionRow,
     JansenVanDenSteenTable,
     NavarroLopezSuarezTable,
+    PrintedThreeBranchTable,
     StribeckTable,
     TabulatedFrictionTable,
     TuckerWangTable,
@@ -215,6 +218,15 @@ def _friction(tables: DesignTables) -> BitRockLaw:
                 return fixed
             factors = (table.a1_factor, table.a2_factor, table.beta_factor)
             return over_weight(_rows(table.table), *factors)
+        case PrintedThreeBranchTable():
+            if table.table is not None and weight_moves(tables):
+                raise InputError(
+                    f"does not go with a weight on bit that moves under {table.law!r}; "
+                    "give a1, a2 and beta",
+                    "bit_rock.table",
+                )
+            turning = _navarro_lopez_suarez(table, tables.operating_point.weight_on_bit)
+            return PrintedThreeBranch(*turning, table.tolerance)
         case BitRadiusFrictionTable():
             return NavarroLopezSuarez(
                 a1=table.bit_radius * table.sliding_coefficient,
@@ -240,7 +252,7 @@ def _friction(tables: DesignTables) -> BitRockLaw:
             return tabulated(static, tuple(point.speed for point in table.points), arms)
 
 
-def _navarro_lopez_suarez(table: NavarroLopezSuarezTable, weight: float) -> NavarroLopezSuarez:
+def _navarro_lopez_suarez(table: FrictionCoefficients, weight: float) -> NavarroLopezSuarez:
     law = _coefficients(table, weight)
     law = NavarroLopezSuarez(
         law.a1 * table.a1_factor, law.a2 * table.a2_factor, law.beta * table.beta_factor
@@ -255,7 +267,7 @@ def _navarro_lopez_suarez(table: NavarroLopezSuarezTable, weight: float) -> Nava
 def _refuse_impossible_friction(law: BitRockLaw, tables: DesignTables) -> None:
     """Refuse coefficients that overflow, or turn negative far outside a table."""
     weight = tables.operating_point.weight_on_bit
-    numbers = law._asdict() if isinstance(law, NavarroLopezSuarez) else {}
+    numbers = law._asdict() if isinstance(law, (NavarroLopezSuarez, PrintedThreeBranch)) else {}
     for name, value in (*numbers.items(), ("static torque", law.static_torque(weight))):
         if not 0.0 <= value < math.inf:
             raise InputError(
@@ -266,7 +278,7 @@ def _refuse_impossible_friction(law: BitRockLaw, tables: DesignTables) -> None:
 def table_range(tables: DesignTables) -> tuple[float, float]:
     """Lowest and highest weight (N) of the friction table; any weight without a table."""
     table = tables.bit_rock
-    if not isinstance(table, NavarroLopezSuarezTable) or table.table is None:
+    if not isinstance(table, FrictionCoefficients) or table.table is None:
         return 0.0, HEAVIEST
     return table.table[0].weight_on_bit, table.table[-1].weight_on_bit
 
@@ -280,7 +292,7 @@ def _rows(table: tuple[FrictionRow, ...]) -> WeightTable:
     )
 
 
-def _coefficients(table: NavarroLopezSuarezTable, weight: float) -> NavarroLopezSuarez:
+def _coefficients(table: FrictionCoefficients, weight: float) -> NavarroLopezSuarez:
     if table.table is None:
         return NavarroLopezSuarez(table.a1, table.a2, table.beta)
     rows = _rows(table.table)

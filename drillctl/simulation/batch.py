@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.bit_rock import PrintedThreeBranch
 from drillctl.design.tables import SimulationTable
+from drillctl.errors import InputError
 from drillctl.simulation import measures as m
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.propagator import StringStep, string_step
@@ -85,8 +87,9 @@ def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
     Raises
     ------
     InputError
-        A given step is too long for the friction law.
+        A given step is too long for the friction law, or the law is not one of this engine.
     """
+    _refuse_printed_law(lanes)
     inertia = bit_inertia(lanes.string)
     period = lanes.drive.period if isinstance(lanes.drive, SampledDrive) else None
     scheme = choose_scheme(
@@ -94,6 +97,17 @@ def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
     )
     stepper = string_step(lanes.string, scheme.step, scheme.modes)
     return Prepared(stepper, scheme, table.duration, table.j1_from)
+
+
+def _refuse_printed_law(lanes: Lanes) -> None:
+    """Within its tolerance the torque is not a function of speed and weight alone."""
+    if isinstance(lanes.friction, PrintedThreeBranch):
+        raise InputError(
+            "'printed-three-branch' is not a law of the batch engine, on which maps, regions and "
+            "comparisons run; use 'navarro-lopez-suarez', the set that it stands in for, or "
+            "simulate single runs with the reference engine",
+            "bit_rock.law",
+        )
 
 
 def _shared(period: Array | None) -> float | None:

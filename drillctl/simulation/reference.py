@@ -15,9 +15,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.bit_rock import PrintedThreeBranch
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.simulation.phases import stored_energy
+from drillctl.simulation.printed import PrintedSystem
 from drillctl.simulation.system import WORKS, Method, System, integrate
 
 Array = NDArray[np.float64]
@@ -53,6 +55,8 @@ class Piece:
     ----------
     begin, end : float
         Times (s).
+    phase : int
+        As `System` counts them.
     direction : int
         +1 or -1 in slip; 0 in stick.
     solution : callable
@@ -67,6 +71,7 @@ class Piece:
 
     begin: float
     end: float
+    phase: int
     direction: int
     solution: Callable[[Any], Array]
     steps: Array
@@ -166,45 +171,56 @@ def solve(design: Design, tolerance: float = 1e-8, method: Method = "DOP853") ->
     SimulationError
         The integrator failed, or phases followed each other without time advancing.
     """
-    system = System(design)
+    system = system_of(design)
     duration = design.tables.simulation.duration
     first = system.start(design)
     state = system.stop(0.0, 1, first)
-    time, direction = 0.0, system.direction_at(0.0, state)
+    time, phase = 0.0, system.direction_at(0.0, state)
     events: list[Event] = []
+    changes = 0
     while True:
         stop = min(system.next_stop(time), duration)
-        piece, state, by_itself = _run(system, time, stop, direction, state, tolerance, method)
+        piece, state, by_itself = _run(system, time, stop, phase, state, tolerance, method)
         system.pieces.append(piece)
         time = piece.end
         if time >= duration:
             break
-        before = direction
+        before = phase
         if by_itself:
-            direction = system.next_direction(time, direction, state)
+            phase = system.next_direction(time, phase, state)
         else:
-            state = system.stop(time, direction, state)
-            direction = system.after_stop(time, direction, state)
-        if direction != before or by_itself:
-            events.append(Event(time, "slip" if direction else "stick", direction))
-        if len(events) >= MOST_PHASES:
+            state = system.stop(time, phase, state)
+            phase = system.after_stop(time, phase, state)
+        if phase != before or by_itself:
+            changes += 1
+            direction = system.direction_of(phase)
+            if direction or system.direction_of(before):
+                events.append(Event(time, "slip" if direction else "stick", direction))
+        if changes >= MOST_PHASES:
             raise SimulationError(f"{MOST_PHASES} changes of phase by {time:g} s: chattering")
     energy = _audit(system, first, state)
     pieces = tuple(system.pieces)
     return Motion(design, system, pieces, tuple(events), energy, tolerance, method)
 
 
+def system_of(design: Design) -> System:
+    """The equations of a design: those that its bit-rock law needs."""
+    if isinstance(design.bit_rock, PrintedThreeBranch):
+        return PrintedSystem(design)
+    return System(design)
+
+
 def _run(
     system: System,
     begin: float,
     end: float,
-    direction: int,
+    phase: int,
     state: Array,
     tolerance: float,
     method: Method,
 ) -> tuple[Piece, Array, bool]:
     """Integrate one phase until it ends by itself (then true) or at a time."""
-    equations = system.equations(direction)
+    equations = system.equations(phase)
     result = integrate(
         equations.rates,
         (begin, end),
@@ -214,16 +230,19 @@ def _run(
         atol=tolerance,
         events=equations.events,
         dense_output=True,
+        longest_step=equations.longest_step,
     )
     if result.status < 0:
         raise SimulationError(f"the integrator failed at {result.t[-1]:g} s: {result.message}")
     if not np.isfinite(result.y[:, -1]).all():
         raise SimulationError(f"the motion is no longer finite at {result.t[-1]:g} s")
     final = result.y[:, -1].copy()
-    if result.status == 1:  # at rest exactly, not to the locator's rounding
-        final[2 * system.nodes - 1] = -system.set_speed
-    found = [np.asarray(times) for times in result.t_events]
-    piece = Piece(begin, float(result.t[-1]), direction, result.sol, result.t, found[1], found[2])
+    if result.status == 1:
+        final = system.at_end(float(result.t[-1]), phase, final)
+    crossings, extremes = (np.asarray(times) for times in result.t_events[1:3])
+    direction = system.direction_of(phase)
+    end = float(result.t[-1])
+    piece = Piece(begin, end, phase, direction, result.sol, result.t, crossings, extremes)
     return piece, final, result.status == 1
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +29,31 @@ WORKS = 3
 """Integrals of power that every state carries: work of the drive, of the bit, of damping."""
 
 
+class Forces(NamedTuple):
+    """What acts on the string at a moment.
+
+    Attributes
+    ----------
+    string : Phase
+        Accelerations as a function of motion and end torques.
+    top_torque, bit_torque : float
+        Torques of drive and rock (N m).
+    drive : ndarray, shape (drive states,)
+        Rates of the drive's memory.
+    """
+
+    string: Phase
+    top_torque: float
+    bit_torque: float
+    drive: Array
+
+
 class System:
     """A rig in motion.
 
     Its state: angles and speeds of the nodes in the frame, the works of drive, bit and damping,
-    then the memories of drive and weight.
+    then the memories of drive and weight. Its phases: +1 and -1 for a bit that turns, 0 for one
+    that is stuck; a law that needs others has a system of its own.
     """
 
     def __init__(self, design: Design) -> None:
@@ -54,6 +74,14 @@ class System:
         self.of_weight = slice(self.of_drive.stop, self.of_drive.stop + self.weight.states)
         self.size = self.of_weight.stop
         self._begin: Array = np.empty(0)
+
+    def string_in(self, phase: int) -> Phase:
+        """Accelerations of the string in a phase."""
+        return self.slip if phase else self.stick
+
+    def direction_of(self, phase: int) -> int:
+        """Direction of slip in a phase; 0 where the bit counts as stuck."""
+        return phase
 
     @property
     def simple(self) -> bool:
@@ -124,12 +152,17 @@ class System:
 
     def slip_torque(self, time: float, state: Array, direction: int) -> float:
         """Torque on a bit that turns (N m)."""
-        speed = self.bit_speed(state)
-        rock = self.rock(time)
-        if not rock.set_valued:
-            direction = 1 if speed >= 0.0 else -1
-        # Past zero speed a set-valued law is continued smoothly, so that the event can be located.
-        torque, _ = contact(rock, self.weight_law(time, state), direction * speed, _exp)
+        if not self.rock(time).set_valued:
+            direction = 1 if self.bit_speed(state) >= 0.0 else -1
+        return self.continued_torque(time, state, direction)
+
+    def continued_torque(self, time: float, state: Array, direction: int) -> float:
+        """Torque (N m) of one direction, continued smoothly past zero speed.
+
+        So the event can be located that ends the phase.
+        """
+        speed = direction * self.bit_speed(state)
+        torque, _ = contact(self.rock(time), self.weight_law(time, state), speed, _exp)
         return direction * float(torque)
 
     def respond(self, time: float, state: Array, phase: Phase, bit: float) -> tuple[float, Array]:
@@ -147,23 +180,33 @@ class System:
         top_torque, _ = self.respond(time, state, self.stick, 0.0)
         return self.reaction.torque(state[: 2 * self.nodes], top_torque)
 
-    def rates(self, time: float, state: Array, direction: int) -> Array:
-        """Time derivative of the state; `direction` 0 for a bit that is stuck."""
+    def forces(self, time: float, state: Array, phase: int) -> Forces:
+        """What acts on the string in a phase."""
+        if phase == 0:
+            return self.held(time, state)
+        return self.driven(time, state, self.slip_torque(time, state, phase))
+
+    def held(self, time: float, state: Array) -> Forces:
+        """What acts on the string while the bit keeps its speed."""
+        top_torque, drive = self.respond(time, state, self.stick, 0.0)
+        reaction = self.reaction.torque(state[: 2 * self.nodes], top_torque)
+        return Forces(self.stick, top_torque, reaction, drive)
+
+    def driven(self, time: float, state: Array, bit_torque: float) -> Forces:
+        """What acts on the string under a bit torque (N m)."""
+        top_torque, drive = self.respond(time, state, self.slip, bit_torque)
+        return Forces(self.slip, top_torque, bit_torque, drive)
+
+    def rates(self, time: float, state: Array, phase: int) -> Array:
+        """Time derivative of the state in a phase."""
         end = 2 * self.nodes
         motion = state[:end]
-        if direction == 0:
-            phase = self.stick
-            top_torque, drive = self.respond(time, state, phase, 0.0)
-            bit_torque = self.reaction.torque(motion, top_torque)
-        else:
-            phase = self.slip
-            bit_torque = self.slip_torque(time, state, direction)
-            top_torque, drive = self.respond(time, state, phase, bit_torque)
+        string, top_torque, bit_torque, drive = self.forces(time, state, phase)
         inputs = np.empty(end + 3)
         inputs[:end] = motion
         inputs[end:] = top_torque, bit_torque, 1.0
         rates = np.empty(self.size)
-        np.dot(phase.first_order, inputs, out=rates[:end])
+        np.dot(string.first_order, inputs, out=rates[:end])
         rates[end] = top_torque * (state[self.nodes] + self.set_speed)
         rates[end + 1] = bit_torque * (state[end - 1] + self.set_speed)
         rates[end + 2] = self.damping_power(state[self.nodes : end] + self.set_speed)
@@ -176,6 +219,29 @@ class System:
                 top_torque - self.drag,
             )
         return rates
+
+    def at_end(self, time: float, phase: int, state: Array) -> Array:
+        """State after a phase that ended by itself: at rest, not to the locator's rounding."""
+        state = state.copy()
+        state[2 * self.nodes - 1] = -self.set_speed
+        return state
+
+    def bit_speeds(self, state: Array, direction: Array) -> Array:
+        """Bit speeds (rad/s) of states, shape (states, samples); exactly zero while stuck."""
+        return np.where(direction == 0.0, 0.0, state[2 * self.nodes - 1] + self.set_speed)
+
+    def told(self, time: float, state: Array, phase: int) -> tuple[float, float, float]:
+        """Top torque (N m), weight on bit (N) and bit torque (N m) in a phase."""
+        bit_speed = self.bit_speed(state)
+        speed = 0.0 if phase == 0 else abs(bit_speed)
+        weight = float(self.weight_law(time, state).weight(speed))
+        friction = float(self.rock(time).torque_and_slope(weight, speed, np.exp)[0])
+        rock = 0.0 if phase == 0 else phase * friction
+        torque, _ = self.respond(time, state, self.slip if phase else self.stick, rock)
+        if phase == 0:
+            return torque, weight, self.holding_torque(time, state)
+        turning = phase if self.rocks[1].set_valued else float(np.sign(bit_speed))
+        return torque, weight, turning * friction
 
     def direction_at(self, time: float, state: Array) -> int:
         """Phase at the very start: +1 or -1 turning, 0 stuck; under a smooth law always +1."""
@@ -218,8 +284,8 @@ class System:
         if math.isfinite(self.drive.period):
             turns = time / self.drive.period
             if abs(turns - round(turns)) < 1e-6:
-                phase = self.slip if direction else self.stick
-                top = Top(time, float(state[0]), float(state[self.nodes]), 0.0, float(phase.top[0]))
+                gain = float(self.string_in(direction).top[0])
+                top = Top(time, float(state[0]), float(state[self.nodes]), 0.0, gain)
                 state[self.of_drive] = self.drive.sample(state[self.of_drive], top)
         if self.weight.states:
             state[self.of_weight] = self.weight.read(time, state[self.of_weight], self.past)
@@ -229,15 +295,17 @@ class System:
         """Right-hand side and events of a phase."""
         return self._sticking() if direction == 0 else self._slipping(direction)
 
+    def before_rest(self, state: Array, direction: int) -> float:
+        """How much faster a bit turns (rad/s) than where its slip ends; smooth laws know no end."""
+        return direction * self.bit_speed(state) if self.rocks[1].set_valued else 1.0
+
     def _slipping(self, direction: int) -> Equations:
         def rates(time: float, state: Array) -> Array:
             return self.rates(time, state, direction)
 
         def comes_to_rest(time: float, state: Array) -> float:
-            if not self.rocks[1].set_valued:
-                return 1.0
             # Exactly zero is the release itself, in a step too short to move the bit.
-            return direction * self.bit_speed(state) or 1e-300
+            return self.before_rest(state, direction) or 1e-300
 
         def at_set_speed(time: float, state: Array) -> float:
             return float(state[2 * self.nodes - 1])
@@ -254,10 +322,12 @@ class System:
         def breaks_loose(time: float, state: Array) -> float:
             return self.static_torque(time, state) - abs(self.holding_torque(time, state))
 
-        def never(time: float, state: Array) -> float:
-            return 1.0
-
         return Equations(rates, ending(breaks_loose), [never, never])
+
+
+def never(time: float, state: Array) -> float:
+    """An event that does not occur."""
+    return 1.0
 
 
 def _exp(x: float) -> float:
@@ -265,8 +335,8 @@ def _exp(x: float) -> float:
     return math.exp(min(x, 100.0))
 
 
-def integrate(*arguments: Any, **options: Any) -> Any:
-    """`solve_ivp` with steps of at most `LONGEST_STEP`; a little shorter if an event is missed.
+def integrate(*arguments: Any, longest_step: float = LONGEST_STEP, **options: Any) -> Any:
+    """`solve_ivp` with steps of at most `longest_step` (s); a little shorter if an event is missed.
 
     SciPy finds events on its dense output, which at the ends of a step may differ from the step
     itself by rounding; an event that lies just there is then not bracketed. Other steps move it
@@ -274,7 +344,7 @@ def integrate(*arguments: Any, **options: Any) -> Any:
     """
     for share in (1.0, 0.83, 0.71, 0.59, 0.47):
         try:
-            return solve_ivp(*arguments, max_step=share * LONGEST_STEP, **options)
+            return solve_ivp(*arguments, max_step=share * longest_step, **options)
         except ValueError as error:
             failure = error
     raise SimulationError(f"an event could not be located: {failure}") from failure
@@ -283,9 +353,16 @@ def integrate(*arguments: Any, **options: Any) -> Any:
 class Equations:
     """Right-hand side and events of one phase; the first event ends it."""
 
-    def __init__(self, rates: Callable[[float, Array], Array], end: Any, others: list[Any]) -> None:
+    def __init__(
+        self,
+        rates: Callable[[float, Array], Array],
+        end: Any,
+        others: list[Any],
+        longest_step: float = LONGEST_STEP,
+    ) -> None:
         self.rates = rates
         self.events = [end, *others]
+        self.longest_step = longest_step
 
 
 def ending(event: Any) -> Any:

@@ -156,35 +156,37 @@ def _grid(duration: float, interval: float) -> Array:
     return np.linspace(0.0, duration, max(1, math.ceil(duration / interval * (1 - 1e-9))) + 1)
 
 
-def _states(pieces: tuple[Piece, ...], time: Array) -> tuple[Array, Array]:
-    """State, shape (states, samples), and direction of slip, shape (samples,), at each time."""
+def _states(pieces: tuple[Piece, ...], time: Array) -> tuple[Array, Array, Array]:
+    """State, shape (states, samples), phase and direction of slip, shape (samples,)."""
     ends = np.array([piece.end for piece in pieces])
     which = np.minimum(np.searchsorted(ends, time), len(pieces) - 1)
-    columns, directions = [], []
+    columns, phases, directions = [], [], []
     for index, piece in enumerate(pieces):
         chosen = np.minimum(time[which == index], piece.end)
         if chosen.size:
             columns.append(piece.solution(chosen))
+            phases.append(np.full(chosen.size, piece.phase))
             directions.append(np.full(chosen.size, float(piece.direction)))
-    return np.concatenate(columns, axis=1), np.concatenate(directions)
+    return np.concatenate(columns, axis=1), np.concatenate(phases), np.concatenate(directions)
 
 
 def _signals(motion: Motion, time: Array) -> dict[str, Array]:
     design, system = motion.design, motion.system
-    state, direction = _states(motion.pieces, time)
+    state, phase, direction = _states(motion.pieces, time)
     nodes = design.string.nodes
     angle, speed = state[:nodes], state[nodes : 2 * nodes]
-    bit_speed = np.where(direction == 0.0, 0.0, speed[-1] + design.speed)
-    turning = direction if design.bit_rock.set_valued else np.sign(bit_speed)
+    bit_speed = system.bit_speeds(state, direction)
     if system.simple:
+        turning = direction if design.bit_rock.set_valued else np.sign(bit_speed)
         top_torque = np.asarray(design.top_drive.torque(angle[0], speed[0])) + 0.0 * angle[0]
         law: Any = design.weight_on_bit
         weight = np.broadcast_to(law.weight(np.abs(bit_speed)), bit_speed.shape)
         friction, _ = design.bit_rock.torque_and_slope(weight, np.abs(bit_speed), np.exp)
         reaction = system.reaction
         holding = reaction.motion @ state[: 2 * nodes] + reaction.load + reaction.top * top_torque
+        bit_torque = np.where(direction == 0.0, holding, turning * friction)
     else:
-        top_torque, weight, friction, holding = _one_by_one(motion, time, state, direction)
+        top_torque, weight, bit_torque = _one_by_one(motion, time, state, phase)
     stiffness, damping = design.string.element_stiffness[0], design.string.element_damping[0]
     return {
         "top_speed": speed[0] + design.speed,
@@ -194,29 +196,20 @@ def _signals(motion: Motion, time: Array) -> dict[str, Array]:
         "bit_angle": angle[-1],
         "top_torque": top_torque,
         "pipe_torque": stiffness * (angle[0] - angle[1]) + damping * (speed[0] - speed[1]),
-        "bit_torque": np.where(direction == 0.0, holding, turning * friction),
+        "bit_torque": bit_torque,
         "weight_on_bit": np.array(weight),
         "stuck": (direction == 0.0).astype(float),
     }
 
 
 def _one_by_one(
-    motion: Motion, time: Array, state: Array, direction: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Top torque, weight, friction and holding torque of a rig with memory or program."""
-    system = motion.system
-    found = np.empty((4, len(time)))
+    motion: Motion, time: Array, state: Array, phase: Array
+) -> tuple[Array, Array, Array]:
+    """Top torque, weight and bit torque of a rig with memory, program or phases of its own."""
+    found = np.empty((3, len(time)))
     for i, moment in enumerate(time):
-        here, way = state[:, i], int(direction[i])
-        speed = 0.0 if way == 0 else abs(system.bit_speed(here))
-        weight = float(system.weight_law(moment, here).weight(speed))
-        friction, _ = system.rock(moment).torque_and_slope(weight, speed, np.exp)
-        rock = 0.0 if way == 0 else way * float(friction)
-        phase = system.slip if way else system.stick
-        torque, _ = system.respond(moment, here, phase, rock)
-        held = 0.0 if way else system.holding_torque(moment, here)
-        found[:, i] = torque, weight, float(friction), held
-    return found[0], found[1], found[2], found[3]
+        found[:, i] = motion.system.told(moment, state[:, i], int(phase[i]))
+    return found[0], found[1], found[2]
 
 
 def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measures:

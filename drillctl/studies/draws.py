@@ -29,6 +29,7 @@ DEFAULT_COV = 0.05
 """Coefficient of variation of the rock where a design names nothing uncertain."""
 DEFAULT_PATHS = {
     "navarro-lopez-suarez": ("bit_rock.a1_factor", "bit_rock.a2_factor"),
+    "printed-three-branch": ("bit_rock.a1_factor", "bit_rock.a2_factor"),
     "bit-radius-friction": ("bit_rock.sliding_coefficient", "bit_rock.static_coefficient"),
     "stribeck": ("bit_rock.sliding_coefficient", "bit_rock.static_coefficient"),
     "jansen-van-den-steen": ("bit_rock.a1", "bit_rock.a2"),

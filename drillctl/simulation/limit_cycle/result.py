@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.bit_rock import PrintedThreeBranch
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.simulation.limit_cycle.describing import (
@@ -153,11 +154,12 @@ def limit_cycle(
     Raises
     ------
     InputError
-        Too few periods, an unknown start, or a law with a memory.
+        Too few periods, an unknown start, a law with a memory, or the printed friction.
     SimulationError
         The reference solver could not finish.
     """
     _refuse_memory(design)
+    _refuse_printed_law(design)
     if periods < FEWEST_PERIODS:
         raise InputError(f"at least {FEWEST_PERIODS} periods, not {periods}", "periods")
     harmonic = harmonic_cycles(design, modes)
@@ -175,6 +177,16 @@ def _refuse_memory(design: Design) -> None:
         raise InputError(f"this weight on bit {why}", "weight_on_bit")
     if design.program.moves:
         raise InputError(f"this rig {why}", "scenario")
+
+
+def _refuse_printed_law(design: Design) -> None:
+    """A bit that creeps along an edge has more phases than cycles are followed through."""
+    if isinstance(design.bit_rock, PrintedThreeBranch):
+        raise InputError(
+            f"cycles are not found under {design.tables.bit_rock.law!r}; use "
+            "'navarro-lopez-suarez', or simulate it with the reference engine",
+            "bit_rock.law",
+        )
 
 
 def expected_period(design: Design, harmonic: tuple[HarmonicCycle, ...]) -> float:
