@@ -24,7 +24,8 @@ LAWS = ("navarro-lopez-suarez", "surface-observer")
 """Laws of a weight that follows the bit speed."""
 GAIN, DELAY = VARIED
 MEASURES = {
-    "j1": "s", "peak_bit_speed": "rad/s", "mean_weight_on_bit": "N", "mean_weight_after_start": "N",
+    "j1": "s", "peak_bit_speed": "rad/s", "peak_pipe_torque": "N*m", "mean_weight_on_bit": "N",
+    "mean_weight_after_start": "N",
 }  # fmt: skip
 """What is kept of a run, with its unit."""
 

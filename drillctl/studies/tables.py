@@ -123,12 +123,13 @@ def write_weight_delay(result: WeightDelay, folder: Path) -> None:
             share = one.ended_share
             rows.append([
                 float(gain), share.delay, one.j1, *around, one.difference, *apart, one.pairs,
-                one.ended, share.share, *share.interval_95, one.peak_bit_speed, one.mean_weight,
+                one.ended, share.share, *share.interval_95, one.peak_bit_speed,
+                one.peak_pipe_torque, one.mean_weight,
             ])  # fmt: skip
     heads = [
         "gain", "delay", "j1", "j1_low", "j1_high", "difference", "difference_low",
         "difference_high", "pairs", "ended", "ended_share", "ended_low", "ended_high",
-        "peak_bit_speed", "mean_weight",
+        "peak_bit_speed", "peak_pipe_torque", "mean_weight",
     ]  # fmt: skip
     _write(folder / "weight-delay.csv", heads, rows)
 

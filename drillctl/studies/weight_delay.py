@@ -64,6 +64,8 @@ class DelayedBenefit:
         The same as a share of all draws, with its interval.
     peak_bit_speed : float or None
         Mean of the largest bit speed of a run (rad/s).
+    peak_pipe_torque : float or None
+        Mean of the largest torque in the uppermost element of a run (N m).
     mean_weight : float or None
         Mean weight on bit after the start of the run (N).
     """
@@ -76,6 +78,7 @@ class DelayedBenefit:
     ended: int
     ended_share: EndedShare
     peak_bit_speed: float | None
+    peak_pipe_torque: float | None
     mean_weight: float | None
 
     def summary(self) -> dict[str, Any]:
@@ -91,6 +94,7 @@ class DelayedBenefit:
             "ended_share": self.ended_share.share,
             "ended_interval_95": _listed(self.ended_share.interval_95),
             "peak_bit_speed": self.peak_bit_speed,
+            "peak_pipe_torque": self.peak_pipe_torque,
             "mean_weight": self.mean_weight,
         }
 
@@ -201,6 +205,7 @@ class WeightDelay:
             ended=ended,
             ended_share=EndedShare(delay, ended / total, share_interval(ended, total)),
             peak_bit_speed=_mean(runs.measures["peak_bit_speed"]),
+            peak_pipe_torque=_mean(runs.measures["peak_pipe_torque"]),
             mean_weight=_mean(runs.measures["mean_weight_after_start"]),
         )
 

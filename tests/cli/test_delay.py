@@ -117,8 +117,6 @@ def test_finished_run_is_shown_again(call, monkeypatch):
         ("weight_delay.delay=['1 s']", "weight_delay.delay: unknown key; did you mean 'delays'"),
         ("weight_delay.delays=['1 m']", "weight_delay.delays"),
         ("weight_delay.set.weight_on_bit.lag='1 s'", "weight_delay.set: weight_on_bit.lag"),
-        ("uncertain.weight_on_bit.gain={distribution='normal', mean='1 kN*s/rad', cov=0.1}",
-         "uncertain.weight_on_bit.gain: is what the study runs over"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_and_leaves_nothing(call, setting, message):

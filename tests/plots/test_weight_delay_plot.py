@@ -38,6 +38,9 @@ def test_panels_show_means_bands_and_shares(result):
     np.testing.assert_allclose(
         shares.lines[0].get_ydata(), [one.ended_share.share for one in result.benefits[2]]
     )
+    # Set apart a little, lest bars hide each other.
+    places = np.sqrt(shares.lines[0].get_xdata())
+    np.testing.assert_allclose(places, np.sqrt(result.delays), atol=0.02)
     ends = [segment[:, 1] for segment in shares.lines[2][0].get_segments()]
     np.testing.assert_allclose(
         ends, [one.ended_share.interval_95 for one in result.benefits[2]], atol=1e-12

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -58,10 +59,21 @@ def test_a_run_is_the_one_that_simulate_gives(result, design, i, k):
     drawn = {path: units.SI(values[number]) for path, values in result.drawn.items()}
     alone = late(design, GAINS[i], DELAYS[k]).replace({**drawn, "simulation.engine": "batch"})
     run = drillctl.simulate(alone)
-    for name in ("j1", "peak_bit_speed", "mean_weight_on_bit"):
+    for name in ("j1", "peak_bit_speed", "peak_pipe_torque", "mean_weight_on_bit"):
         expected = getattr(run.measures, name)
         assert result.runs.measures[name][i, k, number] == pytest.approx(expected, rel=1e-9), name
     assert STATUSES[result.runs.status[i, k, number]] == run.status
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("i", "k"), [(1, 0), (2, 2), (2, 3)])
+def test_a_run_is_that_of_the_reference_solver(result, design, i, k):
+    drawn = {path: units.SI(values[5]) for path, values in result.drawn.items()}
+    run = drillctl.simulate(late(design, GAINS[i], DELAYS[k]).replace(drawn))
+    for name in ("j1", "peak_bit_speed", "peak_pipe_torque"):
+        expected = getattr(run.measures, name)
+        assert result.runs.measures[name][i, k, 5] == pytest.approx(expected, rel=5e-3), name
+    assert STATUSES[result.runs.status[i, k, 5]] == run.status
 
 
 def test_differences_are_those_of_a_comparison(result, design):
@@ -133,7 +145,8 @@ def test_draws_of_the_string_are_run_one_by_one(short):
 
 def test_impossible_draws_are_counted_and_have_not_ended(short):
     wide = {"distribution": "uniform", "min": 0.1, "max": 0.9}
-    found = weight_delay(short.replace({"uncertain.bit_rock.a2_factor": wide}), [6e3], [0.1], 20)
+    design = short.replace({"uncertain.bit_rock.a2_factor": wide})
+    found = weight_delay(design, [6e3], [0.1, 0.5], 20)
     (failure,) = found.failures
     assert 0 < failure.count < 20
     one = found.benefits[0][0]
@@ -141,6 +154,12 @@ def test_impossible_draws_are_counted_and_have_not_ended(short):
     assert one.ended <= one.pairs
     assert one.ended_share.share == one.ended / 20
     assert found.summary()["failures"][0]["count"] == failure.count
+    # The same draws at every delay, each in its place.
+    failed = np.isnan(found.runs.measures["j1"][0])
+    assert failed.sum(axis=1).tolist() == [failure.count] * 2
+    np.testing.assert_array_equal(failed[0], failed[1])
+    later = weight_delay(design, [6e3], [0.5], 20)
+    np.testing.assert_array_equal(later.runs.measures["j1"][0, 0], found.runs.measures["j1"][0, 1])
 
 
 # --- what is told ------------------------------------------------------------------------------
@@ -184,6 +203,14 @@ def test_data_is_labelled(result):
     assert float(high) == result.benefits[2][2].difference_interval[1]
 
 
+def test_the_constant_weight_is_kept_beside_the_gains(short, tmp_path):
+    found = weight_delay(short, [6e3], [0.5], 3)
+    back = drillctl.open(found.save(tmp_path / "run"))
+    assert back.summary() == found.summary()
+    for name, values in found.constant.measures.items():
+        np.testing.assert_array_equal(back.constant.measures[name], values)
+
+
 def test_saved_and_read_back(result, tmp_path):
     back = drillctl.open(result.save(tmp_path / "run"))
     assert back.summary() == result.summary() == json.loads(json.dumps(result.summary()))
@@ -193,6 +220,20 @@ def test_saved_and_read_back(result, tmp_path):
     np.testing.assert_array_equal(back.runs.status, result.runs.status)
     for path, values in result.drawn.items():
         np.testing.assert_array_equal(back.drawn[path], values)
+
+
+def test_the_numbers_of_the_page_are_those_of_the_shipped_design():
+    page = (Path(__file__).parents[2] / "docs" / "weight-on-bit.md").read_text(encoding="utf-8")
+    (row,) = weight_delay(drillctl.load(SHIPPED), [6e3], [0.0, 0.1, 0.2]).benefits
+    told = [
+        f"{one.difference:+.1f} ({one.difference_interval[0]:.1f} to "
+        f"{one.difference_interval[1]:.1f})"
+        for one in row
+    ]
+    assert f"| 6 | {' | '.join(told)} |" in page
+    low, high = (100.0 * end for end in row[1].ended_share.interval_95)
+    share = f"{100.0 * row[1].ended_share.share:.1f} % ({low:.1f} to {high:.1f}) at 0.1 s"
+    assert f"| 6 | 0.1 s | {share} |" in page
 
 
 # --- limits ------------------------------------------------------------------------------------
