@@ -38,7 +38,9 @@ def main() -> None:
     text = PAGE.read_text(encoding="utf-8")
     for case in CASES:
         values = {"controller.kp": case.kp, "controller.ki": case.ki}
-        result = weight_delay(drillctl.load(DESIGN, **values))
+        design = drillctl.load(DESIGN, **values)
+        title = f"{design.tables.title}, Kp {case.kp:g}, Ki {case.ki:g}"
+        result = weight_delay(design.replace({"title": title}))
         picture = PAGE.with_name(f"weight-delay-{case.name}.png")
         plots.weight_delay(result).savefig(picture, dpi=110)
         text = filled(text, case.name, (*differences(result), "", *limits(result)))
