@@ -60,6 +60,7 @@ reports: $(BIN)/drillctl
 	$(BIN)/drillctl regularisation monteiro-trindade-140kn --out runs/reports/regularisation
 	$(BIN)/drillctl simulate monteiro-trindade-140kn --out runs/reports/simulate
 	$(BIN)/drillctl map monteiro-trindade-140kn --out runs/reports/map
+	$(BIN)/python docs/make_weight_on_bit.py
 	mkdir -p $(REPORT)
 	cp runs/reports/*/*.png $(REPORT)/
 	cp runs/reports/map/summary.json runs/reports/map/regions.csv $(REPORT)/

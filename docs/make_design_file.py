@@ -13,6 +13,7 @@ from drillctl.design import (
     bit_rock_tables,
     compare_tables,
     controller_tables,
+    delay_tables,
     scenario_tables,
     tables,
     uncertain_tables,
@@ -74,6 +75,7 @@ TABLES = (
     ("[uncertainty]", uncertain_tables.UncertaintyTable),
     ("[compare]", compare_tables.CompareTable),
     ("entries of compare.cases", compare_tables.CaseTable),
+    ("[weight_delay]", delay_tables.WeightDelayTable),
 )
 
 
@@ -109,10 +111,11 @@ def _default(info: Any, kind: Any) -> str:
     if info.is_required():
         return "required"
     value = info.default
-    if value is None:
+    if value is None or info.default_factory is not None:
         return ""
     if kind is not None:
-        return units.write(value, kind)
+        values = value if isinstance(value, tuple) else (value,)
+        return ", ".join(units.write(one, kind) for one in values)
     if isinstance(value, tuple):
         return ", ".join(str(getattr(item, "path", item)) for item in value)
     return str(value)

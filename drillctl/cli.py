@@ -157,6 +157,7 @@ def validate(
     """Check a design: every key, unit and range, its axes, draws and cases."""
     from drillctl import console
     from drillctl.studies.cases import case_designs, refuse_unequal
+    from drillctl.studies.delayed_lanes import following_design
     from drillctl.studies.draws import uncertain_parameters
     from drillctl.studies.grid import axes_of
 
@@ -167,6 +168,8 @@ def validate(
         uncertain_parameters(found)
     if found.tables.compare.cases:
         refuse_unequal(case_designs(found))
+    if "weight_delay" in found.tree:
+        following_design(found)
     if json:
         console.emit({"valid": True, "name": found.name, "path": found.origin})
     else:
@@ -278,6 +281,29 @@ def regularisation(
 
 
 @app.command()
+def delay(
+    design: DesignName,
+    sets: Sets = None,
+    realizations: Annotated[
+        int | None, typer.Option("--realizations", help="Draws of what is uncertain.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the draws.")] = None,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """Dynamic weight on bit against the delay of its path: what is left of its benefit."""
+    from drillctl import verbs
+
+    _use(threads)
+    found = _with_draws(_load(design, sets), realizations, seed)
+    verbs.delay(found, Options(out, json, units, verbose))
+
+
+@app.command()
 def compare(
     design: DesignName,
     sets: Sets = None,
@@ -304,14 +330,10 @@ def compare(
     from drillctl import verbs
 
     _use(threads)
-    given = {
-        "uncertainty.realizations": realizations,
-        "uncertainty.seed": seed,
-        "compare.equal_mean_weight": equal_mean_weight,
-    }
-    asked = {path: value for path, value in given.items() if value is not None}
-    found = _with_axes(_load(design, sets), axis)
-    verbs.compare(found.replace(asked) if asked else found, Options(out, json, units, verbose))
+    found = _with_draws(_with_axes(_load(design, sets), axis), realizations, seed)
+    if equal_mean_weight is not None:
+        found = found.replace({"compare.equal_mean_weight": equal_mean_weight})
+    verbs.compare(found, Options(out, json, units, verbose))
 
 
 @app.command()
@@ -366,6 +388,12 @@ def _with_axes(design: Design, axes: list[str] | None) -> Design:
     from drillctl.design.reading import parse_axis
 
     return design.replace({"map.axes": [parse_axis(text) for text in axes]}) if axes else design
+
+
+def _with_draws(design: Design, realizations: int | None, seed: int | None) -> Design:
+    given = {"uncertainty.realizations": realizations, "uncertainty.seed": seed}
+    asked = {path: value for path, value in given.items() if value is not None}
+    return design.replace(asked) if asked else design
 
 
 def _use(threads: int | None) -> None:

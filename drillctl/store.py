@@ -221,6 +221,7 @@ VERBS = {
     "LoopMap": "loop-map",
     "Regularisation": "regularisation",
     "ThreeRegions": "regions",
+    "WeightDelay": "delay",
 }
 
 
@@ -326,7 +327,7 @@ def open(folder: str | Path) -> Any:
 
     Returns
     -------
-    Sweep, Simulation, Modes, LoopAnalysis, LoopMap, LimitCycle, ThreeRegions or Regularisation
+    Sweep, Simulation, Modes, LoopAnalysis, LoopMap, Comparison, LimitCycle, ThreeRegions, ...
         Equal to what was saved, to the bit; a simulation without its events.
 
     Raises

@@ -25,6 +25,8 @@ from drillctl.simulation.reference import EnergyAudit
 from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.studies.audit import Audit
 from drillctl.studies.comparison import MEASURES, ComparedCase, Comparison
+from drillctl.studies.delayed_lanes import MEASURES as DELAY_MEASURES
+from drillctl.studies.delayed_lanes import Runs
 from drillctl.studies.drawn_lanes import Failures
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
@@ -32,6 +34,7 @@ from drillctl.studies.nominal import Nominal, map_dimension, nominal_design
 from drillctl.studies.regularisation import Regularisation
 from drillctl.studies.sweeps import Sweep
 from drillctl.studies.three_regions import FIELDS, MASKS, ThreeRegions
+from drillctl.studies.weight_delay import WeightDelay
 
 if TYPE_CHECKING:
     import xarray
@@ -207,6 +210,24 @@ def read_regularisation(
     )
 
 
+def read_weight_delay(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> WeightDelay:
+    """A `WeightDelay` as it was saved."""
+
+    def runs(prefix: str) -> Runs:
+        measures = {name: data[f"{prefix}{name}"].values for name in DELAY_MEASURES}
+        return Runs(measures, data[f"{prefix}status"].values.astype(np.int8))
+
+    return WeightDelay(
+        design=design,
+        drawn={path: data[stored_name(path)].values for path in summary["uncertain"]},
+        runs=runs(""),
+        constant=runs("constant_"),
+        failures=tuple(Failures(**failure) for failure in summary["failures"]),
+        **{name: summary[name] for name in ("step", "modes", "total_seconds")},
+        provenance={key: str(value) for key, value in data.attrs.items()},
+    )
+
+
 def read_comparison(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Comparison:
     """A `Comparison` as it was saved."""
     texts = json.loads(data.attrs["case_designs"])
@@ -300,4 +321,5 @@ READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "loop-map": read_loop_map,
     "regions": read_three_regions,
     "regularisation": read_regularisation,
+    "delay": read_weight_delay,
 }

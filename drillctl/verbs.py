@@ -196,6 +196,25 @@ def regularisation(design: Design, options: Options) -> None:
     _conclude(folder, result.summary(), options)
 
 
+def delay(design: Design, options: Options) -> None:
+    """A weight that follows the bit speed against the delay of its path, with figure and table."""
+    from drillctl import plots, printing, store, studies
+
+    folder = store.claim("delay", design, options.out)
+    if _shown_again(
+        folder, options, lambda: printing.weight_delay(store.open(folder.path), options.units)
+    ):
+        return
+    with _running(folder), console.progress() as bar:
+        result = studies.weight_delay(design, progress=bar)
+    store.write_data(result, folder.path)
+    studies.write_weight_delay(result, folder.path)
+    _draw(plots.weight_delay(result, system=options.units), folder.path / "weight-delay.png")
+    if not options.json:
+        printing.weight_delay(result, options.units)
+    _conclude(folder, result.summary(), options)
+
+
 def compare(design: Design, options: Options) -> None:
     """Cases at the same draws, with their figures and tables."""
     import drillctl

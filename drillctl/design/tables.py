@@ -17,6 +17,7 @@ from drillctl.design.base import number_or_quantity
 from drillctl.design.bit_rock_tables import BitRockTable
 from drillctl.design.compare_tables import CompareTable
 from drillctl.design.controller_tables import ControllerTable, PITable
+from drillctl.design.delay_tables import WeightDelayTable
 from drillctl.design.scenario_tables import ScenarioTable
 from drillctl.design.uncertain_tables import DistributionTable, UncertaintyTable, flattened
 from drillctl.design.weight_tables import ConstantWeightTable, WeightOnBitTable
@@ -274,6 +275,7 @@ class DesignTables(Table):
     uncertain: dict[str, DistributionTable] = Field(default_factory=dict)
     uncertainty: UncertaintyTable = UncertaintyTable()
     compare: CompareTable = CompareTable()
+    weight_delay: WeightDelayTable = WeightDelayTable()
 
     @field_validator("uncertain", mode="before")
     @classmethod

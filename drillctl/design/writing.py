@@ -32,7 +32,7 @@ def _plain(value: Any, kind: units.Kind | None) -> Any:
     if isinstance(value, Table):
         return to_tree(value)
     if isinstance(value, tuple):
-        return [_plain(item, None) for item in value]
+        return [_plain(item, kind) for item in value]
     if isinstance(value, dict):
         return {key: _plain(item, None) for key, item in value.items()}
     if kind is not None and isinstance(value, float):

@@ -13,6 +13,7 @@
 - `limit_cycle.py`: `limit_cycle`, one period by each method.
 - `three_regions.py`: `three_regions` over the same two parameters.
 - `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
+- `weight_delay.py`: `weight_delay`, a weight that follows the bit speed against its delay.
 - `time_response.py`: `time_response`, speeds against time with sticks shaded.
 - `style.py`: colours, sizes and the making of figures, shared by all.
 
@@ -36,6 +37,7 @@ from drillctl.plots.regularisation import regularisation
 from drillctl.plots.root_locus import root_locus
 from drillctl.plots.three_regions import three_regions
 from drillctl.plots.time_response import time_response
+from drillctl.plots.weight_delay import weight_delay
 
 __all__ = [
     "bode",
@@ -60,4 +62,5 @@ __all__ = [
     "sweep_line",
     "three_regions",
     "time_response",
+    "weight_delay",
 ]

@@ -9,6 +9,8 @@
 - `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
 - `draws.py`: uncertain parameters and draws from them; `drawn_lanes.py`: the lanes of draws.
 - `comparison.py`: cases at the same draws; `cases.py`: what makes them comparable.
+- `weight_delay.py`: a weight on bit that follows the bit speed, against the delay of its path;
+  `delayed_lanes.py`: its lanes; `delay_limits.py`: where a benefit ends.
 - `nominal.py`: their maps and motions at their own values.
 - `drawn_runs.py`: runs of draws, equal mean weights; `intervals.py`: shares and means.
 - `audit.py`: cells of a map simulated again with the reference solver.
@@ -25,8 +27,14 @@ from drillctl.studies.regions import Region, region
 from drillctl.studies.regularisation import Regularisation, regularisation
 from drillctl.studies.responses import responses
 from drillctl.studies.sweeps import Sweep, stability_map, sweep
-from drillctl.studies.tables import write_comparison, write_loop_table, write_tables
+from drillctl.studies.tables import (
+    write_comparison,
+    write_loop_table,
+    write_tables,
+    write_weight_delay,
+)
 from drillctl.studies.three_regions import ThreeRegions, three_regions
+from drillctl.studies.weight_delay import WeightDelay, weight_delay
 
 __all__ = [
     "Axis",
@@ -37,6 +45,7 @@ __all__ = [
     "Regularisation",
     "Sweep",
     "ThreeRegions",
+    "WeightDelay",
     "compare",
     "draw",
     "loop_map",
@@ -47,7 +56,9 @@ __all__ = [
     "sweep",
     "three_regions",
     "uncertain_parameters",
+    "weight_delay",
     "write_comparison",
     "write_loop_table",
     "write_tables",
+    "write_weight_delay",
 ]

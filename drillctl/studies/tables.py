@@ -11,6 +11,7 @@ from drillctl.simulation.measures import STATUSES
 from drillctl.studies.comparison import MEASURES, QUANTILES, Comparison
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.sweeps import Sweep
+from drillctl.studies.weight_delay import WeightDelay
 
 
 def write_tables(result: Sweep, folder: Path) -> None:
@@ -103,6 +104,34 @@ def write_comparison(result: Comparison, folder: Path) -> None:
             rows.append([case.name, number, *map(float, values), STATUSES[status]])
     heads = ["case", "realization", *result.baseline.drawn, *MEASURES, "status"]
     _write(folder / "draws.csv", heads, rows)
+
+
+def write_weight_delay(result: WeightDelay, folder: Path) -> None:
+    """Write `weight-delay.csv`, a row a gain and delay; SI, empty where a figure is undefined.
+
+    Parameters
+    ----------
+    result : WeightDelay
+        What was computed.
+    folder : Path
+        Where to.
+    """
+    rows: list[list[object]] = []
+    for gain, benefits in zip(result.gains, result.benefits, strict=True):
+        for one in benefits:
+            around, apart = one.j1_interval or (None, None), one.difference_interval or (None, None)
+            share = one.ended_share
+            rows.append([
+                float(gain), share.delay, one.j1, *around, one.difference, *apart, one.pairs,
+                one.ended, share.share, *share.interval_95, one.peak_bit_speed,
+                one.peak_pipe_torque, one.mean_weight,
+            ])  # fmt: skip
+    heads = [
+        "gain", "delay", "j1", "j1_low", "j1_high", "difference", "difference_low",
+        "difference_high", "pairs", "ended", "ended_share", "ended_low", "ended_high",
+        "peak_bit_speed", "peak_pipe_torque", "mean_weight",
+    ]  # fmt: skip
+    _write(folder / "weight-delay.csv", heads, rows)
 
 
 def _write(path: Path, heads: list[str], rows: list[list[object]]) -> None:

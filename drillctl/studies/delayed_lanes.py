@@ -1,0 +1,184 @@
+"""Lanes of a weight on bit that follows the bit speed: every draw at every delay, one gain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.design.delay_tables import VARIED
+from drillctl.errors import InputError
+from drillctl.simulation.lanes import Lanes
+from drillctl.simulation.measures import STATUSES
+from drillctl.studies.drawn_lanes import DrawnGroup, DrawnLanes, drawn_lanes
+from drillctl.studies.drawn_runs import run_draws
+from drillctl.studies.draws import Draws, uncertain_parameters
+
+Array = NDArray[np.float64]
+
+LAWS = ("navarro-lopez-suarez", "surface-observer")
+"""Laws of a weight that follows the bit speed."""
+GAIN, DELAY = VARIED
+MEASURES = {
+    "j1": "s", "peak_bit_speed": "rad/s", "peak_pipe_torque": "N*m", "mean_weight_on_bit": "N",
+    "mean_weight_after_start": "N",
+}  # fmt: skip
+"""What is kept of a run, with its unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """What was measured.
+
+    Attributes
+    ----------
+    measures : dict of ndarray
+        By the names of `MEASURES` (SI), all of one shape; NaN where a run failed.
+    status : ndarray of int8, of the same shape
+        Index into `simulation.measures.STATUSES`.
+    """
+
+    measures: dict[str, Array]
+    status: NDArray[np.int8]
+
+    def at(self, *place: int) -> Runs:
+        """Those at a place along the first dimensions."""
+        measures = {name: values[place] for name, values in self.measures.items()}
+        return Runs(measures, np.asarray(self.status[place]))
+
+    @property
+    def ended(self) -> NDArray[np.bool_]:
+        """Whether stick-slip has ended; a run that failed has not."""
+        still = [STATUSES.index(name) for name in ("sticking", "stalled", "failed")]
+        return ~np.isin(self.status, still)
+
+
+def following_design(design: Design) -> Design:
+    """The design with a weight on bit that follows the bit speed, as yet with no gain or delay.
+
+    Parameters
+    ----------
+    design : Design
+        Its `[weight_delay.set]` replaces what its `[weight_on_bit]` says. Without either, the
+        law is that of Navarro-Lopez & Suarez without limits.
+
+    Raises
+    ------
+    InputError
+        Another law, an impossible value, or gain or delay named uncertain.
+    """
+    for path in VARIED:
+        if path in design.tables.uncertain:
+            where = _where(design, f"uncertain.{path}")
+            raise InputError("is what the study runs over and cannot be drawn", where)
+    values = dict(design.tables.weight_delay.values)
+    own = design.tables.weight_on_bit.law
+    law = values.setdefault("weight_on_bit.law", LAWS[0] if own == "constant" else own)
+    if law not in LAWS:
+        raise InputError(
+            f"{law!r} does not follow the bit speed; allowed: {', '.join(LAWS)}",
+            _where(design, "weight_on_bit.law"),
+        )
+    try:
+        found = design.replace({**values, GAIN: units.SI(0.0), DELAY: units.SI(0.0)})
+        # Limits are compared with the nominal weight only when the law is made of them.
+        found.weight_on_bit  # noqa: B018
+    except InputError as error:
+        key = error.where.removeprefix(design.origin).removeprefix(": ")
+        raise InputError(error.problem, _where(design, f"weight_delay.set: {key}")) from None
+    uncertain_parameters(found)
+    return found
+
+
+def _where(design: Design, key: str) -> str:
+    """A key after the file it is in."""
+    return f"{design.origin}: {key}" if design.origin else key
+
+
+@dataclass(frozen=True, eq=False)
+class DelayedLanes:
+    """Every draw at every delay.
+
+    Attributes
+    ----------
+    parts : tuple of DrawnLanes
+        At no delay, where that is asked for, and at all others: without any lag the first is of
+        the law that acts at once, which has a kernel of its own.
+    draws : int
+        How many draws, the impossible ones included.
+    delays : ndarray, shape (delays,)
+        Increasing (s).
+    """
+
+    parts: tuple[DrawnLanes, ...]
+    draws: int
+    delays: Array
+
+    def run(self, gain: float) -> tuple[Runs, set[tuple[float | None, int | None]]]:
+        """Simulate all at one gain (N s/rad): runs, shape (delays, draws), and step and modes."""
+        found = []
+        at = (self.delays > 0.0).astype(int)
+        sizes = [int((at == k).sum()) for k in (0, 1) if (at == k).any()]
+        for part, size in zip(self.parts, sizes, strict=True):
+            given = _replaced(part, lambda lanes: _with(lanes, gain=np.full(len(lanes), gain)))
+            found.append(run_draws(given, size * self.draws))
+        shape = (len(self.delays), self.draws)
+        measures = {
+            name: np.concatenate([one.measures[name] for one in found]).reshape(shape)
+            for name in MEASURES
+        }
+        status = np.concatenate([one.status for one in found]).reshape(shape)
+        return Runs(measures, status), {(one.step, one.modes) for one in found}
+
+
+def delayed_lanes(following: Design, draws: Draws, delays: Array) -> DelayedLanes:
+    """Lanes of a design at every draw and delay.
+
+    Parameters
+    ----------
+    following : Design
+        From `following_design`.
+    draws : Draws
+        Of its uncertain parameters.
+    delays : ndarray, shape (delays,)
+        Increasing, not negative (s).
+
+    Raises
+    ------
+    InputError
+        Every draw is impossible.
+    """
+    late = delays[delays > 0.0]
+    parts = []
+    if late.size < delays.size:
+        parts.append(drawn_lanes(following, draws))
+    if late.size:
+        first = drawn_lanes(following.replace({DELAY: units.SI(float(late[0]))}), draws)
+        parts.append(_at_delays(first, len(draws), late))
+    return DelayedLanes(tuple(parts), len(draws), delays)
+
+
+def _at_delays(drawn: DrawnLanes, count: int, delays: Array) -> DrawnLanes:
+    """All draws again at every delay, delay by delay."""
+    groups = []
+    for group in drawn.groups:
+        size = len(group.lanes)
+        lanes = group.lanes[np.tile(np.arange(size), len(delays))]
+        numbers = np.concatenate([group.numbers + k * count for k in range(len(delays))])
+        delayed = _with(lanes, delay=np.repeat(delays, size))
+        groups.append(DrawnGroup(group.design, delayed, numbers))
+    return DrawnLanes(tuple(groups), drawn.failures)
+
+
+def _replaced(drawn: DrawnLanes, change: Callable[[Lanes], Lanes]) -> DrawnLanes:
+    groups = tuple(DrawnGroup(g.design, change(g.lanes), g.numbers) for g in drawn.groups)
+    return DrawnLanes(groups, drawn.failures)
+
+
+def _with(lanes: Lanes, **numbers: Array) -> Lanes:
+    """Lanes with other numbers of their weight law."""
+    return replace(lanes, weight=lanes.weight._replace(**numbers))

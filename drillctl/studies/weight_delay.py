@@ -1,0 +1,402 @@
+"""The benefit of a weight that follows the bit speed, against the delay of its path.
+
+W = W_n + K_w (|w_b| - w_ref) takes weight off a slow bit. It needs the bit speed, which comes up
+late. Every gain and delay is run at the same draws of what is uncertain and compared draw by draw
+with the constant weight, which is the same law with K_w = 0.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.progress import SILENT, Progress
+from drillctl.provenance import provenance
+from drillctl.simulation.measures import STATUSES
+from drillctl.studies.delay_limits import (
+    EndedShare,
+    EndsUpTo,
+    HarmfulFrom,
+    ends_up_to,
+    harmful_from,
+)
+from drillctl.studies.delayed_lanes import MEASURES, Runs, delayed_lanes, following_design
+from drillctl.studies.drawn_lanes import Failures
+from drillctl.studies.draws import draw, uncertain_parameters
+from drillctl.studies.intervals import Interval, mean_interval, share_interval
+from drillctl.studies.memory import refuse_too_large
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DelayedBenefit:
+    """One gain at one delay, over all draws.
+
+    Attributes
+    ----------
+    j1 : float or None
+        Mean of J1 over the draws that did not fail (s); None if all did.
+    j1_interval : tuple of float, or None
+        Its bootstrap interval; None for fewer than two draws.
+    difference : float or None
+        Mean over the draws of J1 less that of the constant weight at the same draw (s).
+    difference_interval : tuple of float, or None
+        Bootstrap interval of that mean.
+    pairs : int
+        Draws that neither failed in.
+    ended : int
+        Draws in which stick-slip has ended: the bit did not stick in the last 20 s.
+    ended_share : EndedShare
+        The same as a share of all draws, with its interval.
+    peak_bit_speed : float or None
+        Mean of the largest bit speed of a run (rad/s).
+    peak_pipe_torque : float or None
+        Mean of the largest torque in the uppermost element of a run (N m).
+    mean_weight : float or None
+        Mean weight on bit after the start of the run (N).
+    """
+
+    j1: float | None
+    j1_interval: Interval | None
+    difference: float | None
+    difference_interval: Interval | None
+    pairs: int
+    ended: int
+    ended_share: EndedShare
+    peak_bit_speed: float | None
+    peak_pipe_torque: float | None
+    mean_weight: float | None
+
+    def summary(self) -> dict[str, Any]:
+        """As strict JSON values, SI."""
+        return {
+            "delay": self.ended_share.delay,
+            "j1": self.j1,
+            "j1_interval_95": _listed(self.j1_interval),
+            "difference": self.difference,
+            "difference_interval_95": _listed(self.difference_interval),
+            "pairs": self.pairs,
+            "ended": self.ended,
+            "ended_share": self.ended_share.share,
+            "ended_interval_95": _listed(self.ended_share.interval_95),
+            "peak_bit_speed": self.peak_bit_speed,
+            "peak_pipe_torque": self.peak_pipe_torque,
+            "mean_weight": self.mean_weight,
+        }
+
+
+@dataclass(frozen=True)
+class GainLimits:
+    """How much delay one gain bears.
+
+    Attributes
+    ----------
+    gain : float
+        K_w (N s/rad).
+    ends_up_to : EndsUpTo
+        Longest delay at which stick-slip has ended in 95 % of the draws, shorter ones included.
+    harmful_from : HarmfulFrom
+        Delay at which the mean of J1 stops being under that of the constant weight.
+    """
+
+    gain: float
+    ends_up_to: EndsUpTo
+    harmful_from: HarmfulFrom
+
+
+@dataclass(frozen=True, eq=False)
+class WeightDelay:
+    """A weight on bit that follows the bit speed, over gains and delays, at the same draws.
+
+    Attributes
+    ----------
+    design : Design
+        Its `[weight_delay]` holds gains, delays and law, its `[uncertainty]` number and seed.
+    drawn : dict of ndarray, shape (realizations,)
+        Values of the uncertain parameters by path (SI).
+    runs : Runs, shape (gains, delays, realizations)
+        Measures and statuses.
+    constant : Runs, shape (realizations,)
+        Of the constant weight, K_w = 0.
+    failures : tuple of Failures
+        Why draws came to nothing.
+    step, modes : float and int, or None
+        Scheme of the batch engine; None where it differs from gain to gain.
+    total_seconds : float
+        From call to return (s).
+    provenance : dict of str
+        Versions and processor it came from.
+    """
+
+    design: Design
+    drawn: dict[str, Array]
+    runs: Runs
+    constant: Runs
+    failures: tuple[Failures, ...]
+    step: float | None
+    modes: int | None
+    total_seconds: float
+    provenance: dict[str, str] = field(default_factory=provenance)
+
+    @property
+    def gains(self) -> Array:
+        """K_w (N s/rad), increasing, shape (gains,)."""
+        return np.array(self.design.tables.weight_delay.gains)
+
+    @property
+    def delays(self) -> Array:
+        """Total delays of the path (s), increasing, shape (delays,)."""
+        return np.array(self.design.tables.weight_delay.delays)
+
+    @property
+    def realizations(self) -> int:
+        """Number of draws."""
+        return self.design.tables.uncertainty.realizations
+
+    @property
+    def seed(self) -> int:
+        """What the draws follow from."""
+        return self.design.tables.uncertainty.seed
+
+    @cached_property
+    def baseline(self) -> DelayedBenefit:
+        """The constant weight over all draws; its difference from itself is none."""
+        return self._benefit(self.constant, 0.0)
+
+    @cached_property
+    def benefits(self) -> tuple[tuple[DelayedBenefit, ...], ...]:
+        """By gain and delay."""
+        return tuple(
+            tuple(self._benefit(self.runs.at(i, k), float(d)) for k, d in enumerate(self.delays))
+            for i in range(len(self.gains))
+        )
+
+    @cached_property
+    def limits(self) -> tuple[GainLimits, ...]:
+        """How much delay each gain bears; a gain of zero is never harmful."""
+        return tuple(map(self._limits, map(float, self.gains), self.benefits))
+
+    def _benefit(self, runs: Runs, delay: float) -> DelayedBenefit:
+        j1 = runs.measures["j1"]
+        apart = j1 - self.constant.measures["j1"]
+        paired = ~np.isnan(apart)
+        ended = int(runs.ended.sum())
+        total = self.realizations
+        return DelayedBenefit(
+            j1=_mean(j1),
+            j1_interval=mean_interval(j1[~np.isnan(j1)], self.seed),
+            difference=_mean(apart),
+            difference_interval=mean_interval(apart[paired], self.seed),
+            pairs=int(paired.sum()),
+            ended=ended,
+            ended_share=EndedShare(delay, ended / total, share_interval(ended, total)),
+            peak_bit_speed=_mean(runs.measures["peak_bit_speed"]),
+            peak_pipe_torque=_mean(runs.measures["peak_pipe_torque"]),
+            mean_weight=_mean(runs.measures["mean_weight_after_start"]),
+        )
+
+    def _limits(self, gain: float, benefits: tuple[DelayedBenefit, ...]) -> GainLimits:
+        harmful = HarmfulFrom(None, (None, None))
+        if gain > 0.0:
+            lines = [(one.difference, *(one.difference_interval or (None, None)))
+                     for one in benefits]  # fmt: skip
+            difference, low, high = np.array(lines, dtype=float).T
+            harmful = harmful_from(self.delays, difference, low, high)
+        return GainLimits(gain, ends_up_to([one.ended_share for one in benefits]), harmful)
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """Runs by gain, delay and realization; means, differences, shares; with units."""
+        import xarray
+
+        over = ("gain", "delay", "realization")
+        coordinates = {
+            "gain": ("gain", self.gains, {"units": "N*s/rad"}),
+            "delay": ("delay", self.delays, {"units": "s"}),
+            "realization": ("realization", np.arange(self.realizations)),
+        }
+        flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
+        variables: dict[str, Any] = {
+            "status": (over, self.runs.status, flags),
+            "constant_status": ("realization", self.constant.status, flags),
+        }
+        for name, unit in MEASURES.items():
+            variables[name] = (over, self.runs.measures[name], {"units": unit})
+            alone = self.constant.measures[name]
+            variables[f"constant_{name}"] = ("realization", alone, {"units": unit})
+        for drawn in uncertain_parameters(following_design(self.design)):
+            variables[drawn.path] = ("realization", self.drawn[drawn.path], {"units": drawn.unit})
+        for name, (unit, values) in self._figures().items():
+            variables[name] = (("gain", "delay"), values, {"units": unit})
+        return xarray.Dataset(variables, coordinates, dict(self.provenance))
+
+    def _figures(self) -> dict[str, tuple[str, Array]]:
+        """What is told of each gain and delay, with its unit."""
+
+        def over(pick: Any) -> Array:
+            return np.array([[pick(one) for one in row] for row in self.benefits], dtype=float)
+
+        def end(number: int) -> Array:
+            return over(lambda one: (one.difference_interval or (None, None))[number])
+
+        return {
+            "difference": ("s", over(lambda one: one.difference)),
+            "difference_low": ("s", end(0)),
+            "difference_high": ("s", end(1)),
+            "ended_share": ("1", over(lambda one: one.ended_share.share)),
+            "ended_low": ("1", over(lambda one: one.ended_share.interval_95[0])),
+            "ended_high": ("1", over(lambda one: one.ended_share.interval_95[1])),
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Limits and figures of every gain and delay, settings; SI units."""
+        constant = self.baseline.summary()
+        for key in ("delay", "difference", "difference_interval_95", "pairs"):
+            del constant[key]
+        return {
+            "gains": [
+                {
+                    "gain": limits.gain,
+                    "ends_up_to": limits.ends_up_to.summary(),
+                    "harmful_from": limits.harmful_from.summary(),
+                    "delays": [one.summary() for one in row],
+                }
+                for limits, row in zip(self.limits, self.benefits, strict=True)
+            ],
+            "constant": constant,
+            "delays": self.delays.tolist(),
+            "realizations": self.realizations,
+            "seed": self.seed,
+            "uncertain": list(self.drawn),
+            "failures": [asdict(failure) for failure in self.failures],
+            "step": self.step,
+            "modes": self.modes,
+            "total_seconds": self.total_seconds,
+        }
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
+
+
+def weight_delay(
+    design: Design,
+    gains: Sequence[float | str] | None = None,
+    delays: Sequence[float | str] | None = None,
+    realizations: int | None = None,
+    progress: Progress = SILENT,
+) -> WeightDelay:
+    """Run a weight on bit that follows the bit speed over gains and delays, at the same draws.
+
+    Parameters
+    ----------
+    design : Design
+        Its `[weight_delay]` table gives gains, delays and what its law has beside them; hoist lag,
+        sensor, sampling and limits stay as they are. What is uncertain is drawn as its
+        `[uncertain]` and `[uncertainty]` say.
+    gains : sequence of float or str, optional
+        K_w instead of the design's own: N s/rad, or text with a unit. Not negative.
+    delays : sequence of float or str, optional
+        Total delays of the path instead of the design's own: s, or text with a unit. Not negative.
+    realizations : int, optional
+        Number of draws instead of the design's own.
+    progress : Progress
+        Told of runs.
+
+    Returns
+    -------
+    WeightDelay
+        A draw that is impossible or breaks down is a status and counted, not an exception.
+
+    Raises
+    ------
+    InputError
+        Impossible settings, a law that does not follow the bit speed, every draw impossible, or
+        more runs than fit the memory.
+
+    Notes
+    -----
+    The law is that of Navarro-Lopez & Suarez, Proc. IEEE CCA (2004) 1454-1460, behind the way of
+    `drillctl.weight_on_bit.RealWeight`.
+    """
+    begin = time.perf_counter()
+    design = _asked(design, gains, delays, realizations)
+    table, count = design.tables.weight_delay, design.tables.uncertainty.realizations
+    refuse_too_large([len(table.gains), len(table.delays), count], "weight_delay")
+    following = following_design(design)
+    draws = draw(following, count, design.tables.uncertainty.seed)
+    lanes = delayed_lanes(following, draws, np.array(table.delays))
+    alone = delayed_lanes(following, draws, np.array(table.delays[:1]))
+    progress.begin("simulating delays", count * len(table.delays) * len(table.gains))
+    constant, schemes = alone.run(0.0)
+    found = []
+    for gain in table.gains:
+        runs, scheme = lanes.run(gain) if gain > 0.0 else (constant, schemes)
+        found.append(runs)
+        schemes = schemes | scheme
+        progress.advance(count * len(table.delays))
+    step, modes = next(iter(schemes)) if len(schemes) == 1 else (None, None)
+    return WeightDelay(
+        design=design,
+        drawn=draws.values,
+        runs=_stacked(found, (len(table.delays), count)),
+        constant=constant.at(0),
+        failures=lanes.parts[0].failures,
+        step=step,
+        modes=modes,
+        total_seconds=time.perf_counter() - begin,
+    )
+
+
+def _asked(
+    design: Design,
+    gains: Sequence[float | str] | None,
+    delays: Sequence[float | str] | None,
+    realizations: int | None,
+) -> Design:
+    """The design with what was given beside it, so that it alone makes the run again."""
+    values: dict[str, Any] = {}
+    for key, given in (("gains", gains), ("delays", delays)):
+        if given is not None:
+            values[f"weight_delay.{key}"] = [
+                one if isinstance(one, str) else units.SI(one) for one in given
+            ]
+    if realizations is not None:
+        values["uncertainty.realizations"] = realizations
+    return design.replace(values) if values else design
+
+
+def _stacked(found: Sequence[Runs], shape: tuple[int, int]) -> Runs:
+    """Runs of all gains; those of the constant weight are the same at any delay."""
+    return Runs(
+        {
+            name: np.stack([np.broadcast_to(one.measures[name], shape) for one in found])
+            for name in MEASURES
+        },
+        np.stack([np.broadcast_to(one.status, shape) for one in found]),
+    )
+
+
+def _mean(values: Array) -> float | None:
+    values = values[~np.isnan(values)]
+    return float(values.mean()) if values.size else None
+
+
+def _listed(interval: Interval | None) -> list[float] | None:
+    return None if interval is None else list(interval)
