@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import console
 from drillctl.errors import InputError
+from drillctl.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -106,7 +107,7 @@ def loop(design: Design, options: Options) -> None:
         summary["map"] = found.summary()
         studies.write_loop_table(found, folder.path)
         boundary = None
-        if over_gains(found.axes):
+        if over_gains(found.axes) and design.simple_drive:
             kp, ki = ((float(a.values[0]), float(a.values[-1])) for a in found.axes)
             boundary = linear.gain_boundary(design, window=(kp, ki))
         picture = plots.loop_map(found, boundary=boundary, system=options.units)
@@ -137,6 +138,8 @@ def _loop_map(design: Design, bar: Progress) -> LoopMap | None:
             f"map of the slope margin alone, no root locus: {nodes} nodes; up to {MOST_NODES} the "
             "poles are computed for every cell"
         )
+        return studies.loop_map(design, axes, ("slope_margin",), progress=bar)
+    if not design.simple_drive or isinstance(design.weight_on_bit, PATHS):
         return studies.loop_map(design, axes, ("slope_margin",), progress=bar)
     return studies.loop_map(design, axes, progress=bar)
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from drillctl.drillstring import Drillstring, Section, assemble
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.compiling import OPTIONS
+from drillctl.simulation.kernels.observer_step import NoObserver
 from drillctl.simulation.kernels.string_step import (
     BlockString,
     DenseString,
@@ -16,20 +17,28 @@ from drillctl.simulation.kernels.string_step import (
     look,
 )
 from drillctl.simulation.propagator import string_step
+from drillctl.top_drive import PI
 
 numba = pytest.importorskip("numba")
 STEP = 0.02
 
 
 @numba.njit(**OPTIONS)
-def _steps(string, state, work, torques, seen):
+def _steps(string, drive, observer, state, work, torques, seen):
     for n in range(len(torques)):
-        complete_and_propagate(string, state, work)
+        complete_and_propagate(string, drive, observer, state, work)
         work[r.TOP_TORQUE] = torques[n, 0]
         work[r.BIT_TORQUE] = torques[n, 1]
         speed, angle = look(string, state, work, 0)
         seen[n, 0] = speed
         seen[n, 1] = angle
+
+
+def steps(*arguments):
+    """The steps of a string that nothing asks for its top speed."""
+    nothing = np.zeros(1)
+    string, *rest = arguments
+    _steps(string, PI(nothing, nothing), NoObserver(nothing), *rest)
 
 
 def by_kernel(string: Drillstring, angle, speed, torques, modes=999):
@@ -39,7 +48,7 @@ def by_kernel(string: Drillstring, angle, speed, torques, modes=999):
     state = np.zeros((2 * len(z), r.WIDTH))
     state[: len(z), 0] = z
     seen = np.zeros((len(torques), 2))
-    _steps(stepper.string, state.ravel(), np.zeros(r.ROWS * r.WIDTH), torques, seen)
+    steps(stepper.string, state.ravel(), np.zeros(r.ROWS * r.WIDTH), torques, seen)
     return stepper, seen
 
 
@@ -157,7 +166,7 @@ def test_a_free_undamped_string_keeps_its_energy(seed, steps):
     state = np.zeros((2 * len(z), r.WIDTH))
     state[: len(z), 0] = z
     flat = state.ravel()
-    _steps(
+    steps(
         stepper.string, flat, np.zeros(r.ROWS * r.WIDTH), np.zeros((steps, 2)), np.zeros((steps, 2))
     )
     n = string.nodes
@@ -183,7 +192,7 @@ def test_held_torques_do_exactly_the_work_of_the_change_of_angle(seed):
     to_state = np.hstack([stepper.angle_to_state, stepper.speed_to_state])
     state[: len(to_state), 0] = to_state @ before
     flat, work = state.ravel(), np.zeros(r.ROWS * r.WIDTH)
-    _steps(stepper.string, flat, work, np.array([torques]), np.zeros((1, 2)))
+    steps(stepper.string, flat, work, np.array([torques]), np.zeros((1, 2)))
     # The pass has propagated freely; the held torques are the state's `push`.
     pushed = flat.reshape(-1, r.WIDTH)[: len(to_state), 0] + stepper.string.push.reshape(-1, 2) @ [
         top,
