@@ -34,7 +34,7 @@ def _steps(string, drive, observer, state, work, torques, seen):
         seen[n, 1] = angle
 
 
-def steps(*arguments):
+def run_steps(*arguments):
     """The steps of a string that nothing asks for its top speed."""
     nothing = np.zeros(1)
     string, *rest = arguments
@@ -48,7 +48,7 @@ def by_kernel(string: Drillstring, angle, speed, torques, modes=999):
     state = np.zeros((2 * len(z), r.WIDTH))
     state[: len(z), 0] = z
     seen = np.zeros((len(torques), 2))
-    steps(stepper.string, state.ravel(), np.zeros(r.ROWS * r.WIDTH), torques, seen)
+    run_steps(stepper.string, state.ravel(), np.zeros(r.ROWS * r.WIDTH), torques, seen)
     return stepper, seen
 
 
@@ -166,7 +166,7 @@ def test_a_free_undamped_string_keeps_its_energy(seed, steps):
     state = np.zeros((2 * len(z), r.WIDTH))
     state[: len(z), 0] = z
     flat = state.ravel()
-    steps(
+    run_steps(
         stepper.string, flat, np.zeros(r.ROWS * r.WIDTH), np.zeros((steps, 2)), np.zeros((steps, 2))
     )
     n = string.nodes
@@ -192,7 +192,7 @@ def test_held_torques_do_exactly_the_work_of_the_change_of_angle(seed):
     to_state = np.hstack([stepper.angle_to_state, stepper.speed_to_state])
     state[: len(to_state), 0] = to_state @ before
     flat, work = state.ravel(), np.zeros(r.ROWS * r.WIDTH)
-    steps(stepper.string, flat, work, np.array([torques]), np.zeros((1, 2)))
+    run_steps(stepper.string, flat, work, np.array([torques]), np.zeros((1, 2)))
     # The pass has propagated freely; the held torques are the state's `push`.
     pushed = flat.reshape(-1, r.WIDTH)[: len(to_state), 0] + stepper.string.push.reshape(-1, 2) @ [
         top,
