@@ -45,6 +45,7 @@ format: $(BIN)/drillctl
 bench: $(BIN)/drillctl
 	$(BIN)/python benchmarks/map_speed.py
 	$(BIN)/python benchmarks/linear_speed.py
+	$(BIN)/python benchmarks/law_speed.py
 
 clean:
 	rm -rf runs build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
