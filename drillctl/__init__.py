@@ -8,6 +8,7 @@ A design flows one way: file -> `Design` -> plant -> simulation -> map -> region
 `bit_rock`              friction laws of the bit, set-valued at rest
 `top_drive`             control laws of the top drive
 `weight_on_bit`         laws of the weight on bit
+`program`               what changes by the clock in a run
 `linear`                plant and loop as `control.StateSpace`, modes, margins, boundaries
 `simulation`            reference solver (located events) and batch engine (lanes)
 `studies`               sweeps, regions, comparisons, audits
