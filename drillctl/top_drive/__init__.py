@@ -10,6 +10,9 @@ that both are zero in steady drilling.
   engine's form.
 - `impedance(s)`: torque against the motion per speed (N m s/rad) of the linearised law; what
   the string feels of the drive, its inertia apart.
+
+`RealDrive` and `SampledDrive` have a memory: filters, integral, motor. They have an `impedance` and
+the `torque` of steady motion; how they move is in `motion`.
 """
 
 from drillctl.top_drive.constant_torque import ConstantTorque
