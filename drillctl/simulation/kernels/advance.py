@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined, widest_vectors
@@ -211,12 +211,14 @@ def _compile() -> Any:
     # one file only, notices a change in any law or kernel.
     version = fingerprint(sources())
 
-    @njit(parallel=True, cache=True, **OPTIONS)
+    # Threads are the caller's: numba's own loop in parallel compiles everything twice.
+    @njit(nogil=True, cache=True, **OPTIONS)
     def run(
+        begin: int, end: int,
         string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
         observer: Any, speed: Any, start: Any, clock: Any, measures: Any, traces: Any,
     ) -> str:  # fmt: skip
-        for block in prange(speed.shape[1] // WIDTH):
+        for block in range(begin, end):
             advance_block(
                 string, friction, before, drive, weight, program, observer,
                 speed, start, clock, measures, traces, block * WIDTH,
@@ -242,9 +244,11 @@ def fingerprint(paths: list[Path]) -> str:
 
 
 run = _compile()
-"""Advance lanes from time zero to the end: `run(string, friction, before, drive, weight, program,
-observer, speed, start, clock, measures, traces)`.
+"""Advance lanes from time zero to the end: `run(begin, end, string, friction, before, drive, weight,
+program, observer, speed, start, clock, measures, traces)`.
 
+- `begin`, `end`: blocks of `WIDTH` lanes to advance, of all those there are. Blocks do not see each
+  other: threads may take some each, the interpreter's lock is not held.
 - `string`: `BlockString` or `DenseString`.
 - `friction`, `before`, `drive`, `weight`, `program`: laws with an array, shape (lanes,), for each
   number, those with a memory as prepared by `simulation.step_laws`; `before` is the rock before
