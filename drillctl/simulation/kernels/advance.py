@@ -244,8 +244,8 @@ def fingerprint(paths: list[Path]) -> str:
 
 
 run = _compile()
-"""Advance lanes from time zero to the end: `run(begin, end, string, friction, before, drive, weight,
-program, observer, speed, start, clock, measures, traces)`.
+"""Advance lanes from time zero to the end: `run(begin, end, string, friction, before,
+drive, weight, program, observer, speed, start, clock, measures, traces)`.
 
 - `begin`, `end`: blocks of `WIDTH` lanes to advance, of all those there are. Blocks do not see each
   other: threads may take some each, the interpreter's lock is not held.
