@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import console
 from drillctl.errors import InputError
-from drillctl.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -139,7 +138,7 @@ def _loop_map(design: Design, bar: Progress) -> LoopMap | None:
             "poles are computed for every cell"
         )
         return studies.loop_map(design, axes, ("slope_margin",), progress=bar)
-    if not design.simple_drive or isinstance(design.weight_on_bit, PATHS):
+    if not design.simple_loop:
         return studies.loop_map(design, axes, ("slope_margin",), progress=bar)
     return studies.loop_map(design, axes, progress=bar)
 
@@ -284,6 +283,8 @@ def stability_map(design: Design, options: Options) -> None:
         return
     with _running(folder), console.progress() as bar:
         result = studies.sweep(design, progress=bar, blocks=folder.blocks())
+    if result.minimum is None:
+        console.note("warning: no cell gives a finite answer; see the statuses")
     store.write_data(result, folder.path)
     studies.write_tables(result, folder.path)
     if len(result.axes) == 2:

@@ -21,26 +21,19 @@ class DriveTable(Table):
     """
 
     torque_limit: q.TorqueLimit = None
-    minimum_torque: q.TorqueLimit = None
+    minimum_torque: q.LeastTorque = None
     power_limit: q.PowerLimit = None
     torque_rate_limit: q.TorqueRateLimit = None
     anti_windup: Literal["back-calculation", "none"] = "back-calculation"
     tracking_time: q.Time | None = None
-    sampling_period: q.TimeOrZero = 0.0
+    sampling_period: q.SamplingPeriod = 0.0
     one_sample_delay: bool = False
-    lag: q.TimeOrZero = 0.0
-    encoder_lag: q.TimeOrZero = 0.0
-    torque_lag: q.TimeOrZero = 0.0
+    lag: q.Lag = 0.0
+    encoder_lag: q.Lag = 0.0
+    torque_lag: q.Lag = 0.0
 
     @model_validator(mode="after")
-    def _in_order(self) -> DriveTable:
-        least = self.minimum_torque
-        if least is not None and least > 0.0:
-            raise InputError(f"minimum_torque {least / 1e3:g} kN*m must not be more than 0")
-        for name in ("torque_limit", "power_limit", "torque_rate_limit"):
-            value = getattr(self, name)
-            if value is not None and value <= 0.0:
-                raise InputError(f"{name} must be more than 0, got {value:g} in SI units")
+    def _late_samples(self) -> DriveTable:
         if self.one_sample_delay and self.sampling_period == 0.0:
             raise InputError("one_sample_delay needs a sampling_period")
         return self

@@ -16,7 +16,7 @@ from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError
 from drillctl.program import Program
 from drillctl.top_drive import PI, ConstantTorque, TopDriveLaw
-from drillctl.weight_on_bit import WeightLaw
+from drillctl.weight_on_bit import ObservedWeight, RealWeight, WeightLaw
 
 if TYPE_CHECKING:
     import control
@@ -129,6 +129,16 @@ class Design:
     def simple_drive(self) -> bool:
         """Whether the drive is ideal: two gains, or a constant torque, tell all of it."""
         return isinstance(self.top_drive, (PI, ConstantTorque))
+
+    @property
+    def simple_loop(self) -> bool:
+        """Whether the linear loop is told by two gains: no memory in drive or weight.
+
+        An alarm, which drilling steadily never sets off, is none.
+        """
+        return self.simple_drive and not isinstance(
+            self.weight_on_bit, (RealWeight, ObservedWeight)
+        )
 
     @property
     def table_range(self) -> tuple[float, float]:

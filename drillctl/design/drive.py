@@ -47,7 +47,12 @@ def top_drive(tables: DesignTables, string: Callable[[], Drillstring]) -> TopDri
         A law tuned to the pipe on a string whose uppermost section is a lumped spring.
     """
     table = tables.controller
-    controller = _controller(tables, string)
+    try:
+        controller = _controller(tables, string)
+    except InputError as error:
+        raise InputError(
+            f"{table.law} is tuned to the pipe: {error.problem}", "controller.law"
+        ) from None
     if table.drive.ideal and controller.mobility == 0.0:
         if isinstance(table, ConstantTorqueTable):
             return ConstantTorque(controller.feedforward)

@@ -335,6 +335,20 @@ def program(tables: DesignTables) -> Program:
             f"{scenario.bit_rock.until:g} s: the run ends at {duration:g} s",
             "scenario.bit_rock.until",
         )
+    rock = scenario.bit_rock
+    if rock.until == 0.0 and (rock.static_factor, rock.sliding_factor, rock.decay_factor) != (
+        1,
+        1,
+        1,
+    ):
+        raise InputError(
+            "is missing: when the rock becomes the design's own", "scenario.bit_rock.until"
+        )
+    period = tables.controller.drive.sampling_period
+    if period >= duration:
+        raise InputError(
+            f"{period:g} s: the run ends at {duration:g} s", "controller.drive.sampling_period"
+        )
     speed = weight = STILL
     if scenario.speed.start is not None:
         first = scenario.speed.start - point.speed

@@ -80,14 +80,37 @@ def _count(check: Check) -> BeforeValidator:
     return BeforeValidator(read)
 
 
-def _limit(kind: Kind) -> BeforeValidator:
+SHORTEST_LAG = 1e-4
+"""Shortest time constant (s) but for none: less would cost the solvers much and change nothing."""
+SHORTEST_PERIOD = 1e-3
+"""Shortest sampling period (s) but for none."""
+
+
+def _none_or_lag(found: float, written: object) -> None:
+    if found != 0.0 and not found >= SHORTEST_LAG:
+        raise InputError(f"{shown(written)} is not allowed: it must be 0 or at least 0.1 ms")
+
+
+def _none_or_period(found: float, written: object) -> None:
+    if found != 0.0 and not found >= SHORTEST_PERIOD:
+        raise InputError(f"{shown(written)} is not allowed: it must be 0 or at least 1 ms")
+
+
+def _not_positive(found: float, written: object) -> None:
+    if not found <= 0:
+        raise InputError(f"{shown(written)} is not allowed: it must be 0 or less")
+
+
+def _limit(kind: Kind, check: Check = _positive) -> BeforeValidator:
     """A limit: infinity, in whatever form it is written, is none."""
-    read = _read(kind).func
+    read = _read(kind, check).func
 
     def reads(value: object) -> float | None:
         if value is None or (isinstance(value, float) and value == math.inf):
             return None
-        if isinstance(value, str) and value.strip().lower().split(" ")[0] in ("inf", "infinity"):
+        if isinstance(value, str) and value.strip().lower().split(" ")[0] in (
+            "inf", "infinity", "-inf", "-infinity"
+        ):  # fmt: skip
             return None
         return float(read(value))  # type: ignore[call-arg]
 
@@ -115,6 +138,8 @@ Diameter = Annotated[float, units.DIAMETER, _read(units.DIAMETER, _positive)]
 Bore = Annotated[float, units.DIAMETER, _read(units.DIAMETER, _not_negative)]
 Time = Annotated[float, units.TIME, _read(units.TIME, _positive)]
 TimeOrZero = Annotated[float, units.TIME, _read(units.TIME, _not_negative)]
+Lag = Annotated[float, units.TIME, _read(units.TIME, _none_or_lag)]
+SamplingPeriod = Annotated[float, units.TIME, _read(units.TIME, _none_or_period)]
 Rate = Annotated[float, units.RATE, _read(units.RATE, _not_negative)]
 Inertia = Annotated[float, units.INERTIA, _read(units.INERTIA, _not_negative)]
 Density = Annotated[float, units.DENSITY, _read(units.DENSITY, _positive)]
@@ -136,6 +161,7 @@ Share = Annotated[float, _number(_share)]
 
 # Limits: None where there is none.
 TorqueLimit = Annotated[float | None, units.TORQUE, _limit(units.TORQUE)]
+LeastTorque = Annotated[float | None, units.TORQUE, _limit(units.TORQUE, _not_positive)]
 PowerLimit = Annotated[float | None, units.POWER, _limit(units.POWER)]
 TorqueRateLimit = Annotated[float | None, units.TORQUE_RATE, _limit(units.TORQUE_RATE)]
 WeightRateLimit = Annotated[float | None, units.FORCE_RATE, _limit(units.FORCE_RATE)]

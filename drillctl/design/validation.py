@@ -49,6 +49,8 @@ def validated(tree: Tree, origin: str) -> DesignTables:
         parts.refuse_impossible_string(tables)
         parts.bit_rock_before(tables)
         parts.program(tables)
+        if tables.controller.law not in ("pi", "constant-torque"):
+            drive.top_drive(tables, lambda: parts.drillstring(tables))
         if not tables.controller.drive.ideal:
             drive.refuse_weak_drive(
                 tables, parts.drillstring(tables), parts.torque_at_set_speed(tables)

@@ -43,8 +43,8 @@ def weight_on_bit(tables: DesignTables) -> WeightLaw:
             _refuse_outside(nominal, table.minimum, math.inf)
             rate, hoist = _hoist(table.path)
             return AlarmWeight(
-                nominal, table.minimum, table.path.delay, table.path.sensor_lag, hoist, rate,
-                table.window, table.alarm, table.calm, table.reduction,
+                nominal, table.minimum / nominal, table.path.delay, table.path.sensor_lag, hoist,
+                rate, table.window, table.alarm, table.calm, table.reduction,
             )  # fmt: skip
         case FollowingSpeedTable():
             return _following(table, nominal, tables.operating_point.speed)

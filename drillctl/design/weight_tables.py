@@ -20,16 +20,10 @@ class PathTable(Table):
     """
 
     delay: q.TimeOrZero = 0.0
-    sampling_period: q.TimeOrZero = 0.0
-    sensor_lag: q.TimeOrZero = 0.0
-    hoist_lag: q.TimeOrZero = 0.0
+    sampling_period: q.SamplingPeriod = 0.0
+    sensor_lag: q.Lag = 0.0
+    hoist_lag: q.Lag = 0.0
     rate_limit: q.WeightRateLimit = None
-
-    @model_validator(mode="after")
-    def _rate(self) -> PathTable:
-        if self.rate_limit is not None and self.rate_limit <= 0.0:
-            raise InputError(f"rate_limit must be more than 0, got {self.rate_limit:g} N/s")
-        return self
 
     @property
     def ideal(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -111,10 +112,16 @@ def telling_grid(ends: Ends) -> Array:
     ndarray
         Increasing, the first more than zero.
     """
+    return _grid_of(ends.parts, model_of(ends), count_of(ends))
+
+
+@functools.lru_cache(maxsize=64)
+def _grid_of(parts: Parts, model: Model, count: int) -> Array:
+    """The same for maps of loops on one string, made once; not to be written to."""
     marks = np.unique(
         np.concatenate(
             [
-                natural_frequencies(ends.parts, model_of(ends), count_of(ends), top, bit)
+                natural_frequencies(parts, model, count, top, bit)
                 for top in (False, True)
                 for bit in (False, True)
             ]
@@ -126,4 +133,6 @@ def telling_grid(ends: Ends) -> Array:
     share = 0.5 * (1.0 - np.cos(np.pi * (np.arange(BETWEEN) + 0.5) / BETWEEN))
     inner = (marks[:-1, None] + np.diff(marks)[:, None] * share).ravel()
     slow = np.geomspace(1e-10 * marks[0], marks[0], 300, endpoint=False)
-    return np.unique(np.concatenate([slow, inner]))
+    grid = np.unique(np.concatenate([slow, inner]))
+    grid.flags.writeable = False
+    return grid

@@ -172,7 +172,7 @@ def loop(design: Design) -> LoopAnalysis:
         There is no steady drilling: the drive cannot turn the bit.
     """
     point = operating_point(design)
-    if design.simple_drive and not isinstance(design.weight_on_bit, PATHS):
+    if design.simple_loop:
         return _of_gains(design, point)
     return _of_any(design, point)
 
@@ -240,7 +240,7 @@ def tolerated_slope(design: Design, speed: float) -> tuple[float, float]:
     """
     ends = ends_of(design.string)
     at_once = not isinstance(design.weight_on_bit, PATHS)
-    if design.simple_drive and at_once:
+    if design.simple_loop:
         return slope_margin(ends, *design.top_drive.gains())
     # A weight that moves at once is in the slope, not in the margin.
     bit = BitSide(0.0, None if at_once else weight_path(design, speed))

@@ -93,7 +93,7 @@ def root_locus(design: Design, path: str, values: ArrayLike, count: int = 12) ->
 def _lowest(design: Design, count: int) -> ComplexArray:
     point = operating_point(design)
     at_once = not isinstance(design.weight_on_bit, PATHS)
-    if design.simple_drive and at_once:
+    if design.simple_loop:
         return loop_poles(design.string, *design.top_drive.gains(), point.slope)[:count]
     path = None if at_once else weight_path(design, point.speed)
     return model_poles(design, BitSide(point.slope, path))[:count]

@@ -85,10 +85,14 @@ def _panel(ax: Axes, run: Simulation, paths: Sequence[str]) -> None:
 def _title(run: Simulation, paths: Sequence[str]) -> str:
     if paths:
         numbers = ", ".join(_named(run, path) for path in paths)
-    else:
+    elif run.design.simple_drive:
         law = run.design.top_drive
         numbers = ", ".join(f"{k} {v:g}" for k, v in law._asdict().items())  # type: ignore[attr-defined]
-    return f"J1 {run.measures.j1:.1f} s: {numbers}"
+    else:
+        numbers = run.design.tables.controller.law
+    j1 = run.measures.j1
+    # A run that broke down has no measures.
+    return f"{run.status}: {numbers}" if j1 is None else f"J1 {j1:.1f} s: {numbers}"
 
 
 def _named(run: Simulation, path: str) -> str:

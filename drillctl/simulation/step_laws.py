@@ -110,7 +110,7 @@ def weight_step(weight: Any, step: float) -> Any:
     hoist = (kept(weight.hoist, step), ramp_followed(weight.hoist, step))
     if isinstance(weight, AlarmWeight):
         made: Any = AlarmWeightStep(
-            weight.nominal, weight.least, weight.delay, weight.window, weight.alarm, weight.calm,
+            weight.nominal, weight.floor, weight.delay, weight.window, weight.alarm, weight.calm,
             weight.reduction, *seen, *hoist, weight.rate * step,
         )  # fmt: skip
     elif np.any(weight.period > 0.0):

@@ -160,9 +160,9 @@ def equalising_shift(drawn: DrawnLanes, count: int) -> float:
 def _allowed(drawn: DrawnLanes) -> tuple[float, float]:
     """Shifts (N) that keep the nominal weight of every draw within the limits of its law."""
     laws = [group.lanes.weight for group in drawn.groups]
+    if isinstance(laws[0], AlarmWeight):  # its least weight is a share of the nominal one
+        return max(float(np.max(-law.nominal)) for law in laws), math.inf
     low = max(float(np.max(law.least - law.nominal)) for law in laws)
-    if isinstance(laws[0], AlarmWeight):  # nothing limits its nominal weight from above
-        return low, math.inf
     high = min(float(np.min(law.most - law.nominal)) for law in laws)
     return low, high
 

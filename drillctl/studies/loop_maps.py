@@ -18,7 +18,6 @@ from drillctl.linear.loop_poles import many_loop_poles
 from drillctl.progress import SILENT, Progress
 from drillctl.studies.grid import Axis, Group, axes_of, groups, shape_of
 from drillctl.studies.steady import gains_of, slopes_tolerated, steady_drilling
-from drillctl.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -176,7 +175,7 @@ def _of_poles(
 ) -> dict[str, Array]:
     import numba
 
-    if not group.design.simple_drive or isinstance(group.lanes.weight, PATHS):
+    if not group.design.simple_loop:
         raise InputError(
             "maps of poles take an ideal drive and a weight that acts at once; slope_margin is "
             "mapped for all",

@@ -15,7 +15,6 @@ from drillctl.linear.operating_point import operating_point, rock_at
 from drillctl.linear.slope_margin import SlopeMargins, slope_margins
 from drillctl.simulation.lanes import Lanes
 from drillctl.studies.grid import Axis, Group, cell_design
-from drillctl.weight_on_bit import PATHS
 
 Array = NDArray[np.float64]
 
@@ -74,7 +73,7 @@ def slopes_tolerated(
     comes late.
     """
     lanes = group.lanes
-    if group.design.simple_drive and not isinstance(lanes.weight, PATHS):
+    if group.design.simple_loop:
         return slope_margins(ends_of(group.design.string), *gains_of(lanes))
     slope, omega = np.full((2, len(lanes)), np.nan)
     for lane in np.flatnonzero(np.isfinite(speed)):

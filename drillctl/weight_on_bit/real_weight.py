@@ -121,8 +121,8 @@ class AlarmWeight(NamedTuple):
     ----------
     nominal : float
         Weight W_n without alarm (N).
-    least : float
-        W_min (N), above zero.
+    floor : float
+        W_min over the nominal weight, above zero.
     delay : float
         From the end of a window to the driller (s), at most the window.
     sensor, hoist, rate : float
@@ -136,7 +136,7 @@ class AlarmWeight(NamedTuple):
     """
 
     nominal: Any
-    least: Any
+    floor: Any
     delay: Any
     sensor: Any
     hoist: Any
@@ -162,9 +162,8 @@ class AlarmWeight(NamedTuple):
             Of the bit speed in the window (rad/s).
         """
         spread = 0.5 * (high - low)
-        floor = self.least / self.nominal
         lower = level * (1.0 - self.reduction)
-        lower = lower + (lower < floor) * (floor - lower)
+        lower = lower + (lower < self.floor) * (self.floor - lower)
         upper = level / (1.0 - self.reduction)
         upper = upper + (upper > 1.0) * (1.0 - upper)
         # Not as a quotient: a bit that stands still has no mean, and is cause for alarm.

@@ -316,11 +316,11 @@ def verbs_on(name):
     return verbs | ({"cycle": []} if "2dof" in name else {})
 
 
-# The same rig at other weights on bit tells nothing new in a quick run; the last two take kernels
-# of their own, each compiled for a quarter of a minute.
+# The same rig at other weights on bit tells nothing new in a quick run; the last four take several
+# kernels of their own.
 SLOW = (
     "monteiro-trindade-80kn", "monteiro-trindade-100kn", "monteiro-trindade-160kn",
-    "pi-vs-delayed-wob-140kn", "start-up-140kn",
+    "pi-vs-delayed-wob-140kn", "start-up-140kn", "slip-laws-140kn", "six-drives-100kn",
 )  # fmt: skip
 
 
@@ -340,6 +340,17 @@ def test_every_verb_on_every_design(call, name):
         note = "one case only: give others in compare.cases to compare it with\n" if alone else ""
         assert (code, err) == (0, f"{note}results: runs/{name}-{verb}-1\n")
         assert parsed(out)
+
+
+def test_a_run_that_breaks_down_is_a_status(call):
+    """A torque fed back through one sample, nineteen times itself: no finite answer."""
+    controller = ["controller.law=active-damping", "controller.drive.sampling_period=20 ms"]
+    sets = [word for text in controller for word in ("--set", text)]
+    code, out, _ = call("simulate", DESIGN, *sets, "--engine", "batch", "--json")
+    assert code == 0
+    found = parsed(out)
+    assert found["status"] == "failed"
+    assert found["measures"]["j1"] is None
 
 
 @pytest.mark.usefixtures("_pictures")

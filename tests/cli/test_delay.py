@@ -12,6 +12,8 @@ import drillctl
 from drillctl.cli import run
 
 SHIPPED = "dynamic-wob-delay-140kn"
+# One worker: the kernels of these runs are compiled once.
+pytestmark = pytest.mark.xdist_group("delay")
 SMALL = [
     "--set", "simulation.duration=10 s", "--realizations", "3",
     "--set", "weight_delay.gains=['0 kN*s/rad', '6 kN*s/rad']",

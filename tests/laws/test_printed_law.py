@@ -48,7 +48,12 @@ def drift(motion, piece):
 
 
 @pytest.mark.parametrize(
-    ("kp", "ki", "weight"), [(625, 125, 140), (200, 100, 140), (200, 100, 120)]
+    ("kp", "ki", "weight"),
+    [
+        (625, 125, 140),
+        pytest.param(200, 100, 140, marks=pytest.mark.slow),
+        pytest.param(200, 100, 120, marks=pytest.mark.slow),
+    ],
 )
 def test_close_to_the_set_valued_law(kp, ki, weight):
     # Measured: J1 within 6.7e-6, 3.3e-7 and 3.1e-6; time stuck 0.006, 0.022 and 0.018 s longer.
@@ -85,6 +90,7 @@ def test_a_smaller_tolerance_tends_to_the_set():
     assert off[1] / off[2] == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_same_by_an_implicit_integrator():
     design = printed(**{"simulation.duration": "15 s"})
     one, other = (sample(solve(design, 1e-9, by)).measures for by in ("DOP853", "Radau"))

@@ -241,10 +241,19 @@ def test_a_drive_too_weak_to_free_the_bit_stalls_and_says_so():
     [
         ({"torque_limit": "6 kN*m"}, r"controller.drive.torque_limit: gives 6 kN\*m .* 6.6 kN\*m"),
         ({"power_limit": "50 kW"}, r"controller.drive.power_limit: gives 4.775 kN\*m"),
-        ({"torque_limit": "-1 kN*m"}, "torque_limit must be more than 0"),
-        ({"minimum_torque": "1 kN*m"}, "minimum_torque 1 .* must not be more than 0"),
+        (
+            {"torque_limit": "-1 kN*m"},
+            "drive.torque_limit: '-1 kN.m' is not allowed: it must be gr",
+        ),
+        (
+            {"minimum_torque": "1 kN*m"},
+            "drive.minimum_torque: '1 kN.m' is not allowed: it must be 0",
+        ),
         ({"one_sample_delay": True}, "one_sample_delay needs a sampling_period"),
         ({"lag": "-1 s"}, "controller.drive.lag: '-1 s' is not allowed"),
+        ({"lag": "0.01 ms"}, "controller.drive.lag: .* 0 or at least 0.1 ms"),
+        ({"sampling_period": "0.1 ms"}, "sampling_period: .* 0 or at least 1 ms"),
+        ({"sampling_period": "100 s"}, "controller.drive.sampling_period: 100 s: the run ends"),
         ({"lag": 0.1}, "controller.drive.lag: 0.1 has no unit"),
         ({"torqe_limit": "9 kN*m"}, "controller.drive.torqe_limit.*did you mean 'torque_limit'"),
     ],

@@ -32,7 +32,8 @@ def eigenvalue_mask(design, slope, kp, ki):
 @pytest.mark.parametrize(
     ("name", "values", "points"),
     [
-        (DESIGN, {}, 200),
+        (DESIGN, {}, 80),
+        pytest.param(DESIGN, {}, 200, marks=pytest.mark.slow),
         (DESIGN, {"drillstring.sections.pipe.stiffness_damping": "1 ms"}, 80),
         (DESIGN, {"operating_point.speed": "80 rpm"}, 80),
         ("monteiro-trindade-120kn", {"drillstring.sections.pipe.elements": 10}, 80),

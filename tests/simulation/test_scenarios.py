@@ -118,6 +118,7 @@ def test_a_changed_rock_is_another_law():
             {"scenario.bit_rock": {"until": "9 s", "static_factor": 0.2}},
             "scenario.bit_rock.static_factor: static torque would be less",
         ),
+        ({"scenario.bit_rock": {"static_factor": 0.9}}, "scenario.bit_rock.until: is missing"),
         ({"scenario.sped": {}}, "scenario.sped: unknown key; did you mean 'speed'"),
         (
             {

@@ -169,7 +169,7 @@ def advance_block(
         for i in range(start.shape[0]):
             state[i * WIDTH + lane] = start[i, first + lane]
     begin_program(program, before, work, first)
-    begin_drive(work)
+    begin_drive(drive, work)
     begin_weight(weight, observer, work, memory, first)
     _begin(friction, weight, work)
     begin_measures(work)

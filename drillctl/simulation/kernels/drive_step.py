@@ -24,9 +24,33 @@ from drillctl.simulation.kernels.laws import at_lane, mean_torque, torque_at
 from drillctl.simulation.kernels.rows import WIDTH
 
 
-@inlined
-def begin_drive(work: Any) -> None:
+def begin_drive(drive: Any, work: Any) -> None:
     """Memory at time zero; the top speed is in its row."""
+    raise NotImplementedError("compiled only")
+
+
+@overload(begin_drive)
+def _begin_drive(drive, work):
+    if drive.instance_class is RealStep:
+        return lambda drive, work: _begin_real(drive, work)
+    return lambda drive, work: _begin(work)
+
+
+@inlined
+def _begin_real(drive: Any, work: Any) -> None:
+    """A motor without lag gives its torque from the first moment on."""
+    _begin(work)
+    for lane in range(WIDTH):
+        law = at_lane(drive, work, r.DRIVE, lane)
+        _limits(law, work[r.TOP_SPEED + lane] + work[r.SET_SPEED + lane], work, lane)
+        error = law.kp * (work[r.LEAD + lane] - work[r.TOP_SPEED + lane])
+        wanted = (law.feedforward + error) / (1.0 + law.kp * law.by_torque)
+        given = _clip(wanted, work[r.LEAST + lane], work[r.MOST + lane])
+        work[r.MOTOR + lane] = given if law.mean == 0.0 else 0.0
+
+
+@inlined
+def _begin(work: Any) -> None:
     for lane in range(WIDTH):
         speed = work[r.TOP_SPEED + lane]
         work[r.SEEN + lane] = speed

@@ -72,6 +72,7 @@ def _first_rows(program: Any, before: Any, work: Any, first: int) -> None:
     load_block(program, work, r.PROGRAM, first)
     for lane in range(WIDTH):
         law = at_lane(program, work, r.PROGRAM, lane)
+        work[r.LEAD + lane] = _value(law.speed_first, law.speed_begin, law.speed_end, 0.0)
         work[r.NOMINAL + lane] = work[r.WEIGHT + lane]
         _set_nominal(law, work, lane, 0.0)
     load_block(before, work, r.FRICTION, first)

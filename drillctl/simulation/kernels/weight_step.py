@@ -96,14 +96,14 @@ class AlarmWeightStep(NamedTuple):
 
     Attributes
     ----------
-    nominal, least, delay, window, alarm, calm, reduction : ndarray
+    nominal, floor, delay, window, alarm, calm, reduction : ndarray
         As in the law.
     seen_keep, seen_ramp, hoist_keep, hoist_ramp, most_moved : ndarray
         As in `RealWeightStep`.
     """
 
     nominal: Any
-    least: Any
+    floor: Any
     delay: Any
     window: Any
     alarm: Any
