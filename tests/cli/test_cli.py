@@ -192,6 +192,7 @@ def test_regions_json(call):
     assert drillctl.open(f"runs/{BISTABLE}-regions-1").summary() == found
 
 
+@pytest.mark.xdist_group("regularisation")
 def test_regularisation_json(call):
     axes = ["--axis", "controller.kp=500:650:2", "--axis", "controller.ki=75:150:2"]
     code, out, _ = call("regularisation", DESIGN, "--json", *axes)
@@ -316,11 +317,12 @@ def verbs_on(name):
     return verbs | ({"cycle": []} if "2dof" in name else {})
 
 
-# The same rig at other weights on bit tells nothing new in a quick run; the last four take several
+# The same rig at other weights on bit tells nothing new in a quick run; the last six take several
 # kernels of their own.
 SLOW = (
     "monteiro-trindade-80kn", "monteiro-trindade-100kn", "monteiro-trindade-160kn",
     "pi-vs-delayed-wob-140kn", "start-up-140kn", "slip-laws-140kn", "six-drives-100kn",
+    "torque-limited-140kn", "pi-vs-dynamic-wob-140kn",
 )  # fmt: skip
 
 

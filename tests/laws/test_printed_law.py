@@ -79,6 +79,7 @@ def test_a_stuck_bit_drifts_by_at_most_the_tolerance():
     assert np.any((run.signals["stuck"] == 1.0) & (run.signals["bit_speed"] != 0.0))
 
 
+@pytest.mark.slow
 def test_a_smaller_tolerance_tends_to_the_set():
     # J1 differs by an amount proportional to the tolerance: 2.8e-4, 1.4e-4, 7.1e-5 s.
     due = sample(solve(exact(**{"simulation.duration": "30 s"}))).measures.j1

@@ -190,7 +190,9 @@ print(json.dumps([float(x).hex() for x in batch.measures["j1"]]))
 """
 
 
-@pytest.mark.parametrize(("width", "threads"), [(8, 2), (32, 1)])
+@pytest.mark.parametrize(
+    ("width", "threads"), [(8, 2), pytest.param(32, 1, marks=pytest.mark.slow)]
+)
 def test_the_same_bits_for_any_block_width_and_threads(width, threads, tmp_path):
     code = _PRINT_BITS.format(folder=os.path.dirname(__file__), threads=threads)  # noqa: PTH120
     environment = os.environ | {"DRILLCTL_BLOCK_WIDTH": str(width)}
