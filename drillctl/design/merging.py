@@ -120,6 +120,8 @@ def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
             # The default controller is what a gain alone is a change of.
             controller = DesignTables.model_fields["controller"].default
             tree = {**tree, "controller": controller.model_dump(exclude={"drive"})}
+        if "weight_on_bit" not in tree and path.startswith("weight_on_bit."):
+            tree = {**tree, "weight_on_bit": {"law": "constant"}}
         tree = overlay(tree, branch(path, values[path], tree))
     return tree
 

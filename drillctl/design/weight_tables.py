@@ -33,9 +33,10 @@ class PathTable(Table):
 
 
 class ConstantWeightTable(Table):
-    """Weight on bit held at the operating point's value."""
+    """Weight on bit held at the operating point's value; its path waits for another law."""
 
     law: Literal["constant"] = "constant"
+    path: PathTable = PathTable()
 
 
 class FollowingSpeedTable(Table):

@@ -46,6 +46,18 @@ def test_an_ideal_path_is_the_ideal_law():
     assert isinstance(rig("surface-observer").weight_on_bit, ObservedWeight)
 
 
+def test_the_path_stays_when_the_law_changes():
+    late = rig(path=LATE)
+    constant = late.replace({"weight_on_bit.law": "constant"})
+    assert constant.weight_on_bit.level == 140e3
+    again = constant.replace(
+        {"weight_on_bit.law": "navarro-lopez-suarez", "weight_on_bit.gain": "4 kN*s/rad"}
+    )
+    assert again.weight_on_bit.delay == late.weight_on_bit.delay
+    with pytest.raises(InputError, match='path.delay: 1 has no unit; did you mean "1 s"'):
+        drillctl.load(DESIGN, **{"weight_on_bit.path.delay": 1})
+
+
 def test_a_limited_rate_comes_with_a_lag():
     assert rig(path={"rate_limit": "10 kN/s"}).weight_on_bit.hoist == 0.1
     kept = rig(path={"rate_limit": "10 kN/s", "hoist_lag": "2 s"}).weight_on_bit
