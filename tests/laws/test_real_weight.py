@@ -54,7 +54,7 @@ def test_the_path_stays_when_the_law_changes():
         {"weight_on_bit.law": "navarro-lopez-suarez", "weight_on_bit.gain": "4 kN*s/rad"}
     )
     assert again.weight_on_bit.delay == late.weight_on_bit.delay
-    with pytest.raises(InputError, match='path.delay: 1 has no unit; did you mean "1 s"'):
+    with pytest.raises(InputError, match=r"path\.delay: 1 has no unit"):
         drillctl.load(DESIGN, **{"weight_on_bit.path.delay": 1})
 
 
