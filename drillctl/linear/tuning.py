@@ -152,7 +152,6 @@ def active_damping(string: Drillstring) -> tuple[float, float]:
     tuple of float
         c_f (N m s/rad) and k_f (N m/rad).
     """
-    stiffness = 1.0 / float((1.0 / string.element_stiffness).sum())
     inertia = string.parts.top_inertia
     spring = stick_slip_frequency(string) ** 2 * inertia
-    return 2.0 * math.sqrt(stiffness * inertia), spring
+    return 2.0 * math.sqrt(string.static_stiffness * inertia), spring
