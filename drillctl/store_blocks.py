@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from drillctl.simulation.batch import FLOATS, Batch, Prepared
-from drillctl.simulation.kernels.string_step import BlockString, DenseString
+from drillctl.simulation.kernels.string_step import BlockString, DenseString, UndampedString
 from drillctl.simulation.propagator import StringStep
 from drillctl.simulation.scheme import Scheme
 
@@ -59,22 +59,26 @@ def _string_arrays(prepared: Prepared) -> dict[str, Any]:
     stepper = prepared.stepper
     fields = {f"kernel.{k}": v for k, v in stepper.string._asdict().items()}
     return fields | {
-        "blocks": isinstance(stepper.string, BlockString),
+        "kind": type(stepper.string).__name__,
         "angle_to_state": stepper.angle_to_state,
         "speed_to_state": stepper.speed_to_state,
         "rest": stepper.rest,
         "step": prepared.scheme.step,
         "steps": prepared.scheme.steps,
         "modes": prepared.scheme.modes,
+        "sampling": prepared.scheme.sampling,
         "duration": prepared.duration,
         "j1_from": prepared.j1_from,
     }
 
 
 def _string_from(held: dict[str, Any]) -> Prepared:
-    kind = BlockString if held["blocks"] else DenseString
+    kinds = {kind.__name__: kind for kind in (UndampedString, BlockString, DenseString)}
+    kind = kinds[str(held["kind"])]
     string = kind(**{name: _number(held[f"kernel.{name}"]) for name in kind._fields})
-    scheme = Scheme(float(held["step"]), int(held["steps"]), int(held["modes"]))
+    scheme = Scheme(
+        float(held["step"]), int(held["steps"]), int(held["modes"]), int(held["sampling"])
+    )
     stepper = StringStep(
         string,
         held["angle_to_state"],

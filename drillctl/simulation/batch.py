@@ -177,9 +177,9 @@ def trace(lanes: Lanes, prepared: Prepared, interval: float) -> tuple[Array, dic
 
     every = max(1, round(interval / prepared.scheme.step))
     parts = [_run(part, prepared, every)[1] for part in _chunks(lanes)]
-    traces = np.concatenate(parts, axis=1)
+    traces = np.concatenate(parts, axis=2)
     time = np.arange(len(traces), dtype=float) * every * prepared.scheme.step
-    return time, {name: traces[:, :, i] for i, name in enumerate(TRACED)}
+    return time, {name: traces[:, i] for i, name in enumerate(TRACED)}
 
 
 def _chunks(lanes: Lanes) -> Iterator[Lanes]:
@@ -188,9 +188,9 @@ def _chunks(lanes: Lanes) -> Iterator[Lanes]:
 
 
 def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
-    """Raw measures, shape (MEASURES, lanes), and traces, shape (samples, lanes, signals)."""
+    """Raw measures, shape (MEASURES, lanes), and traces, shape (samples, signals, lanes)."""
     from drillctl.simulation.kernels.advance import TRACED, Clock, run
-    from drillctl.simulation.kernels.rows import MEASURES, WIDTH
+    from drillctl.simulation.kernels.rows import MEASURES, ROWS, WIDTH
 
     count = len(lanes)
     # Every block is full: the last one is filled up with copies of the last lane.
@@ -204,7 +204,7 @@ def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
     scheme, duration = prepared.scheme, prepared.duration
     samples = scheme.steps // every + 1 if every else 0
     measures = np.empty((MEASURES, len(padded)))
-    traces = np.empty((samples, len(padded), len(TRACED)))
+    traces = np.empty((samples, len(TRACED), len(padded)))
     window = min(m.WINDOW, duration)
     observer = padded.observer
     start_of_observer = np.zeros((0, 0)) if observer is None else observer.state(angle, speed)
@@ -223,10 +223,15 @@ def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
         ),
         weight_step(padded.weight, scheme.step), program_step(padded.program),
         observer_step(observer, scheme.step, start_of_observer),
-        numbers, np.ascontiguousarray(state), ticks, measures, traces,
+        numbers, np.ascontiguousarray(state), ticks,
     )  # fmt: skip
-    _in_threads(lambda begin, end: run(begin, end, *arguments), len(padded) // WIDTH)
-    return measures[:, :count], traces[:, :count]
+    rows = ROWS + 2 * len(state) + ticks.remembered + 2 * ticks.estimated
+
+    def advance(begin: int, end: int) -> None:
+        run(begin, end, *arguments, np.empty(rows * WIDTH), measures, traces)
+
+    _in_threads(advance, len(padded) // WIDTH)
+    return measures[:, :count], traces[:, :, :count]
 
 
 def _in_threads(advance: Callable[[int, int], Any], blocks: int) -> None:

@@ -1,6 +1,7 @@
 """The exact step of a string: from M, C and K to the matrices the kernels multiply with.
 
-Undamped, Rayleigh-damped and modally damped strings fall into 2 x 2 blocks, one a mode. Any
+A string without damping falls into its modes (see `undamped_step.py`). Rayleigh-damped and
+modally damped strings fall into 2 x 2 blocks, one a mode. Any
 other viscous damping couples the modes: the first-order matrix is brought to real
 block-diagonal form, one block a conjugate pair or two real poles. Where that basis is badly
 conditioned, or a block cannot be read off the two signals that the laws need, the step is a
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from drillctl.drillstring import Drillstring
-from drillctl.simulation.kernels.string_step import BlockString, DenseString
+from drillctl.simulation.kernels.string_step import BlockString, DenseString, UndampedString
+from drillctl.simulation.undamped_step import undamped_step
 
 Array = NDArray[np.float64]
 
@@ -34,7 +36,7 @@ class StringStep:
 
     Attributes
     ----------
-    string : BlockString or DenseString
+    string : UndampedString, BlockString or DenseString
         What the kernels take.
     angle_to_state, speed_to_state : ndarray, shape (states, nodes)
         State per nodal angle (1/rad) and per nodal speed (s/rad), both in the frame.
@@ -46,7 +48,7 @@ class StringStep:
         Length of the step (s).
     """
 
-    string: BlockString | DenseString
+    string: UndampedString | BlockString | DenseString
     angle_to_state: Array
     speed_to_state: Array
     rest: Array
@@ -99,29 +101,38 @@ def string_step(string: Drillstring, step: float, modes: int) -> StringStep:
     with threadpool_limits(limits=1, user_api="blas"):
         frequency, shapes = string.undamped_modes
         frequency, shapes = frequency[:modes], shapes[:, :modes]
-        modal = _modal(string, frequency, shapes)
         rest = _rest(string)
         to_modal = shapes.T @ string.mass.toarray()
-        stepped = _blocks(modal, step) or _dense(modal, step)
+        kind, fields, basis = _stepped(string, frequency, shapes, step)
     constants = {
         "drag": float(string.ground_damping.sum()),
         "pipe_offset": float(string.element_stiffness[0] * (rest[0] - rest[1])),
         "twist_offset": float(rest[0] - rest[-1]),
     }
-    fields, basis = stepped
-    kernel_string = (
-        BlockString(**fields, **constants)
-        if fields["free"].shape[1] == 4 and "top_angle" not in fields
-        else DenseString(**fields, **constants)
-    )
     return StringStep(
-        string=kernel_string,
+        string=kind(**fields, **constants),
         angle_to_state=basis[:, :modes] @ to_modal,
         speed_to_state=basis[:, modes:] @ to_modal,
         rest=rest,
         modes=modes,
         step=step,
     )
+
+
+def _stepped(
+    string: Drillstring, frequency: Array, shapes: Array, step: float
+) -> tuple[Any, dict[str, Any], Array]:
+    """The simplest form that is fit: its kind, its fields, and its states per modal state."""
+    if string.undamped:
+        top, below, bit = shapes[0], shapes[1], shapes[-1]
+        found = undamped_step(frequency, top, bit, below, string.element_stiffness[0], step)
+        if found is not None:
+            return UndampedString, *found
+    modal = _modal(string, frequency, shapes)
+    found = _blocks(modal, step)
+    if found is not None:
+        return BlockString, *found
+    return DenseString, *_dense(modal, step)
 
 
 def _modal(string: Drillstring, frequency: Array, shapes: Array) -> _Modal:

@@ -177,7 +177,7 @@ def observer_step(observer: Observer | None, step: float, start: Array) -> Any:
 
 def program_step(program: Any) -> Any:
     """The kernel's form of the programs of all lanes; nothing where none moves."""
-    from drillctl.simulation.kernels.program_step import NoProgram, Programs
+    from drillctl.simulation.kernels.program_numbers import NoProgram, Programs
 
     moves = np.any(program.speed.first != 0.0) or np.any(program.weight.first != 0.0)
     if not moves and not np.any(program.rock_until > 0.0):

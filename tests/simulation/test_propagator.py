@@ -8,11 +8,13 @@ from hypothesis import strategies as st
 
 from drillctl.drillstring import Drillstring, Section, assemble
 from drillctl.simulation.kernels import rows as r
+from drillctl.simulation.kernels.arithmetic import put
 from drillctl.simulation.kernels.compiling import OPTIONS
 from drillctl.simulation.kernels.observer_step import NoObserver
 from drillctl.simulation.kernels.string_step import (
     BlockString,
     DenseString,
+    UndampedString,
     complete_and_propagate,
     look,
 )
@@ -29,9 +31,11 @@ def _steps(string, drive, observer, state, work, torques, seen):
         complete_and_propagate(string, drive, observer, state, work)
         work[r.TOP_TORQUE] = torques[n, 0]
         work[r.BIT_TORQUE] = torques[n, 1]
-        speed, angle = look(string, state, work, 0)
-        seen[n, 0] = speed
-        seen[n, 1] = angle
+        speed, angle = look(string, state, work)
+        put(work, r.SEEN_TOP, speed)
+        put(work, r.SEEN_TWIST, angle)
+        seen[n, 0] = work[r.SEEN_TOP]
+        seen[n, 1] = work[r.SEEN_TWIST]
 
 
 def run_steps(*arguments):
@@ -99,7 +103,22 @@ def test_steps_equal_the_matrix_exponential(name):
     stepper, seen = by_kernel(string, angle, speed, torques)
     expected = by_exponential(string, angle, speed, torques)
     assert np.abs(seen - expected).max() <= 1e-9 * np.abs(expected).max()
+    assert isinstance(stepper.string, UndampedString if name == "undamped" else BlockString)
+
+
+def test_modes_too_fast_for_the_short_form_take_blocks(monkeypatch):
+    from drillctl.simulation import undamped_step
+
+    string = CASES["undamped"]
+    random = np.random.default_rng(7)
+    angle, speed = random.normal(size=(2, string.nodes))
+    torques = 1e3 * random.normal(size=(100, 2))
+    _, by_modes = by_kernel(string, angle, speed, torques)
+    frequency, _ = string.undamped_modes
+    monkeypatch.setattr(undamped_step, "LARGEST_TURN", 0.5 * frequency.max() * STEP)
+    stepper, by_blocks = by_kernel(string, angle, speed, torques)
     assert isinstance(stepper.string, BlockString)
+    assert np.abs(by_modes - by_blocks).max() <= 1e-11 * np.abs(by_blocks).max()
 
 
 @settings(max_examples=40, deadline=None)
@@ -194,7 +213,9 @@ def test_held_torques_do_exactly_the_work_of_the_change_of_angle(seed):
     flat, work = state.ravel(), np.zeros(r.ROWS * r.WIDTH)
     run_steps(stepper.string, flat, work, np.array([torques]), np.zeros((1, 2)))
     # The pass has propagated freely; the held torques are the state's `push`.
-    pushed = flat.reshape(-1, r.WIDTH)[: len(to_state), 0] + stepper.string.push.reshape(-1, 2) @ [
+    by_top, ratio = stepper.string.push, stepper.string.ratio
+    push = np.stack([by_top, -ratio[:, None] * by_top], axis=2).reshape(-1, 2)
+    pushed = flat.reshape(-1, r.WIDTH)[: len(to_state), 0] + push @ [
         top,
         bit,
     ]

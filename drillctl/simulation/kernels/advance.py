@@ -1,4 +1,12 @@
-"""The loop over blocks of lanes and over steps."""
+"""The loop over blocks of lanes and over steps.
+
+A step, for all lanes of a block at once:
+
+    swing   = A z              string, free of this step's torques        string_step
+    reduced = swing + drive    free bit speed, and its fall per torque    drive_step
+    outcome: u + (gain/2) T(u) contains right                             rock_step
+    z       = swing + B [T_top, T_bit]                                    with the next swing
+"""
 
 from __future__ import annotations
 
@@ -6,36 +14,40 @@ import hashlib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba import njit
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined, widest_vectors
+from drillctl.simulation.kernels.arithmetic import at, fma, pick, put
+from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined
 from drillctl.simulation.kernels.drive_step import (
     begin_drive,
+    eliminate,
     follow_drive,
     sample_drive,
     top_torque_now,
 )
 from drillctl.simulation.kernels.held_rock import hold_rock
-from drillctl.simulation.kernels.lane_step import conclude, eliminate
-from drillctl.simulation.kernels.laws import at_lane, contact, load_block, weight_at
+from drillctl.simulation.kernels.laws import contact, law_at, load_block, weight_at
 from drillctl.simulation.kernels.measure_step import (
+    Before,
     begin_measures,
+    conclude_bands,
+    conclude_load,
     measure,
-    measure_crossings,
+    measure_load,
     measure_pipe,
-    measure_window,
 )
 from drillctl.simulation.kernels.program_step import advance_program, begin_program
 from drillctl.simulation.kernels.rock_step import meet_rock
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.kernels.string_step import complete_and_propagate, look
+from drillctl.simulation.kernels.top_motion import move_top
 from drillctl.simulation.kernels.weight_step import (
     Memory,
     acting,
     begin_weight,
     follow_weight,
+    move_load,
     raise_weight,
 )
 
@@ -78,53 +90,6 @@ class Clock(NamedTuple):
 
 
 @inlined
-def _begin(friction: Any, weight: Any, work: Any) -> None:
-    """State of the laws at time zero."""
-    for lane in range(WIDTH):
-        speed = work[r.BIT_SPEED + lane]
-        load = acting(weight, work, lane)
-        work[r.REST_LOAD + lane] = weight_at(load, 0.0)
-        work[r.REST_END + lane] = weight_at(load, 0.0)
-        work[r.LOAD + lane] = weight_at(load, abs(speed))
-        torque, slope = contact(at_lane(friction, work, r.FRICTION, lane), load, abs(speed))
-        work[r.SLOPE + lane] = slope
-        direction = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
-        work[r.DIRECTION + lane] = direction
-        work[r.KINETIC + lane] = direction * torque
-        work[r.HOLDING + lane] = -1.0
-        work[r.ANGLE + lane] = 0.0
-        work[r.TOP_TORQUE + lane] = 0.0
-        work[r.BIT_TORQUE + lane] = 0.0
-
-
-@compiled
-def _look_around(string: Any, state: Any, work: Any, looks: Any) -> None:
-    for lane in range(WIDTH):
-        looks[0, lane], looks[1, lane] = look(string, state, work, lane)
-
-
-@compiled
-def _sample(
-    string: Any, drive: Any, work: Any, looks: Any, traces: Any, sample: int, first: int
-) -> None:
-    """Store one sample of every lane; `looks` holds what was seen before the pass."""
-    for lane in range(WIDTH):
-        set_speed = work[r.SET_SPEED + lane]
-        stuck = work[r.DIRECTION + lane] == 0.0
-        held = work[r.BIT_TORQUE + lane]
-        row = traces[sample, first + lane]
-        row[0] = looks[0, lane] + set_speed
-        row[1] = work[r.BIT_SPEED + lane]
-        row[2] = work[r.ANGLE + lane]
-        row[3] = looks[1, lane] - string.twist_offset * set_speed
-        row[4] = work[r.PIPE + lane] + work[r.PIPE_OFFSET + lane]
-        row[5] = held if stuck else work[r.KINETIC + lane]
-        row[6] = 1.0 if stuck else 0.0
-        row[7] = top_torque_now(drive, work, lane, looks[0, lane])
-        row[8] = work[r.LOAD + lane]
-
-
-@inlined
 def _share_after(begin: float, step: float, moment: float) -> float:
     """Share of a step that lies after a moment."""
     return min(1.0, max(0.0, (begin + step - moment) / step))
@@ -138,72 +103,140 @@ def _load(
     load_block(friction, work, r.FRICTION, first)
     load_block(drive, work, r.DRIVE, first)
     load_block(weight, work, r.WEIGHT, first)
-    for lane in range(WIDTH):
-        set_speed = speed[0, first + lane]
-        work[r.SET_SPEED + lane] = set_speed
-        work[r.BIT_SPEED + lane] = speed[1, first + lane]
-        work[r.TABLE_LOW + lane] = speed[2, first + lane]
-        work[r.TABLE_HIGH + lane] = speed[3, first + lane]
-        work[r.TOP_SPEED + lane] = speed[4, first + lane]
-        work[r.DRAG + lane] = string.drag * set_speed
-        work[r.PIPE_OFFSET + lane] = string.pipe_offset * set_speed
+    set_speed = at(speed[0], first)
+    put(work, r.SET_SPEED, set_speed)
+    put(work, r.BIT_SPEED, at(speed[1], first))
+    put(work, r.TABLE_LOW, at(speed[2], first))
+    put(work, r.TABLE_HIGH, at(speed[3], first))
+    put(work, r.TOP_SPEED, at(speed[4], first))
+    put(work, r.DRAG, string.drag * set_speed)
+    put(work, r.PIPE_OFFSET, string.pipe_offset * set_speed)
 
 
 @compiled
-def advance_block(
+def _begin_rock(friction: Any, weight: Any, work: Any) -> None:
+    """What bit and rock are to each other at time zero."""
+    speed = at(work, r.BIT_SPEED)
+    load = acting(weight, work)
+    at_rest = weight_at(load, 0.0 * speed)
+    put(work, r.REST_LOAD, at_rest)
+    put(work, r.REST_END, at_rest)
+    put(work, r.LOAD, weight_at(load, abs(speed)))
+    torque, slope = contact(law_at(friction, work, r.FRICTION), load, abs(speed))
+    direction = pick(speed > 0.0, 1.0, pick(speed < 0.0, -1.0, 0.0))
+    put(work, r.SLOPE, slope)
+    put(work, r.DIRECTION, direction)
+    put(work, r.KINETIC, direction * torque)
+    put(work, r.HOLDING, -1.0)
+
+
+@compiled
+def _begin(
     string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any, observer: Any,
-    speed: Any, start: Any, clock: Any, measures: Any, traces: Any, first: int,
+    speed: Any, start: Any, clock: Any, state: Any, work: Any, memory: Any, first: int,
+) -> None:  # fmt: skip
+    """A block at time zero; its memory holds zeros."""
+    _load(string, friction, drive, weight, speed, work, first)
+    for i in range(start.shape[0]):
+        put(state, i * WIDTH, at(start[i], first))
+    begin_program(program, before, work, first)
+    begin_drive(drive, string, work, 1.0 / clock.step)
+    begin_weight(weight, observer, work, memory, first)
+    _begin_rock(friction, weight, work)
+    begin_measures(work)
+
+
+@compiled
+def _look_around(string: Any, state: Any, work: Any) -> None:
+    speed, angle = look(string, state, work)
+    put(work, r.SEEN_TOP, speed)
+    put(work, r.SEEN_TWIST, angle)
+
+
+@compiled
+def _sample(
+    string: Any, drive: Any, work: Any, pipe: Any, traces: Any, sample: int, first: int
+) -> None:
+    """Store one sample of every lane; speeds and angles were seen before the pass."""
+    set_speed, top_speed = at(work, r.SET_SPEED), at(work, r.SEEN_TOP)
+    stuck = at(work, r.DIRECTION) == 0.0
+    signals = traces[sample]
+    put(signals[0], first, top_speed + set_speed)
+    put(signals[1], first, at(work, r.BIT_SPEED))
+    put(signals[2], first, at(work, r.ANGLE))
+    put(signals[3], first, at(work, r.SEEN_TWIST) - string.twist_offset * set_speed)
+    put(signals[4], first, pipe + at(work, r.PIPE_OFFSET))
+    put(signals[5], first, pick(stuck, at(work, r.BIT_TORQUE), at(work, r.KINETIC)))
+    put(signals[6], first, pick(stuck, 1.0, 0.0))
+    put(signals[7], first, top_torque_now(drive, work, top_speed))
+    put(signals[8], first, at(work, r.LOAD))
+
+
+@inlined
+def _conclude(string: Any, drive: Any, observer: Any, swing: Any, reduced: Any, outcome: Any,
+              work: Any) -> None:  # fmt: skip
+    """Top torque of the step, and the state at its end."""
+    net_torque = fma(reduced.share, outcome.torque, reduced.alone) - at(work, r.DRAG)
+    put(work, r.TOP_TORQUE, net_torque)
+    put(work, r.BIT_TORQUE, outcome.torque)
+    angle = fma(string.angle_by_top, net_torque, swing.top_angle)
+    put(work, r.ANGLE, fma(-string.angle_by_bit, outcome.torque, angle))
+    move_top(drive, observer, string, swing, work)
+    put(work, r.BIT_SPEED, outcome.speed)
+    put(work, r.DIRECTION, outcome.direction)
+    put(work, r.KINETIC, outcome.kinetic)
+    put(work, r.SLOPE, outcome.slope)
+    put(work, r.HOLDING, outcome.holding)
+
+
+@compiled
+def _advance_block(
+    string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any, observer: Any,
+    speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any, first: int,
 ) -> None:  # fmt: skip
     """Advance the lanes from `first` on, one block, from time zero to the end."""
-    widest_vectors()
-    work = np.zeros(r.ROWS * WIDTH)
-    state = np.zeros(2 * start.shape[0] * WIDTH)
-    looks = np.zeros((2, WIDTH))
-    memory = Memory(
-        np.zeros(clock.remembered * WIDTH),
-        np.zeros((clock.estimated, WIDTH)),
-        np.zeros((clock.estimated, WIDTH)),
-    )
-    _load(string, friction, drive, weight, speed, work, first)
-    for lane in range(WIDTH):
-        for i in range(start.shape[0]):
-            state[i * WIDTH + lane] = start[i, first + lane]
-    begin_program(program, before, work, first)
-    begin_drive(drive, work)
-    begin_weight(weight, observer, work, memory, first)
-    _begin(friction, weight, work)
-    begin_measures(work)
+    work = kept[: r.ROWS * WIDTH]
+    ring = r.ROWS * WIDTH + 2 * start.shape[0] * WIDTH
+    estimate = ring + clock.remembered * WIDTH
+    moved = estimate + clock.estimated * WIDTH
+    state = kept[r.ROWS * WIDTH : ring]
+    memory = Memory(kept[ring:estimate], kept[estimate:moved], kept[moved:])
+    kept[:] = 0.0
+    _begin(
+        string, friction, before, drive, weight, program, observer,
+        speed, start, clock, state, work, memory, first,
+    )  # fmt: skip
     rate = 1.0 / clock.step
     for n in range(clock.steps + 1):
         begin = n * clock.step
         advance_program(program, friction, weight, work, first, begin, clock.step)
         sampled = clock.every > 0 and n % clock.every == 0
         if sampled:
-            _look_around(string, state, work, looks)
-        complete_and_propagate(string, drive, observer, state, work)
-        measure_pipe(work)
+            _look_around(string, state, work)
+        swing = complete_and_propagate(string, drive, observer, state, work)
+        measure_pipe(work, swing.pipe)
         if sampled:
-            _sample(string, drive, work, looks, traces, n // clock.every, first)
+            _sample(string, drive, work, swing.pipe, traces, n // clock.every, first)
         if n == clock.steps:
             break
         sample_drive(drive, work, clock.sampling > 0 and n % clock.sampling == 0)
         raise_weight(weight, program, work, memory, n, clock.step)
         hold_rock(friction, weight, work)
-        eliminate(string, drive, work, rate)
-        meet_rock(friction, weight, work)
-        conclude(string, drive, weight, observer, work)
-        follow_drive(drive, work, rate)
-        follow_weight(weight, observer, work, memory, n, clock.step)
+        was = Before(at(work, r.BIT_SPEED), at(work, r.TOP_SPEED), at(work, r.LOAD))
+        reduced = eliminate(drive, program, string, swing, work, rate)
+        outcome = meet_rock(friction, weight, reduced, work)
+        _conclude(string, drive, observer, swing, reduced, outcome, work)
+        move_load(weight, program, work)
+        follow_drive(drive, work, was.top_speed, rate)
+        follow_weight(weight, observer, work, memory, was, n, clock.step)
         in_j1 = _share_after(begin, clock.step, clock.j1_from)
         in_window = _share_after(begin, clock.step, clock.window_from)
-        if measure(work, begin, clock.step, in_j1, in_window) > 0:
-            measure_crossings(work, begin, clock.step, in_j1)
-        if in_window > 0.0:
-            measure_window(work, in_window)
+        measure(work, was, outcome, begin, clock.step, in_j1, in_window)
+        measure_load(weight, program, work, was, outcome, clock.step)
+    conclude_bands(work, clock.steps * clock.step)
+    conclude_load(weight, program, work, clock.steps * clock.step)
     for measured in range(r.MEASURES):
-        for lane in range(WIDTH):
-            value = work[r.FIRST_MEASURE + measured * WIDTH + lane]
-            measures[measured, first + lane] = value
+        put(measures[measured], first, at(work, r.FIRST_MEASURE + measured * WIDTH))
 
 
 def _compile() -> Any:
@@ -216,12 +249,12 @@ def _compile() -> Any:
     def run(
         begin: int, end: int,
         string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
-        observer: Any, speed: Any, start: Any, clock: Any, measures: Any, traces: Any,
+        observer: Any, speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any,
     ) -> str:  # fmt: skip
         for block in range(begin, end):
-            advance_block(
+            _advance_block(
                 string, friction, before, drive, weight, program, observer,
-                speed, start, clock, measures, traces, block * WIDTH,
+                speed, start, clock, kept, measures, traces, block * WIDTH,
             )  # fmt: skip
         return version
 
@@ -245,7 +278,7 @@ def fingerprint(paths: list[Path]) -> str:
 
 run = _compile()
 """Advance lanes from time zero to the end: `run(begin, end, string, friction, before,
-drive, weight, program, observer, speed, start, clock, measures, traces)`.
+drive, weight, program, observer, speed, start, clock, kept, measures, traces)`.
 
 - `begin`, `end`: blocks of `WIDTH` lanes to advance, of all those there are. Blocks do not see each
   other: threads may take some each, the interpreter's lock is not held.
@@ -258,8 +291,9 @@ drive, weight, program, observer, speed, start, clock, measures, traces)`.
   weight of the friction table (N), top speed at time zero in the frame (rad/s).
 - `start`, shape (states, lanes): the string at time zero.
 - `clock`: `Clock`.
+- `kept`, shape (rows x WIDTH,): memory of one block, `rows.py`; each thread brings its own.
 - `measures`, shape (MEASURES, lanes): written; the rows from `rows.FIRST_MEASURE` on.
-- `traces`, shape (samples, lanes, len(TRACED)): written if `clock.every` > 0.
+- `traces`, shape (samples, len(TRACED), lanes): written if `clock.every` > 0.
 
 `lanes` must be a multiple of `WIDTH`. Returns the fingerprint of the sources.
 """

@@ -1,9 +1,4 @@
-"""Multiply-adds that are fused because we say so, not where the compiler likes.
-
-Left to itself a compiler fuses differently in a vector loop, in its scalar remainder and for
-another block width, and the last bits differ. With every fusion written out, and none other
-allowed, a lane has the same bits whatever its company.
-"""
+"""What rows need beyond the operators: memory, choice, fused multiply-adds."""
 
 from __future__ import annotations
 
@@ -11,35 +6,192 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
+
+from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.vectors import (
+    MASK,
+    ROW,
+    WHOLE,
+    Mask,
+    Row,
+    as_row,
+    mask,
+    row,
+    splat,
+)
+
+DOUBLE_BYTES = 8
+
+
+def _address(context: Any, builder: Any, array: Any, kind: Any, place: Any) -> Any:
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [place]), ROW.as_pointer())
+
+
+@intrinsic
+def at(typing_context: Any, work: Any, place: Any) -> Any:
+    """The row of a flat array that begins at `place`."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        address = _address(context, builder, arguments[0], signature.args[0], arguments[1])
+        return builder.load(address, align=DOUBLE_BYTES)
+
+    return row(work, types.intp), generate
+
+
+@intrinsic
+def put(typing_context: Any, work: Any, place: Any, value: Any) -> Any:
+    """Store a row, or one number for all lanes, at `place` of a flat array."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        address = _address(context, builder, arguments[0], signature.args[0], arguments[1])
+        stored = as_row(context, builder, arguments[2], signature.args[2])
+        builder.store(stored, address, align=DOUBLE_BYTES)
+        return context.get_dummy_value()
+
+    return types.void(work, types.intp, value), generate
+
+
+@intrinsic
+def gather(typing_context: Any, work: Any, places: Any) -> Any:
+    """One element of a flat array a lane; `places` holds whole numbers."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        whole = builder.fptosi(arguments[1], WHOLE)
+        found = ir.Constant(ROW, ir.Undefined)
+        for lane in range(WIDTH):
+            index = ir.Constant(ir.IntType(32), lane)
+            element = builder.load(builder.gep(data, [builder.extract_element(whole, index)]))
+            found = builder.insert_element(found, element, index)
+        return found
+
+    return row(work, row), generate
+
+
+@intrinsic
+def each(typing_context: Any, value: Any) -> Any:
+    """A row of one number, or a row as it is."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return as_row(context, builder, arguments[0], signature.args[0])
+
+    return row(value), generate
+
+
+@intrinsic
+def pick(typing_context: Any, condition: Any, yes: Any, no: Any) -> Any:
+    """`yes` in the lanes where the condition holds, `no` in the others."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        chosen = [
+            as_row(context, builder, value, kind)
+            for value, kind in zip(arguments[1:], signature.args[1:], strict=True)
+        ]
+        return builder.select(arguments[0], *chosen)
+
+    return row(mask, yes, no), generate
+
+
+@intrinsic
+def any_of(typing_context: Any, condition: Any) -> Any:
+    """Whether a condition holds in some lane."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        bits = builder.bitcast(arguments[0], ir.IntType(WIDTH))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+    return types.boolean(mask), generate
+
+
+@intrinsic
+def everywhere(typing_context: Any) -> Any:
+    """A condition that holds in every lane."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return ir.Constant(MASK, [1] * WIDTH)
+
+    return mask(), generate
 
 
 @intrinsic
 def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-    """A * b + c, rounded once."""
+    """A * b + c, rounded once, of rows or numbers."""
+    vector = any(isinstance(kind, (Row, Mask)) for kind in (a, b, c))
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.fma(*arguments)
+        if not vector:
+            return builder.fma(*arguments)
+        rows = [
+            as_row(context, builder, value, kind)
+            for value, kind in zip(arguments, signature.args, strict=True)
+        ]
+        kind = ir.FunctionType(ROW, [ROW] * 3)
+        name = f"llvm.fma.v{WIDTH}f64"
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), rows)
 
-    double = types.float64
-    return double(double, double, double), generate
+    kinds = [k if isinstance(k, (Row, Mask)) else types.float64 for k in (a, b, c)]
+    return (row if vector else types.float64)(*kinds), generate
 
 
 @intrinsic
-def bits(typing_context: Any, value: Any) -> Any:
-    """The 64 bits of a double as an integer."""
+def least(typing_context: Any, a: Any, b: Any) -> Any:
+    """The smaller of two; the second where one is NaN."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.IntType(64))
+        x, y = (
+            as_row(context, builder, *pair) for pair in zip(arguments, signature.args, strict=True)
+        )
+        return builder.select(builder.fcmp_ordered("<", x, y), x, y)
 
-    return types.int64(types.float64), generate
+    return row(a, b), generate
 
 
 @intrinsic
-def double(typing_context: Any, bits: Any) -> Any:
-    """The double made of 64 bits."""
+def most(typing_context: Any, a: Any, b: Any) -> Any:
+    """The larger of two; the second where one is NaN."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.DoubleType())
+        x, y = (
+            as_row(context, builder, *pair) for pair in zip(arguments, signature.args, strict=True)
+        )
+        return builder.select(builder.fcmp_ordered(">", x, y), x, y)
 
-    return types.float64(types.int64), generate
+    return row(a, b), generate
+
+
+@intrinsic
+def power_of_two(typing_context: Any, shifted: Any) -> Any:
+    """2^k from k + 1.5 * 2^52: the low bits of that double are those of k."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        bits = builder.bitcast(arguments[0], WHOLE)
+        moved = builder.shl(bits, splat(builder, ir.Constant(ir.IntType(64), 52), WHOLE))
+        bias = splat(builder, ir.Constant(ir.IntType(64), 1023 << 52), WHOLE)
+        return builder.bitcast(builder.add(moved, bias), ROW)
+
+    return row(row), generate
+
+
+@intrinsic
+def rounded_down(typing_context: Any, value: Any) -> Any:
+    """The largest whole number that is not above."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(ROW, [ROW])
+        name = f"llvm.floor.v{WIDTH}f64"
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), arguments)
+
+    return row(row), generate
+
+
+@intrinsic
+def lane_number(typing_context: Any) -> Any:
+    """0, 1, 2, ...: each lane's place in its block."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return ir.Constant(ROW, [float(lane) for lane in range(WIDTH)])
+
+    return row(), generate

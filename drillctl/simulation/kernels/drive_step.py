@@ -13,135 +13,201 @@ torque of the last step; a limited torque is a number, its slopes are zero.
 
 from __future__ import annotations
 
-from typing import Any
-
-from numba.extending import overload
+from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined, widest_vectors
+from drillctl.simulation.kernels.arithmetic import at, each, fma, most, pick, put
+from drillctl.simulation.kernels.compiling import by_type, compiled, inlined
 from drillctl.simulation.kernels.drive_numbers import RealStep, SampledStep
-from drillctl.simulation.kernels.laws import at_lane, mean_torque, torque_at
-from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.laws import law_at, mean_torque, torque_at
+from drillctl.simulation.kernels.program_numbers import NoProgram
+
+SLOWEST = 1e-9
+"""Speed (rad/s) under which a limit of power no longer grows."""
 
 
-def begin_drive(drive: Any, work: Any) -> None:
-    """Memory at time zero; the top speed is in its row."""
+class Reduced(NamedTuple):
+    """String and drive eliminated: what the torque on the bit decides in a step.
+
+    Attributes
+    ----------
+    alone, share : row
+        Mean top torque of the step were the bit torque zero (N m), and what each of its N m adds.
+    free, gain, per_gain : row
+        Bit speed at its end were the bit torque zero (rad/s), its fall per bit torque
+        (rad/s per N m), and one over that.
+    """
+
+    alone: Any
+    share: Any
+    free: Any
+    gain: Any
+    per_gain: Any
+
+
+def begin_drive(drive: Any, string: Any, work: Any, rate: float) -> None:
+    """Memory at time zero, or constants of an ideal drive; the top speed is in its row."""
     raise NotImplementedError("compiled only")
 
 
-@overload(begin_drive)
-def _begin_drive(drive, work):
+@by_type(begin_drive)
+def _begin_drive(drive, string, work, rate):
     if drive.instance_class is RealStep:
-        return lambda drive, work: _begin_real(drive, work)
-    return lambda drive, work: _begin(work)
+        return lambda drive, string, work, rate: _begin_real(drive, work)
+    if drive.instance_class is SampledStep:
+        return lambda drive, string, work, rate: _begin(work)
+    return lambda drive, string, work, rate: _begin_ideal(drive, string, work, rate)
 
 
 @inlined
 def _begin_real(drive: Any, work: Any) -> None:
     """A motor without lag gives its torque from the first moment on."""
     _begin(work)
-    for lane in range(WIDTH):
-        law = at_lane(drive, work, r.DRIVE, lane)
-        _limits(law, work[r.TOP_SPEED + lane] + work[r.SET_SPEED + lane], work, lane)
-        error = law.kp * (work[r.LEAD + lane] - work[r.TOP_SPEED + lane])
-        wanted = (law.feedforward + error) / (1.0 + law.kp * law.by_torque)
-        given = _clip(wanted, work[r.LEAST + lane], work[r.MOST + lane])
-        work[r.MOTOR + lane] = given if law.mean == 0.0 else 0.0
+    law = law_at(drive, work, r.DRIVE)
+    low, high = _limits(law, at(work, r.TOP_SPEED) + at(work, r.SET_SPEED))
+    error = law.kp * (at(work, r.LEAD) - at(work, r.TOP_SPEED))
+    wanted = (law.feedforward + error) / (1.0 + law.kp * law.by_torque)
+    put(work, r.MOTOR, pick(law.mean == 0.0, _clip(wanted, low, high), 0.0))
 
 
 @inlined
 def _begin(work: Any) -> None:
-    for lane in range(WIDTH):
-        speed = work[r.TOP_SPEED + lane]
-        work[r.SEEN + lane] = speed
-        work[r.SEEN_LAST + lane] = speed
-        for row in (r.FELT, r.SLOW, r.INTEGRAL, r.MOTOR, r.COMMAND, r.PENDING, r.IMPULSE):
-            work[row + lane] = 0.0
+    put(work, r.SEEN, at(work, r.TOP_SPEED))
+    put(work, r.SEEN_LAST, at(work, r.TOP_SPEED))
+
+
+@compiled
+def _begin_ideal(drive: Any, string: Any, work: Any, rate: float) -> None:
+    """Constants of an ideal drive: its mean torque is a line in both angles of the step."""
+    law = law_at(drive, work, r.DRIVE)
+    level, slope = mean_torque(law, each(0.0), rate)
+    level_of_one, _ = mean_torque(law, each(1.0), rate)
+    drag = at(work, r.DRAG)
+    shrink = 1.0 / (1.0 + slope * string.angle_by_top)
+    share = slope * string.angle_by_bit * shrink
+    gain = string.speed_by_bit - string.speed_by_top * share
+    put(work, r.LINE_LEVEL, (level + slope * string.angle_by_top * drag) * shrink)
+    put(work, r.LINE_BACK, (level_of_one - level) * shrink)
+    put(work, r.LINE_FORTH, -slope * shrink)
+    put(work, r.SHARE, share)
+    put(work, r.GAIN, gain)
+    put(work, r.PER_GAIN, 1.0 / gain)
 
 
 @inlined
-def _clip(value: float, low: float, high: float) -> float:
-    value = low if value < low else value
-    return high if value > high else value
+def _clip(value: Any, low: Any, high: Any) -> Any:
+    value = pick(value < low, low, value)
+    return pick(value > high, high, value)
 
 
 @inlined
-def _limits(law: Any, speed: float, work: Any, lane: int) -> None:
+def _limits(law: Any, speed: Any) -> Any:
     """Limits of the torque in this step at an absolute speed (rad/s)."""
-    turning = abs(speed)
-    by_power = law.power / (turning if turning > 1e-9 else 1e-9)
-    work[r.LEAST + lane] = law.least if law.least > -by_power else -by_power
-    work[r.MOST + lane] = law.most if law.most < by_power else by_power
+    by_power = law.power / most(abs(speed), SLOWEST)
+    low = pick(law.least > -by_power, law.least, -by_power)
+    return low, pick(law.most < by_power, law.most, by_power)
 
 
-def drive_line(drive: Any, string: Any, work: Any, lane: int, rate: float) -> Any:
-    """Offset, slope and speed slope of the mean torque of a step of length 1 / `rate`."""
+def eliminate(drive: Any, program: Any, string: Any, swing: Any, work: Any, rate: float) -> Any:
+    """What is left of string and drive for the bit: a `Reduced`; `rate` is 1 / step."""
     raise NotImplementedError("compiled only")
 
 
-@overload(drive_line)
-def _drive_line(drive, string, work, lane, rate):
+@by_type(eliminate)
+def _eliminate(drive, program, string, swing, work, rate):
     if drive.instance_class is RealStep:
-        return lambda drive, string, work, lane, rate: _real_line(drive, string, work, lane, rate)
+        return lambda drive, program, string, swing, work, rate: _by_real_drive(
+            drive, string, swing, work, rate
+        )
     if drive.instance_class is SampledStep:
-        return lambda drive, string, work, lane, rate: _held_line(drive, work, lane, rate)
-    return lambda drive, string, work, lane, rate: _ideal_line(drive, work, lane, rate)
+        return lambda drive, program, string, swing, work, rate: _by_held_torque(
+            drive, string, swing, work
+        )
+    if program.instance_class is NoProgram:
+        return lambda drive, program, string, swing, work, rate: _by_ideal_drive(
+            string, swing, work, at(work, r.ANGLE), swing.top_angle
+        )
+    return lambda drive, program, string, swing, work, rate: _by_ideal_drive(
+        string,
+        swing,
+        work,
+        at(work, r.ANGLE) - at(work, r.SHIFT),
+        swing.top_angle - at(work, r.SHIFT_NEW),
+    )
 
 
 @inlined
-def _ideal_line(drive: Any, work: Any, lane: int, rate: float) -> Any:
-    law = at_lane(drive, work, r.DRIVE, lane)
-    offset, slope = mean_torque(law, work[r.ANGLE + lane] - work[r.SHIFT + lane], rate)
-    return offset + slope * work[r.SHIFT_NEW + lane], slope, 0.0
+def _by_ideal_drive(string: Any, swing: Any, work: Any, angle: Any, free_angle: Any) -> Any:
+    alone = fma(at(work, r.LINE_BACK), angle, at(work, r.LINE_LEVEL))
+    alone = fma(at(work, r.LINE_FORTH), free_angle, alone)
+    free = at(work, r.SET_SPEED) + swing.bit_speed
+    free = fma(string.speed_by_top, alone - at(work, r.DRAG), free)
+    return Reduced(alone, at(work, r.SHARE), free, at(work, r.GAIN), at(work, r.PER_GAIN))
 
 
 @inlined
-def _real_line(drive: Any, string: Any, work: Any, lane: int, rate: float) -> Any:
-    law = at_lane(drive, work, r.DRIVE, lane)
-    angle, motor = work[r.ANGLE + lane], work[r.MOTOR + lane]
-    error = (work[r.SHIFT_NEW + lane] - work[r.SHIFT + lane] + angle) * rate
-    error += law.by_seen * work[r.SEEN + lane] + law.by_begin * work[r.TOP_SPEED + lane]
-    error += law.by_felt * work[r.FELT + lane] + law.by_slow * work[r.SLOW + lane]
-    work[r.ERROR + lane] = error
-    fixed = law.feedforward + law.ki * work[r.INTEGRAL + lane]
+def _reduce(string: Any, swing: Any, work: Any, offset: Any, slope: Any, by_speed: Any) -> Any:
+    """Eliminate a mean torque offset - slope angle - by_speed speed at the end of the step."""
+    drag = at(work, r.DRAG)
+    shrink = 1.0 / (1.0 + slope * string.angle_by_top + by_speed * string.top_speed_by_top)
+    angle = swing.top_angle - string.angle_by_top * drag
+    speed = swing.top_speed - string.top_speed_by_top * drag
+    alone = (offset - slope * angle - by_speed * speed) * shrink
+    share = (slope * string.angle_by_bit + by_speed * string.top_speed_by_bit) * shrink
+    free = at(work, r.SET_SPEED) + swing.bit_speed + string.speed_by_top * (alone - drag)
+    gain = string.speed_by_bit - string.speed_by_top * share
+    return Reduced(alone, share, free, gain, 1.0 / gain)
+
+
+@inlined
+def _by_real_drive(drive: Any, string: Any, swing: Any, work: Any, rate: float) -> Any:
+    law = law_at(drive, work, r.DRIVE)
+    angle, motor = at(work, r.ANGLE), at(work, r.MOTOR)
+    error = (at(work, r.SHIFT_NEW) - at(work, r.SHIFT) + angle) * rate
+    error += law.by_seen * at(work, r.SEEN) + law.by_begin * at(work, r.TOP_SPEED)
+    error += law.by_felt * at(work, r.FELT) + law.by_slow * at(work, r.SLOW)
+    put(work, r.ERROR, error)
+    fixed = law.feedforward + law.ki * at(work, r.INTEGRAL)
     offset = law.of_fixed * fixed + law.of_error * error + law.of_motor * motor
     slope, speed_slope = law.of_error * rate, law.of_error * law.by_speed
     # A forecast of the step with the bit torque of the last one.
-    drag, torque = work[r.DRAG + lane], work[r.BIT_TORQUE + lane]
-    angle_free = work[r.TOP_FREE + lane] - string.angle_by_top * drag - string.angle_by_bit * torque
-    speed_free = (
-        work[r.TOP_SPEED_FREE + lane]
-        - string.top_speed_by_top * drag
-        - string.top_speed_by_bit * torque
-    )
+    drag, torque = at(work, r.DRAG), at(work, r.BIT_TORQUE)
+    angle_free = swing.top_angle - string.angle_by_top * drag - string.angle_by_bit * torque
+    speed_free = swing.top_speed - string.top_speed_by_top * drag - string.top_speed_by_bit * torque
     forecast = (offset - slope * angle_free + speed_slope * speed_free) * law.forecast
     speed = (angle_free + string.angle_by_top * forecast - angle) * rate
-    _limits(law, speed + work[r.SET_SPEED + lane], work, lane)
+    low, high = _limits(law, speed + at(work, r.SET_SPEED))
+    put(work, r.LEAST, low)
+    put(work, r.MOST, high)
     command = (forecast - law.mean * motor) * law.per_command
-    given = _clip(command, work[r.LEAST + lane], work[r.MOST + lane])
+    given = _clip(command, low, high)
     wanted = law.motor_take * (given - motor)
     moved = _clip(wanted, -law.most_moved, law.most_moved)
     at_rate = moved != wanted
-    limited = given != command or at_rate
-    work[r.MOVED + lane] = moved if at_rate else 0.0
+    limited = (given != command) | at_rate
+    put(work, r.MOVED, pick(at_rate, moved, 0.0))
     # At its limit of rate the torque is straight over the step.
-    number = motor + 0.5 * moved if at_rate else given + law.mean * (motor - given)
-    return (
-        number if limited else offset,
-        0.0 if limited else slope,
-        0.0 if limited else -speed_slope,
+    number = pick(at_rate, motor + 0.5 * moved, given + law.mean * (motor - given))
+    return _reduce(
+        string,
+        swing,
+        work,
+        pick(limited, number, offset),
+        pick(limited, 0.0, slope),
+        pick(limited, 0.0, -speed_slope),
     )
 
 
 @inlined
-def _held_line(drive: Any, work: Any, lane: int, rate: float) -> Any:
-    law = at_lane(drive, work, r.DRIVE, lane)
-    motor, command = work[r.MOTOR + lane], work[r.COMMAND + lane]
+def _by_held_torque(drive: Any, string: Any, swing: Any, work: Any) -> Any:
+    law = law_at(drive, work, r.DRIVE)
+    motor, command = at(work, r.MOTOR), at(work, r.COMMAND)
     wanted = law.motor_take * (command - motor)
     moved = _clip(wanted, -law.most_moved, law.most_moved)
-    work[r.MOVED + lane] = moved if moved != wanted else 0.0
+    put(work, r.MOVED, pick(moved != wanted, moved, 0.0))
     mean = command + law.mean * (motor - command)
-    return motor + 0.5 * moved if moved != wanted else mean, 0.0, 0.0
+    torque = pick(moved != wanted, motor + 0.5 * moved, mean)
+    return _reduce(string, swing, work, torque, each(0.0), each(0.0))
 
 
 def sample_drive(drive: Any, work: Any, due: bool) -> None:
@@ -149,7 +215,7 @@ def sample_drive(drive: Any, work: Any, due: bool) -> None:
     raise NotImplementedError("compiled only")
 
 
-@overload(sample_drive)
+@by_type(sample_drive)
 def _sample_drive(drive, work, due):
     if drive.instance_class is SampledStep:
         return lambda drive, work, due: _sample(drive, work) if due else None
@@ -158,107 +224,104 @@ def _sample_drive(drive, work, due):
 
 @inlined
 def _sample(drive: Any, work: Any) -> None:
-    widest_vectors()
-    for lane in range(WIDTH):
-        law = at_lane(drive, work, r.DRIVE, lane)
-        speed = work[r.SEEN + lane]
-        taken = law.sensed_inertia * (speed - work[r.SEEN_LAST + lane])
-        felt = (work[r.IMPULSE + lane] - taken) / law.period
-        felt = law.felt_keep * work[r.FELT + lane] + (1.0 - law.felt_keep) * felt
-        slow = work[r.SLOW + lane]
-        error = work[r.LEAD + lane] - speed - law.mobility * (felt - slow)
-        wanted = law.feedforward + law.kp * error + law.ki * work[r.INTEGRAL + lane]
-        _limits(law, work[r.TOP_SPEED + lane] + work[r.SET_SPEED + lane], work, lane)
-        given = _clip(wanted, work[r.LEAST + lane], work[r.MOST + lane])
-        back = law.tracking * (given - wanted) / law.ki if law.ki != 0.0 else 0.0
-        work[r.FELT + lane] = felt
-        work[r.SLOW + lane] = slow + law.slow_take * (felt - slow)
-        work[r.INTEGRAL + lane] += law.period * (error + back)
-        work[r.COMMAND + lane] = work[r.PENDING + lane] if law.late > 0.0 else given
-        work[r.PENDING + lane] = given
-        work[r.SEEN_LAST + lane] = speed
-        work[r.IMPULSE + lane] = 0.0
+    law = law_at(drive, work, r.DRIVE)
+    speed = at(work, r.SEEN)
+    taken = law.sensed_inertia * (speed - at(work, r.SEEN_LAST))
+    felt = (at(work, r.IMPULSE) - taken) / law.period
+    felt = law.felt_keep * at(work, r.FELT) + (1.0 - law.felt_keep) * felt
+    slow = at(work, r.SLOW)
+    error = at(work, r.LEAD) - speed - law.mobility * (felt - slow)
+    wanted = law.feedforward + law.kp * error + law.ki * at(work, r.INTEGRAL)
+    low, high = _limits(law, at(work, r.TOP_SPEED) + at(work, r.SET_SPEED))
+    given = _clip(wanted, low, high)
+    back = pick(law.ki != 0.0, law.tracking * (given - wanted) / law.ki, 0.0)
+    put(work, r.FELT, felt)
+    put(work, r.SLOW, slow + law.slow_take * (felt - slow))
+    put(work, r.INTEGRAL, at(work, r.INTEGRAL) + law.period * (error + back))
+    put(work, r.COMMAND, pick(law.late > 0.0, at(work, r.PENDING), given))
+    put(work, r.PENDING, given)
+    put(work, r.SEEN_LAST, speed)
+    put(work, r.IMPULSE, 0.0)
 
 
-def follow_drive(drive: Any, work: Any, rate: float) -> None:
+def follow_drive(drive: Any, work: Any, top_speed_before: Any, rate: float) -> None:
     """Memory at the end of a step whose motion is known."""
     raise NotImplementedError("compiled only")
 
 
-@overload(follow_drive)
-def _follow_drive(drive, work, rate):
+@by_type(follow_drive)
+def _follow_drive(drive, work, top_speed_before, rate):
     if drive.instance_class is RealStep:
-        return lambda drive, work, rate: _follow_real(drive, work, rate)
+        return lambda drive, work, top_speed_before, rate: _follow_real(
+            drive, work, top_speed_before, rate
+        )
     if drive.instance_class is SampledStep:
-        return lambda drive, work, rate: _follow_sampled(drive, work, rate)
-    return lambda drive, work, rate: None
+        return lambda drive, work, top_speed_before, rate: _follow_sampled(
+            drive, work, top_speed_before, rate
+        )
+    return lambda drive, work, top_speed_before, rate: None
 
 
 @inlined
-def _see(law: Any, work: Any, lane: int) -> float:
+def _see(law: Any, work: Any, before: Any) -> Any:
     """Move the encoder; returns the change of the speed that it shows."""
-    before, after = work[r.TOP_SPEED_BEFORE + lane], work[r.TOP_SPEED + lane]
-    seen = work[r.SEEN + lane]
+    after, seen = at(work, r.TOP_SPEED), at(work, r.SEEN)
     new = law.seen_keep * seen + (1.0 - law.seen_keep) * before + law.seen_ramp * (after - before)
-    work[r.SEEN + lane] = new
+    put(work, r.SEEN, new)
     return new - seen
 
 
 @inlined
-def _turn(law: Any, work: Any, lane: int, torque: float) -> None:
+def _turn(law: Any, work: Any, torque: Any) -> None:
     """Move the motor under its mean torque, or by as much as its limit of rate allows."""
-    motor, at_rate = work[r.MOTOR + lane], work[r.MOVED + lane]
+    motor, at_rate = at(work, r.MOTOR), at(work, r.MOVED)
     command = (torque - law.mean * motor) * law.per_command
     moved = law.motor_take * (command - motor)
-    work[r.MOTOR + lane] = motor + (at_rate if at_rate != 0.0 else moved)
+    put(work, r.MOTOR, motor + pick(at_rate != 0.0, at_rate, moved))
 
 
 @inlined
-def _follow_real(drive: Any, work: Any, rate: float) -> None:
-    widest_vectors()
+def _follow_real(drive: Any, work: Any, before: Any, rate: float) -> None:
     step = 1.0 / rate
-    for lane in range(WIDTH):
-        law = at_lane(drive, work, r.DRIVE, lane)
-        torque = work[r.TOP_TORQUE + lane] + work[r.DRAG + lane]
-        error = work[r.ERROR + lane] - rate * work[r.ANGLE + lane]
-        error += law.by_speed * work[r.TOP_SPEED + lane] - law.by_torque * torque
-        felt = torque - law.inertia * _see(law, work, lane)
-        before = work[r.FELT + lane]
-        shown = felt + law.felt_mean * (before - felt)
-        work[r.FELT + lane] = felt + law.felt_keep * (before - felt)
-        work[r.SLOW + lane] += law.slow_take * (shown - work[r.SLOW + lane])
-        _turn(law, work, lane, torque)
-        # Back-calculation, implicit: command = wanted + (ki step / 2) rate of the integral.
-        wanted = law.feedforward + law.kp * error + law.ki * work[r.INTEGRAL + lane]
-        free = wanted + law.half * error
-        limit = _clip(free, work[r.LEAST + lane], work[r.MOST + lane])
-        gives_in = (error + law.back * (limit - wanted)) * law.back_shrink
-        work[r.INTEGRAL + lane] += step * (gives_in if free != limit else error)
+    law = law_at(drive, work, r.DRIVE)
+    torque = at(work, r.TOP_TORQUE) + at(work, r.DRAG)
+    error = at(work, r.ERROR) - rate * at(work, r.ANGLE)
+    error += law.by_speed * at(work, r.TOP_SPEED) - law.by_torque * torque
+    felt = torque - law.inertia * _see(law, work, before)
+    felt_before = at(work, r.FELT)
+    shown = felt + law.felt_mean * (felt_before - felt)
+    put(work, r.FELT, felt + law.felt_keep * (felt_before - felt))
+    slow, integral = at(work, r.SLOW), at(work, r.INTEGRAL)
+    put(work, r.SLOW, slow + law.slow_take * (shown - slow))
+    _turn(law, work, torque)
+    # Back-calculation, implicit: command = wanted + (ki step / 2) rate of the integral.
+    wanted = law.feedforward + law.kp * error + law.ki * integral
+    free = wanted + law.half * error
+    limit = _clip(free, at(work, r.LEAST), at(work, r.MOST))
+    gives_in = (error + law.back * (limit - wanted)) * law.back_shrink
+    put(work, r.INTEGRAL, integral + step * pick(free != limit, gives_in, error))
 
 
 @inlined
-def _follow_sampled(drive: Any, work: Any, rate: float) -> None:
-    widest_vectors()
-    step = 1.0 / rate
-    for lane in range(WIDTH):
-        law = at_lane(drive, work, r.DRIVE, lane)
-        torque = work[r.TOP_TORQUE + lane] + work[r.DRAG + lane]
-        _see(law, work, lane)
-        _turn(law, work, lane, torque)
-        work[r.IMPULSE + lane] += torque * step
+def _follow_sampled(drive: Any, work: Any, before: Any, rate: float) -> None:
+    law = law_at(drive, work, r.DRIVE)
+    torque = at(work, r.TOP_TORQUE) + at(work, r.DRAG)
+    _see(law, work, before)
+    _turn(law, work, torque)
+    put(work, r.IMPULSE, at(work, r.IMPULSE) + torque / rate)
 
 
-def top_torque_now(drive: Any, work: Any, lane: int, speed: float) -> float:
+def top_torque_now(drive: Any, work: Any, speed: Any) -> Any:
     """Torque of the drive at the moment, top speed in the frame (rad/s) given."""
     raise NotImplementedError("compiled only")
 
 
-@overload(top_torque_now)
-def _top_torque_now(drive, work, lane, speed):
+@by_type(top_torque_now)
+def _top_torque_now(drive, work, speed):
     if drive.instance_class in (RealStep, SampledStep):
-        return lambda drive, work, lane, speed: work[r.MOTOR + lane]
-    return lambda drive, work, lane, speed: torque_at(
-        at_lane(drive, work, r.DRIVE, lane),
-        work[r.ANGLE + lane] - work[r.SHIFT + lane],
-        speed - work[r.LEAD + lane],
+        return lambda drive, work, speed: at(work, r.MOTOR)
+    return lambda drive, work, speed: torque_at(
+        law_at(drive, work, r.DRIVE),
+        at(work, r.ANGLE) - at(work, r.SHIFT),
+        speed - at(work, r.LEAD),
     )

@@ -1,4 +1,4 @@
-"""exp(x) in plain arithmetic, so that a loop over lanes becomes vector instructions.
+"""exp(x) of a row in plain arithmetic.
 
 A call into the C library would be made lane by lane and would cost as much as the rest of a
 step. Accurate to 1 unit in the last place for -708 <= x <= 709; clamped outside.
@@ -6,7 +6,9 @@ step. Accurate to 1 unit in the last place for -708 <= x <= 709; clamped outside
 
 from __future__ import annotations
 
-from drillctl.simulation.kernels.arithmetic import bits, double, fma
+from typing import Any
+
+from drillctl.simulation.kernels.arithmetic import fma, pick, power_of_two
 from drillctl.simulation.kernels.compiling import inlined
 
 _LOG2_E = 1.4426950408889634
@@ -19,10 +21,10 @@ _LOWEST, _HIGHEST = -708.0, 709.0
 
 
 @inlined
-def exp(x: float) -> float:
+def exp(x: Any) -> Any:
     """E to the power `x`: 2^k times a Taylor polynomial on |r| <= ln(2)/2. NaN stays NaN."""
-    x = _LOWEST if x < _LOWEST else x
-    x = _HIGHEST if x > _HIGHEST else x
+    x = pick(x < _LOWEST, _LOWEST, x)
+    x = pick(x > _HIGHEST, _HIGHEST, x)
     shifted = fma(x, _LOG2_E, _ROUNDER)
     k = shifted - _ROUNDER
     r = fma(-k, _LN2_LOW, fma(-k, _LN2_HIGH, x))
@@ -37,6 +39,4 @@ def exp(x: float) -> float:
     p1011 = fma(r, 1.0 / 39916800.0, 1.0 / 3628800.0)
     low = fma(r4, fma(r2, p67, p45), fma(r2, p23, 1.0 + r))
     high = fma(r4, 1.0 / 479001600.0, fma(r2, p1011, p89))
-    p = fma(r8, high, low)
-    power_of_two = double((bits(shifted) << 52) + (1023 << 52))
-    return p * power_of_two
+    return fma(r8, high, low) * power_of_two(shifted)

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from numba.extending import overload
-
 from drillctl.bit_rock import OverWeight
 from drillctl.bit_rock.protocol import Exp
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined, widest_vectors
-from drillctl.simulation.kernels.laws import at_lane
-from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.arithmetic import at, put
+from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.laws import law_at
 from drillctl.simulation.kernels.weight_step import has_memory
 
 
@@ -64,21 +62,21 @@ def _is_held(friction: Any, weight: Any) -> bool:
     return friction.instance_class is OverWeight and has_memory(weight)
 
 
-def rock(friction: Any, weight: Any, work: Any, lane: int) -> Any:
-    """The bit-rock law that a lane meets in this step."""
+def rock(friction: Any, weight: Any, work: Any) -> Any:
+    """The bit-rock law that the lanes meet in this step."""
     raise NotImplementedError("compiled only")
 
 
-@overload(rock)
-def _rock(friction, weight, work, lane):
+@by_type(rock)
+def _rock(friction, weight, work):
     if _is_held(friction, weight):
-        return lambda friction, weight, work, lane: HeldRock(
-            work[r.HELD_REST + lane],
-            work[r.HELD_LEVEL + lane],
-            work[r.HELD_SPREAD + lane],
-            work[r.HELD_DECAY + lane],
+        return lambda friction, weight, work: HeldRock(
+            at(work, r.HELD_REST),
+            at(work, r.HELD_LEVEL),
+            at(work, r.HELD_SPREAD),
+            at(work, r.HELD_DECAY),
         )
-    return lambda friction, weight, work, lane: at_lane(friction, work, r.FRICTION, lane)
+    return lambda friction, weight, work: law_at(friction, work, r.FRICTION)
 
 
 def hold_rock(friction: Any, weight: Any, work: Any) -> None:
@@ -86,7 +84,7 @@ def hold_rock(friction: Any, weight: Any, work: Any) -> None:
     raise NotImplementedError("compiled only")
 
 
-@overload(hold_rock)
+@by_type(hold_rock)
 def _hold_rock(friction, weight, work):
     if _is_held(friction, weight):
         return lambda friction, weight, work: _look_up(friction, work)
@@ -95,12 +93,10 @@ def _hold_rock(friction, weight, work):
 
 @inlined
 def _look_up(friction: Any, work: Any) -> None:
-    widest_vectors()
-    for lane in range(WIDTH):
-        law = at_lane(friction, work, r.FRICTION, lane)
-        _, rest, _ = _held(law, work[r.REST_LOAD + lane])
-        level, static, decay = _held(law, work[r.HOISTED + lane])
-        work[r.HELD_REST + lane] = rest
-        work[r.HELD_LEVEL + lane] = level
-        work[r.HELD_SPREAD + lane] = static - level
-        work[r.HELD_DECAY + lane] = decay
+    law = law_at(friction, work, r.FRICTION)
+    _, rest, _ = _held(law, at(work, r.REST_LOAD))
+    level, static, decay = _held(law, at(work, r.HOISTED))
+    put(work, r.HELD_REST, rest)
+    put(work, r.HELD_LEVEL, level)
+    put(work, r.HELD_SPREAD, static - level)
+    put(work, r.HELD_DECAY, decay)

@@ -1,8 +1,7 @@
-"""The step of the laws, lane by lane: everything that is not the string.
+"""What a set-valued law of the rock does to the bit in a step.
 
-With the mean top torque of the step affine in the top's motion at its end (`drive_step`), both
-control and string can be eliminated. The bit speed at the end of the step
-is then free - gain T_bit, and what is left is one scalar inclusion:
+With string and drive eliminated (`drive_step`), the bit speed at the end of the step
+is free - gain T_bit, and what is left is one scalar inclusion:
 
 - A stuck bit stays while the torque that holds it, free / gain, is within the static one.
 - A turning bit feels the mean of the torque before and after, so that its speed u >= 0 in its
@@ -11,26 +10,28 @@ is then free - gain T_bit, and what is left is one scalar inclusion:
 - It sticks only if there is no root of its own sign and the static torque can hold it; else it
   turns the other way.
 
-Every lane takes its own decisions by selects, never by branches, and its Newton iteration
-freezes when that lane has converged: no lane's bits depend on its neighbours.
+Every lane takes its own decisions, and its Newton iteration freezes when that lane has converged:
+no lane's bits depend on its neighbours. What takes divisions and happens rarely is done when some
+lane needs it; it leaves the other lanes as they are.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined, widest_vectors
-from drillctl.simulation.kernels.drive_step import drive_line
-from drillctl.simulation.kernels.held_rock import rock
-from drillctl.simulation.kernels.laws import (
-    contact,
-    kinetic_torque_at_rest,
-    static_torque,
-    weight_at,
+from drillctl.simulation.kernels.arithmetic import (
+    any_of,
+    at,
+    each,
+    everywhere,
+    most,
+    pick,
+    put,
 )
-from drillctl.simulation.kernels.rows import WIDTH
-from drillctl.simulation.kernels.top_motion import move_top
+from drillctl.simulation.kernels.compiling import inlined
+from drillctl.simulation.kernels.held_rock import rock
+from drillctl.simulation.kernels.laws import contact, kinetic_torque_at_rest, static_torque
 from drillctl.simulation.kernels.weight_step import acting
 
 NEWTON_STEP = 3e-5
@@ -40,181 +41,128 @@ rock of the paper's map, and at most 1e-9 for a law as steep as the step allows.
 NEWTON_LIMIT = 30
 
 
-@inlined
-def eliminate(string: Any, drive: Any, work: Any, rate: float) -> None:
-    """Reduce string and control to free and gain; `rate` is 1 / step."""
-    widest_vectors()
-    for lane in range(WIDTH):
-        drag = work[r.DRAG + lane]
-        offset, slope, by_speed = drive_line(drive, string, work, lane, rate)
-        shrink = 1.0 / (1.0 + slope * string.angle_by_top + by_speed * string.top_speed_by_top)
-        angle = work[r.TOP_FREE + lane] - string.angle_by_top * drag
-        speed = work[r.TOP_SPEED_FREE + lane] - string.top_speed_by_top * drag
-        alone = (offset - slope * angle - by_speed * speed) * shrink
-        share = (slope * string.angle_by_bit + by_speed * string.top_speed_by_bit) * shrink
-        free = (
-            work[r.SET_SPEED + lane]
-            + work[r.BIT_FREE + lane]
-            + string.speed_by_top * (alone - drag)
-        )
-        gain = string.speed_by_bit - string.speed_by_top * share
-        work[r.OFFSET + lane] = alone
-        work[r.SHARE + lane] = share
-        work[r.FREE + lane] = free
-        work[r.GAIN + lane] = gain
-        work[r.PER_GAIN + lane] = 1.0 / gain
+class Outcome(NamedTuple):
+    """What a step ends with.
+
+    Attributes
+    ----------
+    speed : row
+        Bit speed at its end (rad/s).
+    direction : row
+        +1 or -1 turning, 0 stuck.
+    kinetic, slope : row
+        Friction torque at that speed, signed (N m), and the law's slope there (N m s/rad).
+    torque : row
+        Mean torque on the bit over the step (N m).
+    holding : row
+        Mean torque that held a bit which was stuck throughout (N m); -1 of any other.
+    stuck : row
+        Share of the step spent stuck.
+    """
+
+    speed: Any
+    direction: Any
+    kinetic: Any
+    slope: Any
+    torque: Any
+    holding: Any
+    stuck: Any
 
 
 @inlined
-def set_up(friction: Any, weight: Any, work: Any) -> int:
-    """Set the inclusion at the bit up; returns how many lanes break loose."""
-    widest_vectors()
-    releases = 0
-    for lane in range(WIDTH):
-        free, gain, load = work[r.FREE + lane], work[r.GAIN + lane], work[r.REST_LOAD + lane]
-        law = rock(friction, weight, work, lane)
-        kinetic = kinetic_torque_at_rest(law, load)
-        direction = work[r.DIRECTION + lane]
-        forward = 1.0 if free > 0.0 else -1.0
-        own = direction * (free - 0.5 * gain * work[r.KINETIC + lane]) > 0.5 * gain * kinetic
-        # A stuck bit, and one that is turned round, starts from the torque at rest.
-        sign = direction if own else forward
-        previous = sign * work[r.KINETIC + lane] if own else kinetic
-        right = sign * free - 0.5 * gain * previous
-        # The law as a straight line from its last torque and slope: Newton's first guess, off
-        # by its curvature over one step. A bit set in motion has no last slope.
-        fall = -0.5 * gain * work[r.SLOPE + lane] if own else 0.0
-        last = abs(work[r.BIT_SPEED + lane])
-        flat = right - 0.5 * gain * previous
-        guess = flat + fall * (flat + fall * (flat - last) - last)
-        work[r.SIGN + lane] = sign
-        work[r.OWN + lane] = 1.0 if own else 0.0
-        work[r.RIGHT + lane] = right
-        work[r.SPEED + lane] = guess if guess > 0.0 else 0.0
-        work[r.OPEN + lane] = 1.0
+def stick_or_slip(friction: Any, weight: Any, reduced: Any, work: Any) -> Any:
+    """The `Outcome` of a step under a set-valued law."""
+    law, load, at_rest = rock(friction, weight, work), acting(weight, work), at(work, r.REST_LOAD)
+    static, kinetic = static_torque(law, at_rest), kinetic_torque_at_rest(law, at_rest)
+    free, half = reduced.free, 0.5 * reduced.gain
+    direction, before = at(work, r.DIRECTION), at(work, r.KINETIC)
+    was_stuck = direction == 0.0
+    own = direction * (free - half * before) > half * kinetic
+    # A stuck bit, and one that is turned round, starts from the torque at rest.
+    sign = pick(own, direction, pick(free > 0.0, 1.0, -1.0))
+    previous = pick(own, sign * before, kinetic)
+    right = sign * free - half * previous
+    holding = abs(free) * reduced.per_gain
+    loose = was_stuck & (holding > static)
+    stuck = each(0.0)
+    if any_of(loose):
+        stuck, early = time_release(static, kinetic, holding, reduced.gain, at(work, r.HOLDING))
+        right = pick(loose, right + early, right)
+    # The law as a straight line from its last torque and slope: Newton's first guess, off
+    # by its curvature over one step. A bit set in motion has no last slope.
+    fall = pick(own, -half * at(work, r.SLOPE), 0.0)
+    last = abs(at(work, r.BIT_SPEED))
+    flat = right - half * previous
+    guess = most(flat + fall * (flat + fall * (flat - last) - last), 0.0)
+    u, slope = solve_inclusion(law, load, half, right, guess, at(work, r.SLOPE))
 
-        holding = abs(free) * work[r.PER_GAIN + lane]
-        work[r.NEW_HOLDING + lane] = holding
-        releases += 1 if direction == 0.0 and holding > static_torque(law, load) else 0
-    return releases
+    sticks = (holding <= static) & ~own
+    speed = pick(sticks, 0.0, sign * u)
+    # The slip torque at the new speed follows from the equation that u solves.
+    slip = 2.0 * (right - u) * reduced.per_gain
+    # A bit that breaks loose keeps the share that `time_release` found.
+    stuck = pick(loose, stuck, pick(sticks, 1.0, 0.0))
+    stops = sticks & ~was_stuck
+    if any_of(stops):
+        past_zero = direction * (free - half * before) - half * kinetic
+        # The bit is followed in a straight line from its speed before through zero.
+        stuck = pick(stops, past_zero / (past_zero - last), stuck)
+        put(work, r.STICKS, at(work, r.STICKS) + stops)
+    return Outcome(
+        speed,
+        pick(sticks, 0.0, sign),
+        pick(sticks, 0.0, sign * slip),
+        slope,
+        (free - speed) * reduced.per_gain,
+        pick(was_stuck & sticks, holding, -1.0),
+        stuck,
+    )
 
 
 @inlined
-def time_releases(friction: Any, weight: Any, work: Any) -> None:
+def time_release(static: Any, kinetic: Any, holding: Any, gain: Any, last: Any) -> Any:
     """Date the moment a stuck bit breaks loose, and give it no friction torque before it.
 
     The torque that would hold it rises along the line through the holding torques of this step
     and the last, each in the middle of its step; it meets the static one after the share
     `held` of this step, or before its beginning if that is negative. Until then the bit bears
     the holding torque, which the slip equation has as the slip torque: the difference of the
-    two impulses goes to the right-hand side.
+    two impulses goes to the right-hand side. Returns the share and that difference.
     """
-    widest_vectors()
-    for lane in range(WIDTH):
-        law = rock(friction, weight, work, lane)
-        load = work[r.REST_LOAD + lane]
-        static, kinetic = static_torque(law, load), kinetic_torque_at_rest(law, load)
-        holding, last = work[r.NEW_HOLDING + lane], work[r.HOLDING + lane]
-        rise = holding - last
-        held = 0.5 + (static - holding) / rise
-        # Without a step wholly at rest behind it, nothing is known of the rise.
-        known = last >= 0.0
-        loose = work[r.DIRECTION + lane] == 0.0 and holding > static
-        early = work[r.GAIN + lane] * (0.5 * rise * held * held - held * (static - kinetic))
-        work[r.RIGHT + lane] += early if loose and known else 0.0
-        work[r.STUCK_SHARE + lane] = held if known else 0.0
+    rise = holding - last
+    held = 0.5 + (static - holding) / rise
+    early = gain * (0.5 * rise * held * held - held * (static - kinetic))
+    # Without a step wholly at rest behind it, nothing is known of the rise.
+    known = last >= 0.0
+    return pick(known, held, 0.0), pick(known, early, 0.0)
 
 
 @inlined
-def solve_inclusion(friction: Any, weight: Any, work: Any) -> None:
-    """Newton's method on u + (gain/2) T(u) = right, u >= 0, in every lane that is open."""
-    widest_vectors()
+def solve_inclusion(
+    law: Any, load: Any, half: Any, right: Any, guess: Any, slope_before: Any
+) -> Any:
+    """Newton's method on u + half T(u) = right, u >= 0; the root and the slope there."""
+    u, slope, is_open = guess, slope_before, everywhere()
     for _ in range(NEWTON_LIMIT):
-        still_open = 0  # an integer: the compiler may not reorder a sum of doubles
-        for lane in range(WIDTH):
-            law = rock(friction, weight, work, lane)
-            u = work[r.SPEED + lane]
-            half = 0.5 * work[r.GAIN + lane]
-            torque, slope = contact(law, acting(weight, work, lane), u)
-            move = (work[r.RIGHT + lane] - u - half * torque) / (1.0 + half * slope)
-            new = u + move
-            new = new if new > 0.0 else 0.0
-            is_open = work[r.OPEN + lane] > 0.0
-            far = abs(new - u) > NEWTON_STEP * (1.0 + u)
-            work[r.SPEED + lane] = new if is_open else u
-            work[r.SLOPE + lane] = slope if is_open else work[r.SLOPE + lane]
-            work[r.OPEN + lane] = 1.0 if is_open and far else 0.0
-            still_open += 1 if is_open and far else 0
-        if still_open == 0:
+        torque, falls = contact(law, load, u)
+        new = most(u + (right - u - half * torque) * one_over_one_plus(half * falls), 0.0)
+        far = abs(new - u) > NEWTON_STEP * (1.0 + u)
+        u = pick(is_open, new, u)
+        slope = pick(is_open, falls, slope)
+        is_open = is_open & far
+        if not any_of(is_open):
             break
+    return u, slope
 
 
 @inlined
-def decide(friction: Any, weight: Any, work: Any) -> int:
-    """Stick or slip, and the bit torque of the step; returns how many lanes come to rest."""
-    widest_vectors()
-    stops = 0
-    for lane in range(WIDTH):
-        law = rock(friction, weight, work, lane)
-        static = static_torque(law, work[r.REST_LOAD + lane])
-        free, per_gain = work[r.FREE + lane], work[r.PER_GAIN + lane]
-        holding = work[r.NEW_HOLDING + lane]
-        sticks = holding <= static and not work[r.OWN + lane] > 0.0
-        was_stuck = work[r.DIRECTION + lane] == 0.0
-        speed = 0.0 if sticks else work[r.SIGN + lane] * work[r.SPEED + lane]
-        # The slip torque at the new speed follows from the equation that u solves.
-        slip = 2.0 * (work[r.RIGHT + lane] - work[r.SPEED + lane]) * per_gain
-        work[r.NEW_SPEED + lane] = speed
-        work[r.NEW_DIRECTION + lane] = 0.0 if sticks else work[r.SIGN + lane]
-        work[r.NEW_KINETIC + lane] = 0.0 if sticks else work[r.SIGN + lane] * slip
-        work[r.BIT_TORQUE + lane] = (free - speed) * per_gain
-        # A bit that breaks loose keeps the share that `time_releases` found.
-        loose = was_stuck and not sticks
-        work[r.STUCK_SHARE + lane] = work[r.STUCK_SHARE + lane] if loose else 1.0 * sticks
-        stops += 1 if sticks and not was_stuck else 0
-    return stops
+def one_over_one_plus(d: Any) -> Any:
+    """1 / (1 + d) for |d| <= 1/4, to 2e-5 and far better for small d; a division takes longer.
 
-
-@inlined
-def time_stops(friction: Any, weight: Any, work: Any) -> None:
-    """Share of the step spent stuck in lanes that come to rest.
-
-    The bit is followed in a straight line from its speed before through zero.
+    (1 - d) (1 + d^2) (1 + d^4) = (1 - d^8) / (1 + d). Newton's method corrects itself: its step is
+    off by that share at most.
     """
-    widest_vectors()
-    for lane in range(WIDTH):
-        law = rock(friction, weight, work, lane)
-        half = 0.5 * work[r.GAIN + lane]
-        direction = work[r.DIRECTION + lane]
-        past_zero = direction * (work[r.FREE + lane] - half * work[r.KINETIC + lane])
-        past_zero -= half * kinetic_torque_at_rest(law, work[r.REST_LOAD + lane])
-        stuck = past_zero / (past_zero - abs(work[r.BIT_SPEED + lane]))
-        stops = direction != 0.0 and work[r.NEW_DIRECTION + lane] == 0.0
-        work[r.STUCK_SHARE + lane] = stuck if stops else work[r.STUCK_SHARE + lane]
-        work[r.STICKS + lane] += 1.0 if stops else 0.0
-
-
-@inlined
-def conclude(string: Any, drive: Any, weight: Any, observer: Any, work: Any) -> None:
-    """Top torque of the step, and the state at its end."""
-    widest_vectors()
-    for lane in range(WIDTH):
-        bit_torque = work[r.BIT_TORQUE + lane]
-        top_torque = work[r.OFFSET + lane] + work[r.SHARE + lane] * bit_torque
-        net_torque = top_torque - work[r.DRAG + lane]
-        work[r.TOP_TORQUE + lane] = net_torque
-        work[r.ANGLE + lane] = (
-            work[r.TOP_FREE + lane]
-            + string.angle_by_top * net_torque
-            - string.angle_by_bit * bit_torque
-        )
-        move_top(drive, observer, string, work, lane)
-        stayed = work[r.DIRECTION + lane] == 0.0 and work[r.NEW_DIRECTION + lane] == 0.0
-        work[r.HOLDING + lane] = work[r.NEW_HOLDING + lane] if stayed else -1.0
-        work[r.DIRECTION + lane] = work[r.NEW_DIRECTION + lane]
-        work[r.KINETIC + lane] = work[r.NEW_KINETIC + lane]
-        work[r.SPEED_BEFORE + lane] = work[r.BIT_SPEED + lane]
-        speed = work[r.NEW_SPEED + lane]
-        work[r.BIT_SPEED + lane] = speed
-        work[r.LOAD_BEFORE + lane] = work[r.LOAD + lane]
-        work[r.LOAD + lane] = weight_at(acting(weight, work, lane), abs(speed))
+    square = d * d
+    product = 1.0 - d
+    product = product + product * square
+    return product + product * (square * square)

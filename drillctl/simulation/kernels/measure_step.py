@@ -2,115 +2,176 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined, widest_vectors
-from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.arithmetic import any_of, at, fma, least, most, pick, put
+from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.weight_step import stays
 from drillctl.simulation.measures import NARROW_BAND, WIDE_BAND
+
+
+class Before(NamedTuple):
+    """What moved as a step began.
+
+    Attributes
+    ----------
+    bit_speed, top_speed : row
+        rad/s, the top speed in the frame.
+    load : row
+        Weight on the bit (N).
+    """
+
+    bit_speed: Any
+    top_speed: Any
+    load: Any
 
 
 @inlined
 def begin_measures(work: Any) -> None:
-    """Set the measures of a run that has not begun."""
-    widest_vectors()
-    for lane in range(WIDTH):
-        for measure in range(r.MEASURES):
-            work[r.FIRST_MEASURE + measure * WIDTH + lane] = 0.0
-        speed = work[r.BIT_SPEED + lane]
-        work[r.LOW + lane] = speed
-        work[r.HIGH + lane] = speed
-        work[r.LATE_LOW + lane] = 1e300
-        work[r.LATE_HIGH + lane] = -1e300
-        work[r.STICKS + lane] = 1.0 if work[r.DIRECTION + lane] == 0.0 else 0.0
+    """Set the measures of a run that has not begun, where they do not begin at zero."""
+    speed = at(work, r.BIT_SPEED)
+    put(work, r.LOW, speed)
+    put(work, r.HIGH, speed)
+    put(work, r.LATE_LOW, 1e300)
+    put(work, r.LATE_HIGH, -1e300)
+    put(work, r.STICKS, pick(at(work, r.DIRECTION) == 0.0, 1.0, 0.0))
 
 
 @inlined
-def measure(work: Any, begin: float, step: float, in_j1: float, in_window: float) -> int:
-    """Add one step to the measures; returns how many lanes cross the set speed or a band.
+def _add(work: Any, place: int, factor: Any, value: Any) -> None:
+    put(work, place, fma(factor, value, at(work, place)))
+
+
+@inlined
+def measure(
+    work: Any, before: Any, outcome: Any, begin: float, step: float, in_j1: float, in_window: float
+) -> None:
+    """Add one step to the measures.
 
     `in_j1` and `in_window` are the shares of the step that lie in the J1 window and in the
     window at the end of the run.
     """
-    widest_vectors()
-    crossings = 0
-    end = begin + step
-    for lane in range(WIDTH):
-        before, speed = work[r.SPEED_BEFORE + lane], work[r.BIT_SPEED + lane]
-        set_speed, load = work[r.SET_SPEED + lane], work[r.LOAD + lane]
-        load_before = work[r.LOAD_BEFORE + lane]
-        error_before, error = before - set_speed, speed - set_speed
-        size_before, size = abs(error_before), abs(error)
-        work[r.J1 + lane] += in_j1 * step * 0.5 * (size_before + size)
-        narrow, wide = NARROW_BAND * set_speed, WIDE_BAND * set_speed
-        work[r.OUTSIDE_NARROW + lane] = end if size > narrow else work[r.OUTSIDE_NARROW + lane]
-        work[r.OUTSIDE_WIDE + lane] = end if size > wide else work[r.OUTSIDE_WIDE + lane]
-        crosses = error_before * error < 0.0
-        enters_narrow = size_before > narrow and size <= narrow
-        enters_wide = size_before > wide and size <= wide
-        crossings += 1 if crosses or enters_narrow or enters_wide else 0
+    set_speed, speed = at(work, r.SET_SPEED), outcome.speed
+    error_before, error = before.bit_speed - set_speed, speed - set_speed
+    size_before, size = abs(error_before), abs(error)
+    _add(work, r.J1, 0.5 * step * in_j1, size_before + size)
+    _measure_bands(work, set_speed, size_before, size, begin, step)
+    crosses = error_before * error < 0.0
+    if any_of(crosses):
+        # Two triangles instead of the trapezoid, where the deviation changes sign.
+        excess = step * in_j1 * size_before * size / (size_before + size)
+        put(work, r.J1, at(work, r.J1) - pick(crosses, excess, 0.0))
 
-        angle = 0.5 * step * (before + speed)
-        work[r.BIT_ANGLE + lane] += angle
-        work[r.LATE_ANGLE + lane] += in_window * angle
-        work[r.WORK + lane] += work[r.BIT_TORQUE + lane] * angle
-        outside = load < work[r.TABLE_LOW + lane] or load > work[r.TABLE_HIGH + lane]
-        work[r.OUTSIDE_TABLE + lane] += step if outside else 0.0
-        work[r.WEIGHT_SUM + lane] += 0.5 * step * (load_before + load)
-        drilled = load_before * abs(before) + load * abs(speed)
-        work[r.ROP_SUM + lane] += 0.5 * step * drilled
-
-        stuck = step * work[r.STUCK_SHARE + lane]
-        work[r.STUCK_TIME + lane] += stuck
-        work[r.LATE_STUCK + lane] += in_window * stuck
-
-        work[r.LOW + lane] = min(work[r.LOW + lane], speed)
-        work[r.HIGH + lane] = max(work[r.HIGH + lane], speed)
-        top_torque = work[r.TOP_TORQUE + lane] + work[r.DRAG + lane]
-        work[r.PEAK_TOP + lane] = max(work[r.PEAK_TOP + lane], abs(top_torque))
-    return crossings
+    turned = before.bit_speed + speed
+    _add(work, r.BIT_ANGLE, 0.5 * step, turned)
+    _add(work, r.WORK, outcome.torque, 0.5 * step * turned)
+    _add(work, r.STUCK_TIME, step, outcome.stuck)
+    put(work, r.LOW, least(at(work, r.LOW), speed))
+    put(work, r.HIGH, most(at(work, r.HIGH), speed))
+    top_torque = at(work, r.TOP_TORQUE) + at(work, r.DRAG)
+    put(work, r.PEAK_TOP, most(at(work, r.PEAK_TOP), abs(top_torque)))
+    if in_window > 0.0:
+        _measure_window(work, before.bit_speed, outcome, step, in_window)
 
 
 @inlined
-def measure_crossings(work: Any, begin: float, step: float, in_j1: float) -> None:
-    """Mend J1 where the deviation changes sign, and date the last departure from each band."""
-    widest_vectors()
-    for lane in range(WIDTH):
-        set_speed = work[r.SET_SPEED + lane]
-        error_before = work[r.SPEED_BEFORE + lane] - set_speed
-        error = work[r.BIT_SPEED + lane] - set_speed
-        size_before, size = abs(error_before), abs(error)
-        # Two triangles instead of the trapezoid.
-        excess = step * size_before * size / (size_before + size)
-        work[r.J1 + lane] -= in_j1 * excess if error_before * error < 0.0 else 0.0
-        narrow, wide = NARROW_BAND * set_speed, WIDE_BAND * set_speed
+def _measure_bands(
+    work: Any, set_speed: Any, size_before: Any, size: Any, begin: float, step: float
+) -> None:
+    """Date the entry into each band; the last one counts."""
+    narrow, wide = NARROW_BAND * set_speed, WIDE_BAND * set_speed
+    enters_narrow = (size_before > narrow) & (size <= narrow)
+    enters_wide = (size_before > wide) & (size <= wide)
+    if any_of(enters_narrow | enters_wide):
         since = step / (size_before - size)
-        last = work[r.OUTSIDE_NARROW + lane]
         entered = begin + since * (size_before - narrow)
-        work[r.OUTSIDE_NARROW + lane] = entered if size_before > narrow >= size else last
-        last = work[r.OUTSIDE_WIDE + lane]
+        put(work, r.OUTSIDE_NARROW, pick(enters_narrow, entered, at(work, r.OUTSIDE_NARROW)))
         entered = begin + since * (size_before - wide)
-        work[r.OUTSIDE_WIDE + lane] = entered if size_before > wide >= size else last
+        put(work, r.OUTSIDE_WIDE, pick(enters_wide, entered, at(work, r.OUTSIDE_WIDE)))
 
 
 @inlined
-def measure_window(work: Any, in_window: float) -> None:
-    """Extremes of the bit speed in the window at the end of the run.
+def conclude_bands(work: Any, duration: float) -> None:
+    """A run that ends outside a band has been outside to the end."""
+    set_speed = at(work, r.SET_SPEED)
+    size = abs(at(work, r.BIT_SPEED) - set_speed)
+    last = at(work, r.OUTSIDE_NARROW)
+    put(work, r.OUTSIDE_NARROW, pick(size > NARROW_BAND * set_speed, duration, last))
+    last = at(work, r.OUTSIDE_WIDE)
+    put(work, r.OUTSIDE_WIDE, pick(size > WIDE_BAND * set_speed, duration, last))
+
+
+@inlined
+def _measure_window(
+    work: Any, speed_before: Any, outcome: Any, step: float, in_window: float
+) -> None:
+    """The window at the end of the run.
 
     A step that lies in it as a whole brings its beginning too: the window's first moment.
     """
-    widest_vectors()
-    for lane in range(WIDTH):
-        speed = work[r.BIT_SPEED + lane]
-        before = work[r.SPEED_BEFORE + lane] if in_window >= 1.0 else speed
-        work[r.LATE_LOW + lane] = min(work[r.LATE_LOW + lane], min(before, speed))
-        work[r.LATE_HIGH + lane] = max(work[r.LATE_HIGH + lane], max(before, speed))
+    speed = outcome.speed
+    _add(work, r.LATE_ANGLE, 0.5 * step * in_window, speed_before + speed)
+    _add(work, r.LATE_STUCK, step * in_window, outcome.stuck)
+    low, high = least(at(work, r.LATE_LOW), speed), most(at(work, r.LATE_HIGH), speed)
+    if in_window >= 1.0:
+        low, high = least(low, speed_before), most(high, speed_before)
+    put(work, r.LATE_LOW, low)
+    put(work, r.LATE_HIGH, high)
+
+
+def measure_load(
+    weight: Any, program: Any, work: Any, before: Any, outcome: Any, step: float
+) -> None:
+    """Add the weight on bit of a step, and what it drills, to the measures."""
+    raise NotImplementedError("compiled only")
+
+
+@by_type(measure_load)
+def _measure_load(weight, program, work, before, outcome, step):
+    # A weight that stays needs no sums: only what is drilled under it follows the speed.
+    if stays(weight, program):
+        return lambda weight, program, work, before, outcome, step: _add(
+            work, r.ROP_SUM, 0.5 * step, abs(before.bit_speed) + abs(outcome.speed)
+        )
+    return lambda weight, program, work, before, outcome, step: _measure_moving_load(
+        work, before, outcome, step
+    )
 
 
 @inlined
-def measure_pipe(work: Any) -> None:
+def _measure_moving_load(work: Any, before: Any, outcome: Any, step: float) -> None:
+    load = at(work, r.LOAD)
+    outside = (load < at(work, r.TABLE_LOW)) | (load > at(work, r.TABLE_HIGH))
+    put(work, r.OUTSIDE_TABLE, at(work, r.OUTSIDE_TABLE) + pick(outside, step, 0.0))
+    _add(work, r.WEIGHT_SUM, 0.5 * step, before.load + load)
+    drilled = before.load * abs(before.bit_speed) + load * abs(outcome.speed)
+    _add(work, r.ROP_SUM, 0.5 * step, drilled)
+
+
+def conclude_load(weight: Any, program: Any, work: Any, duration: float) -> None:
+    """What a weight that stays adds up to at the end of a run."""
+    raise NotImplementedError("compiled only")
+
+
+@by_type(conclude_load)
+def _conclude_load(weight, program, work, duration):
+    if stays(weight, program):
+        return lambda weight, program, work, duration: _conclude_steady_load(work, duration)
+    return lambda weight, program, work, duration: None
+
+
+@inlined
+def _conclude_steady_load(work: Any, duration: float) -> None:
+    load = at(work, r.LOAD)
+    outside = (load < at(work, r.TABLE_LOW)) | (load > at(work, r.TABLE_HIGH))
+    put(work, r.OUTSIDE_TABLE, pick(outside, duration, 0.0))
+    put(work, r.WEIGHT_SUM, duration * load)
+    put(work, r.ROP_SUM, load * at(work, r.ROP_SUM))
+
+
+@inlined
+def measure_pipe(work: Any, pipe: Any) -> None:
     """Largest pipe torque so far; the pass over the string has just read it."""
-    widest_vectors()
-    for lane in range(WIDTH):
-        torque = abs(work[r.PIPE + lane] + work[r.PIPE_OFFSET + lane])
-        work[r.PEAK_PIPE + lane] = max(work[r.PEAK_PIPE + lane], torque)
+    torque = abs(pipe + at(work, r.PIPE_OFFSET))
+    put(work, r.PEAK_PIPE, most(at(work, r.PEAK_PIPE), torque))

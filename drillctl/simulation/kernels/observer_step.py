@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from numba.extending import overload
-
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined, widest_vectors
+from drillctl.simulation.kernels.arithmetic import at, put
+from drillctl.simulation.kernels.compiling import by_type, inlined
 from drillctl.simulation.kernels.rows import WIDTH
 
 
@@ -52,7 +51,7 @@ def start_observer(observer: Any, memory: Any, first: int) -> None:
     raise NotImplementedError("compiled only")
 
 
-@overload(start_observer)
+@by_type(start_observer)
 def _start_observer(observer, memory, first):
     if observer.instance_class is NoObserver:
         return lambda observer, memory, first: None
@@ -62,41 +61,35 @@ def _start_observer(observer, memory, first):
 @inlined
 def _copy_start(observer: Any, memory: Any, first: int) -> None:
     for i in range(observer.free.shape[0]):
-        for lane in range(WIDTH):
-            memory.estimate[i, lane] = observer.start[i, first + lane]
+        put(memory.estimate, i * WIDTH, at(observer.start[i], first))
 
 
-def move_observer(observer: Any, memory: Any, work: Any) -> None:
+def move_observer(observer: Any, memory: Any, work: Any, top_speed_before: Any) -> None:
     """One step of the observer."""
     raise NotImplementedError("compiled only")
 
 
-@overload(move_observer)
-def _move_observer(observer, memory, work):
+@by_type(move_observer)
+def _move_observer(observer, memory, work, top_speed_before):
     if observer.instance_class is NoObserver:
-        return lambda observer, memory, work: None
-    return lambda observer, memory, work: _propagate(observer, memory, work)
+        return lambda observer, memory, work, top_speed_before: None
+    return lambda observer, memory, work, top_speed_before: _propagate(
+        observer, memory, work, top_speed_before
+    )
 
 
 @inlined
-def _propagate(observer: Any, memory: Any, work: Any) -> None:
-    widest_vectors()
+def _propagate(observer: Any, memory: Any, work: Any, before: Any) -> None:
     states = observer.free.shape[0]
+    torque, after = at(work, r.TOP_TORQUE), at(work, r.TOP_SPEED)
     for i in range(states):
-        torque, begin, end = observer.by_torque[i], observer.by_begin[i], observer.by_end[i]
-        for lane in range(WIDTH):
-            memory.moved[i, lane] = (
-                torque * work[r.TOP_TORQUE + lane]
-                + begin * work[r.TOP_SPEED_BEFORE + lane]
-                + end * work[r.TOP_SPEED + lane]
-            )
+        moved = observer.by_torque[i] * torque + observer.by_begin[i] * before
+        moved += observer.by_end[i] * after
         for j in range(states):
-            a = observer.free[i, j]
-            for lane in range(WIDTH):
-                memory.moved[i, lane] += a * memory.estimate[j, lane]
+            moved += observer.free[i, j] * at(memory.estimate, j * WIDTH)
+        put(memory.moved, i * WIDTH, moved)
     for i in range(states):
-        for lane in range(WIDTH):
-            memory.estimate[i, lane] = memory.moved[i, lane]
+        put(memory.estimate, i * WIDTH, at(memory.moved, i * WIDTH))
 
 
 def read_observer(observer: Any, memory: Any, work: Any) -> None:
@@ -104,7 +97,7 @@ def read_observer(observer: Any, memory: Any, work: Any) -> None:
     raise NotImplementedError("compiled only")
 
 
-@overload(read_observer)
+@by_type(read_observer)
 def _read_observer(observer, memory, work):
     if observer.instance_class is NoObserver:
         return lambda observer, memory, work: None
@@ -113,8 +106,7 @@ def _read_observer(observer, memory, work):
 
 @inlined
 def _estimate(observer: Any, memory: Any, work: Any) -> None:
-    for lane in range(WIDTH):
-        speed = work[r.SET_SPEED + lane]
-        for i in range(observer.free.shape[0]):
-            speed += observer.read[i] * memory.estimate[i, lane]
-        work[r.SIGNAL + lane] = abs(speed)
+    speed = at(work, r.SET_SPEED)
+    for i in range(observer.free.shape[0]):
+        speed += observer.read[i] * at(memory.estimate, i * WIDTH)
+    put(work, r.SIGNAL, abs(speed))

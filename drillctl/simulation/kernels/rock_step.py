@@ -4,20 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.extending import overload
-
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined, widest_vectors
+from drillctl.simulation.kernels.arithmetic import any_of, at, each, everywhere, least, most, pick
+from drillctl.simulation.kernels.compiling import by_type, inlined
 from drillctl.simulation.kernels.held_rock import rock
-from drillctl.simulation.kernels.lane_step import (
-    decide,
-    set_up,
-    solve_inclusion,
-    time_releases,
-    time_stops,
-)
+from drillctl.simulation.kernels.lane_step import Outcome, stick_or_slip
 from drillctl.simulation.kernels.laws import contact
-from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.kernels.weight_step import acting
 
 BISECTIONS = 60
@@ -26,90 +18,66 @@ CLOSE = 1e-13
 """It has converged when it moves less than this (rad/s, relative over 1 rad/s)."""
 
 
-def meet_rock(friction: Any, weight: Any, work: Any) -> None:
-    """Bit speed and bit torque of the step from what string and drive leave free."""
+def meet_rock(friction: Any, weight: Any, reduced: Any, work: Any) -> Any:
+    """The `Outcome` of a step from what string and drive leave free."""
     raise NotImplementedError("compiled only")
 
 
-@overload(meet_rock)
-def _meet_rock(friction, weight, work):
+@by_type(meet_rock)
+def _meet_rock(friction, weight, reduced, work):
     # A property of the class: it reads no number of the law.
     if friction.instance_class.set_valued.fget(None):
-        return lambda friction, weight, work: _stick_or_slip(friction, weight, work)
-    return lambda friction, weight, work: _creep(friction, weight, work)
+        return lambda friction, weight, reduced, work: stick_or_slip(
+            friction, weight, reduced, work
+        )
+    return lambda friction, weight, reduced, work: _creep(friction, weight, reduced, work)
 
 
 @inlined
-def _stick_or_slip(friction: Any, weight: Any, work: Any) -> None:
-    # What takes divisions and happens rarely is done when some lane needs it; it leaves the
-    # other lanes as they are.
-    if set_up(friction, weight, work) > 0:
-        time_releases(friction, weight, work)
-    solve_inclusion(friction, weight, work)
-    if decide(friction, weight, work) > 0:
-        time_stops(friction, weight, work)
-
-
-@inlined
-def _creep(friction: Any, weight: Any, work: Any) -> None:
+def _creep(friction: Any, weight: Any, reduced: Any, work: Any) -> Any:
     """The step of a smooth law: w + theta gain T(w) = free - (1 - theta) gain T(before).
 
     The mean torque is the trapezoid's, theta = 1/2, while the bit's own time constant under the
     rock is longer than half a step. A law that is steep at rest makes it shorter; theta then
     grows to 1 - 1/z, z = gain x slope, so that a creeping bit relaxes and does not ring.
     """
-    widest_vectors()
-    for lane in range(WIDTH):
-        free, gain = work[r.FREE + lane], work[r.GAIN + lane]
-        steep = gain * work[r.SLOPE + lane]
-        theta = 1.0 - 1.0 / steep if steep > 2.0 else 0.5
-        right = free - (1.0 - theta) * gain * work[r.KINETIC + lane]
-        sign = 1.0 if right >= 0.0 else -1.0
-        work[r.SIGN + lane] = sign
-        work[r.RIGHT + lane] = sign * right
-        work[r.SHARE_NEW + lane] = theta * gain
-        # The root lies between zero and the right-hand side: the torque only brakes.
-        work[r.LOW_BOUND + lane] = 0.0
-        work[r.HIGH_BOUND + lane] = sign * right
-        last = sign * work[r.BIT_SPEED + lane]
-        guess = last if last > 0.0 else 0.0
-        work[r.SPEED + lane] = guess if guess < sign * right else sign * right
-        work[r.OPEN + lane] = 1.0
-    for _ in range(BISECTIONS):
-        if _safeguarded_newton(friction, weight, work) == 0:
-            break
-    for lane in range(WIDTH):
-        sign, u = work[r.SIGN + lane], work[r.SPEED + lane]
-        law = rock(friction, weight, work, lane)
-        torque, slope = contact(law, acting(weight, work, lane), u)
-        work[r.NEW_SPEED + lane] = sign * u
-        work[r.NEW_DIRECTION + lane] = sign
-        work[r.NEW_KINETIC + lane] = sign * torque
-        work[r.SLOPE + lane] = slope
-        work[r.BIT_TORQUE + lane] = (work[r.FREE + lane] - sign * u) * work[r.PER_GAIN + lane]
-        work[r.STUCK_SHARE + lane] = 0.0
+    law, load = rock(friction, weight, work), acting(weight, work)
+    free, gain = reduced.free, reduced.gain
+    steep = gain * at(work, r.SLOPE)
+    theta = pick(steep > 2.0, 1.0 - 1.0 / steep, 0.5)
+    right = free - (1.0 - theta) * gain * at(work, r.KINETIC)
+    sign = pick(right >= 0.0, 1.0, -1.0)
+    u = _safeguarded_newton(law, load, theta * gain, sign * right, sign * at(work, r.BIT_SPEED))
+    torque, slope = contact(law, load, u)
+    return Outcome(
+        sign * u,
+        sign,
+        sign * torque,
+        slope,
+        (free - sign * u) * reduced.per_gain,
+        each(-1.0),
+        each(0.0),
+    )
 
 
 @inlined
-def _safeguarded_newton(friction: Any, weight: Any, work: Any) -> int:
-    """One step of Newton's method, or a bisection where it would leave the bracket."""
-    widest_vectors()
-    still_open = 0
-    for lane in range(WIDTH):
-        law = rock(friction, weight, work, lane)
-        u, share = work[r.SPEED + lane], work[r.SHARE_NEW + lane]
-        torque, slope = contact(law, acting(weight, work, lane), u)
-        excess = u + share * torque - work[r.RIGHT + lane]
-        low = u if excess < 0.0 else work[r.LOW_BOUND + lane]
-        high = u if excess >= 0.0 else work[r.HIGH_BOUND + lane]
+def _safeguarded_newton(law: Any, load: Any, share: Any, right: Any, last: Any) -> Any:
+    """The root of u + share T(u) = right, by Newton's method or bisection.
+
+    It lies between zero and the right-hand side, as the torque only brakes; a step that would
+    leave the bracket halves it instead.
+    """
+    low, high, is_open = each(0.0), right, everywhere()
+    u = least(most(last, 0.0), right)
+    for _ in range(BISECTIONS):
+        torque, slope = contact(law, load, u)
+        excess = u + share * torque - right
+        low, high = pick(excess < 0.0, u, low), pick(excess >= 0.0, u, high)
         new = u - excess / (1.0 + share * slope)
-        inside = new > low and new < high
-        new = new if inside else 0.5 * (low + high)
-        is_open = work[r.OPEN + lane] > 0.0
+        new = pick((new > low) & (new < high), new, 0.5 * (low + high))
         far = abs(new - u) > CLOSE * (1.0 + u)
-        work[r.LOW_BOUND + lane] = low
-        work[r.HIGH_BOUND + lane] = high
-        work[r.SPEED + lane] = new if is_open else u
-        work[r.OPEN + lane] = 1.0 if is_open and far else 0.0
-        still_open += 1 if is_open and far else 0
-    return still_open
+        u = pick(is_open, new, u)
+        is_open = is_open & far
+        if not any_of(is_open):
+            break
+    return u

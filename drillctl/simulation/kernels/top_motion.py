@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.extending import overload
-
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined
+from drillctl.simulation.kernels.arithmetic import at, put
+from drillctl.simulation.kernels.compiling import by_type, inlined
 from drillctl.simulation.kernels.drive_numbers import RealStep, SampledStep
 from drillctl.simulation.kernels.observer_step import ObserverStep
 
@@ -19,23 +18,20 @@ def asks_for_top(drive: Any, observer: Any) -> bool:
     )
 
 
-def move_top(drive: Any, observer: Any, string: Any, work: Any, lane: int) -> None:
-    """Top speed of a lane at the end of the step, where something asks for it."""
+def move_top(drive: Any, observer: Any, string: Any, swing: Any, work: Any) -> None:
+    """Top speed at the end of the step, where something asks for it."""
     raise NotImplementedError("compiled only")
 
 
-@overload(move_top)
-def _move_top(drive, observer, string, work, lane):
+@by_type(move_top)
+def _move_top(drive, observer, string, swing, work):
     if not asks_for_top(drive, observer):
-        return lambda drive, observer, string, work, lane: None
-    return lambda drive, observer, string, work, lane: _move(string, work, lane)
+        return lambda drive, observer, string, swing, work: None
+    return lambda drive, observer, string, swing, work: _move(string, swing, work)
 
 
 @inlined
-def _move(string: Any, work: Any, lane: int) -> None:
-    work[r.TOP_SPEED_BEFORE + lane] = work[r.TOP_SPEED + lane]
-    work[r.TOP_SPEED + lane] = (
-        work[r.TOP_SPEED_FREE + lane]
-        + string.top_speed_by_top * work[r.TOP_TORQUE + lane]
-        - string.top_speed_by_bit * work[r.BIT_TORQUE + lane]
-    )
+def _move(string: Any, swing: Any, work: Any) -> None:
+    top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
+    speed = swing.top_speed + string.top_speed_by_top * top - string.top_speed_by_bit * bit
+    put(work, r.TOP_SPEED, speed)

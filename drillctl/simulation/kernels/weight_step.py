@@ -8,15 +8,23 @@ signal that is not known yet, since the delay is shorter than a step, continues 
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
-from numba.extending import overload
-
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.compiling import inlined, widest_vectors
+from drillctl.simulation.kernels.arithmetic import (
+    any_of,
+    at,
+    gather,
+    lane_number,
+    least,
+    most,
+    pick,
+    put,
+    rounded_down,
+)
+from drillctl.simulation.kernels.compiling import by_type, inlined
 from drillctl.simulation.kernels.exponential import exp
-from drillctl.simulation.kernels.laws import at_lane, weight_at
+from drillctl.simulation.kernels.laws import law_at, moves, weight_at
 from drillctl.simulation.kernels.observer_step import move_observer, read_observer, start_observer
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.weight_on_bit import AlarmWeight, ConstantWeight, RealWeight
@@ -117,14 +125,14 @@ class AlarmWeightStep(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What a block of lanes remembers beside its rows.
+    """What a block of lanes remembers beside its named rows; parts of the same flat array.
 
     Attributes
     ----------
     ring : ndarray, shape (steps x WIDTH,)
         Signals of the last steps, step after step; a power of two of them, so that a place in the
         ring is a mask away. Places before the start hold the first signal.
-    estimate, moved : ndarray, shape (states, WIDTH)
+    estimate, moved : ndarray, shape (states x WIDTH,)
         States of the observer, and room for them.
     """
 
@@ -138,16 +146,21 @@ def has_memory(weight: Any) -> bool:
     return weight.instance_class in (RealWeightStep, ReadWeightStep, AlarmWeightStep)
 
 
-def acting(weight: Any, work: Any, lane: int) -> Any:
+def stays(weight: Any, program: Any) -> bool:
+    """Whether the weight is the same throughout a run."""
+    return not (has_memory(weight) or moves(weight) or "weight_end" in program.fields)
+
+
+def acting(weight: Any, work: Any) -> Any:
     """The weight law that the rock meets in this step."""
     raise NotImplementedError("compiled only")
 
 
-@overload(acting)
-def _acting(weight, work, lane):
+@by_type(acting)
+def _acting(weight, work):
     if has_memory(weight):
-        return lambda weight, work, lane: ConstantWeight(work[r.HOISTED + lane])
-    return lambda weight, work, lane: at_lane(weight, work, r.WEIGHT, lane)
+        return lambda weight, work: ConstantWeight(at(work, r.HOISTED))
+    return lambda weight, work: law_at(weight, work, r.WEIGHT)
 
 
 def begin_weight(weight: Any, observer: Any, work: Any, memory: Any, first: int) -> None:
@@ -155,7 +168,7 @@ def begin_weight(weight: Any, observer: Any, work: Any, memory: Any, first: int)
     raise NotImplementedError("compiled only")
 
 
-@overload(begin_weight)
+@by_type(begin_weight)
 def _begin_weight(weight, observer, work, memory, first):
     if weight.instance_class in (RealWeightStep, ReadWeightStep):
         return lambda weight, observer, work, memory, first: _begin_real(
@@ -169,40 +182,30 @@ def _begin_weight(weight, observer, work, memory, first):
 @inlined
 def _begin_real(weight: Any, observer: Any, work: Any, memory: Any, first: int) -> None:
     start_observer(observer, memory, first)
-    for lane in range(WIDTH):
-        work[r.SIGNAL + lane] = abs(work[r.BIT_SPEED + lane])
+    put(work, r.SIGNAL, abs(at(work, r.BIT_SPEED)))
     read_observer(observer, memory, work)
-    for lane in range(WIDTH):
-        signal = work[r.SIGNAL + lane]
-        for place in range(0, memory.ring.shape[0], WIDTH):
-            memory.ring[place + lane] = signal
-        law = at_lane(weight, work, r.WEIGHT, lane)
-        asked = _asked(law, signal, law.nominal)
-        work[r.CALLED + lane] = asked
-        work[r.HOISTED + lane] = asked
+    signal = at(work, r.SIGNAL)
+    for place in range(0, memory.ring.shape[0], WIDTH):
+        put(memory.ring, place, signal)
+    law = law_at(weight, work, r.WEIGHT)
+    asked = _asked(law, signal, law.nominal)
+    put(work, r.CALLED, asked)
+    put(work, r.HOISTED, asked)
 
 
 @inlined
 def _begin_alarm(weight: Any, work: Any) -> None:
-    for lane in range(WIDTH):
-        speed = abs(work[r.BIT_SPEED + lane])
-        law = at_lane(weight, work, r.WEIGHT, lane)
-        work[r.SIGNAL + lane] = speed
-        work[r.CALLED + lane] = law.nominal
-        work[r.HOISTED + lane] = law.nominal
-        work[r.LEVEL + lane] = 1.0
-        work[r.LEVEL_NEXT + lane] = 1.0
-        work[r.LEVEL_FROM + lane] = 0.0
-        work[r.WINDOW_END + lane] = law.window
-        _open_window(work, lane, speed)
-
-
-@inlined
-def _open_window(work: Any, lane: int, speed: float) -> None:
-    work[r.WINDOW_LOW + lane] = speed
-    work[r.WINDOW_HIGH + lane] = speed
-    work[r.WINDOW_SUM + lane] = 0.0
-    work[r.WINDOW_COUNT + lane] = 0.0
+    speed = abs(at(work, r.BIT_SPEED))
+    law = law_at(weight, work, r.WEIGHT)
+    put(work, r.SIGNAL, speed)
+    put(work, r.CALLED, law.nominal)
+    put(work, r.HOISTED, law.nominal)
+    put(work, r.LEVEL, 1.0)
+    put(work, r.LEVEL_NEXT, 1.0)
+    put(work, r.LEVEL_FROM, 0.0)
+    put(work, r.WINDOW_END, law.window)
+    put(work, r.WINDOW_LOW, speed)
+    put(work, r.WINDOW_HIGH, speed)
 
 
 def raise_weight(weight: Any, program: Any, work: Any, memory: Any, n: int, step: float) -> None:
@@ -210,7 +213,7 @@ def raise_weight(weight: Any, program: Any, work: Any, memory: Any, n: int, step
     raise NotImplementedError("compiled only")
 
 
-@overload(raise_weight)
+@by_type(raise_weight)
 def _raise_weight(weight, program, work, memory, n, step):
     if weight.instance_class is RealWeightStep:
         return lambda weight, program, work, memory, n, step: _raise_real(weight, work, memory, n)
@@ -228,130 +231,138 @@ def _raise_weight(weight, program, work, memory, n, step):
 @inlined
 def _rest(weight: Any, work: Any) -> None:
     """Weight on a bit at rest, on the mean over the step."""
-    widest_vectors()
-    for lane in range(WIDTH):
-        end = weight_at(acting(weight, work, lane), 0.0)
-        work[r.REST_LOAD + lane] = 0.5 * (work[r.REST_END + lane] + end)
-        work[r.REST_END + lane] = end
+    end = weight_at(acting(weight, work), 0.0 * at(work, r.BIT_SPEED))
+    put(work, r.REST_LOAD, 0.5 * (at(work, r.REST_END) + end))
+    put(work, r.REST_END, end)
 
 
 @inlined
-def _hoist(law: Any, work: Any, lane: int, asked: float, followed: float) -> None:
+def _hoist(law: Any, work: Any, asked: Any, followed: Any) -> None:
     """Let the hoist follow what is asked for, `followed` of its change by the end of the step."""
-    before, weight = work[r.CALLED + lane], work[r.HOISTED + lane]
+    before, weight = at(work, r.CALLED), at(work, r.HOISTED)
     new = law.hoist_keep * weight + (1.0 - law.hoist_keep) * before
     new += followed * (asked - before)
-    moved = new - weight
-    moved = law.most_moved if moved > law.most_moved else moved
-    moved = -law.most_moved if moved < -law.most_moved else moved
-    work[r.HOISTED + lane] = weight + moved
-    work[r.CALLED + lane] = asked
+    moved = most(-law.most_moved, least(law.most_moved, new - weight))
+    put(work, r.HOISTED, weight + moved)
+    put(work, r.CALLED, asked)
+
+
+@inlined
+def _between(ring: Any, older: Any, share: Any) -> Any:
+    """A signal between two steps of the ring; one that is not known yet continues the last ones."""
+    steps = ring.shape[0] // WIDTH
+    # A step's place in the ring: what is left of it over the ring's length, itself a power of two.
+    # A delay that is no number must not lead out of the ring.
+    place = least(most(older - steps * rounded_down(older / steps), 0.0), steps - 1.0)
+    after = pick(place + 1.0 < steps, place + 1.0, 0.0)
+    lane = lane_number()
+    left = gather(ring, place * WIDTH + lane)
+    right = gather(ring, after * WIDTH + lane)
+    return most(left + share * (right - left), 0.0)  # a speed is not negative
 
 
 @inlined
 def _raise_real(weight: Any, work: Any, memory: Any, n: int) -> None:
-    widest_vectors()
-    mask = memory.ring.shape[0] // WIDTH - 1
-    for lane in range(WIDTH):
-        law = at_lane(weight, work, r.WEIGHT, lane)
-        older = (n - int(law.back)) & mask
-        left = memory.ring[older * WIDTH + lane]
-        right = memory.ring[((older + 1) & mask) * WIDTH + lane]
-        # A signal that is not known yet continues the last ones; a speed is not negative.
-        seen = left + law.share * (right - left)
-        seen = seen if seen > 0.0 else 0.0
-        _hoist(law, work, lane, _asked(law, seen, law.nominal), law.hoist_ramp)
+    law = law_at(weight, work, r.WEIGHT)
+    seen = _between(memory.ring, n - law.back, law.share)
+    _hoist(law, work, _asked(law, seen, law.nominal), law.hoist_ramp)
     _rest(weight, work)
 
 
 @inlined
 def _raise_read(weight: Any, work: Any, memory: Any, n: int) -> None:
-    mask = memory.ring.shape[0] // WIDTH - 1
-    for lane in range(WIDTH):
-        law = at_lane(weight, work, r.WEIGHT, lane)
-        place = n + 1.0 - law.delay
-        # A reading whose time falls on the end of a step is there, but for rounding.
-        reading = math.floor(place / law.period + 1e-9) * law.period
-        # It jumps within the step: the hoist follows for the rest of it.
-        share = place - reading
-        followed = 1.0 - exp(-law.hoist_decay * (share if share < 1.0 else 1.0))
-        reading = reading if reading > 0.0 else 0.0
-        older = min(int(reading), n - 1)
-        left = memory.ring[(older & mask) * WIDTH + lane]
-        right = memory.ring[((older + 1) & mask) * WIDTH + lane]
-        seen = left + (reading - older) * (right - left)
-        seen = seen if seen > 0.0 else 0.0
-        _hoist(law, work, lane, _asked(law, seen, law.nominal), followed)
+    law = law_at(weight, work, r.WEIGHT)
+    place = n + 1.0 - law.delay
+    # A reading whose time falls on the end of a step is there, but for rounding.
+    reading = rounded_down(place / law.period + 1e-9) * law.period
+    # It jumps within the step: the hoist follows for the rest of it.
+    followed = 1.0 - exp(-law.hoist_decay * least(place - reading, 1.0))
+    reading = most(reading, 0.0)
+    older = least(rounded_down(reading), n - 1.0)
+    seen = _between(memory.ring, older, reading - older)
+    _hoist(law, work, _asked(law, seen, law.nominal), followed)
     _rest(weight, work)
 
 
 @inlined
 def _raise_alarm(weight: Any, work: Any, end: float) -> None:
-    for lane in range(WIDTH):
-        law = at_lane(weight, work, r.WEIGHT, lane)
-        due = end >= work[r.LEVEL_FROM + lane]
-        work[r.LEVEL + lane] = work[r.LEVEL_NEXT + lane] if due else work[r.LEVEL + lane]
-        _hoist(law, work, lane, law.nominal * work[r.LEVEL + lane], law.hoist_ramp)
+    law = law_at(weight, work, r.WEIGHT)
+    due = at(work, r.LEVEL_FROM) <= end
+    level = pick(due, at(work, r.LEVEL_NEXT), at(work, r.LEVEL))
+    put(work, r.LEVEL, level)
+    _hoist(law, work, law.nominal * level, law.hoist_ramp)
     _rest(weight, work)
 
 
-def follow_weight(weight: Any, observer: Any, work: Any, memory: Any, n: int, step: float) -> None:
-    """Signal at the end of step `n`, whose motion is known."""
+def move_load(weight: Any, program: Any, work: Any) -> None:
+    """Weight on the bit at the end of the step, where it moves at all."""
     raise NotImplementedError("compiled only")
 
 
-@overload(follow_weight)
-def _follow_weight(weight, observer, work, memory, n, step):
+@by_type(move_load)
+def _move_load(weight, program, work):
+    if stays(weight, program):
+        return lambda weight, program, work: None
+    return lambda weight, program, work: put(
+        work, r.LOAD, weight_at(acting(weight, work), abs(at(work, r.BIT_SPEED)))
+    )
+
+
+def follow_weight(
+    weight: Any, observer: Any, work: Any, memory: Any, before: Any, n: int, step: float
+) -> None:
+    """Signal at the end of step `n`; `before`: `Before`, what moved as it began."""
+    raise NotImplementedError("compiled only")
+
+
+@by_type(follow_weight)
+def _follow_weight(weight, observer, work, memory, before, n, step):
     if weight.instance_class in (RealWeightStep, ReadWeightStep):
-        return lambda weight, observer, work, memory, n, step: _follow_real(
-            weight, observer, work, memory, n
+        return lambda weight, observer, work, memory, before, n, step: _follow_real(
+            weight, observer, work, memory, before, n
         )
     if weight.instance_class is AlarmWeightStep:
-        return lambda weight, observer, work, memory, n, step: _follow_alarm(
-            weight, work, (n + 1) * step
+        return lambda weight, observer, work, memory, before, n, step: _follow_alarm(
+            weight, work, before, (n + 1) * step
         )
-    return lambda weight, observer, work, memory, n, step: None
+    return lambda weight, observer, work, memory, before, n, step: None
 
 
 @inlined
-def _sense(law: Any, work: Any, lane: int) -> float:
+def _sense(law: Any, work: Any, speed_before: Any) -> Any:
     """Move the sensor's filter; returns what it shows."""
-    before, after = abs(work[r.SPEED_BEFORE + lane]), abs(work[r.BIT_SPEED + lane])
-    shown = law.seen_keep * work[r.SIGNAL + lane] + (1.0 - law.seen_keep) * before
+    before, after = abs(speed_before), abs(at(work, r.BIT_SPEED))
+    shown = law.seen_keep * at(work, r.SIGNAL) + (1.0 - law.seen_keep) * before
     shown += law.seen_ramp * (after - before)
-    work[r.SIGNAL + lane] = shown
+    put(work, r.SIGNAL, shown)
     return shown
 
 
 @inlined
-def _follow_real(weight: Any, observer: Any, work: Any, memory: Any, n: int) -> None:
-    widest_vectors()
-    for lane in range(WIDTH):
-        _sense(at_lane(weight, work, r.WEIGHT, lane), work, lane)
-    move_observer(observer, memory, work)
+def _follow_real(weight: Any, observer: Any, work: Any, memory: Any, before: Any, n: int) -> None:
+    _sense(law_at(weight, work, r.WEIGHT), work, before.bit_speed)
+    move_observer(observer, memory, work, before.top_speed)
     read_observer(observer, memory, work)
     slot = ((n + 1) & (memory.ring.shape[0] // WIDTH - 1)) * WIDTH
-    for lane in range(WIDTH):
-        memory.ring[slot + lane] = work[r.SIGNAL + lane]
+    put(memory.ring, slot, at(work, r.SIGNAL))
 
 
 @inlined
-def _follow_alarm(weight: Any, work: Any, end: float) -> None:
-    for lane in range(WIDTH):
-        law = at_lane(weight, work, r.WEIGHT, lane)
-        before = work[r.SIGNAL + lane]
-        speed = _sense(law, work, lane)
-        low, high = work[r.WINDOW_LOW + lane], work[r.WINDOW_HIGH + lane]
-        low = speed if speed < low else low
-        high = speed if speed > high else high
-        work[r.WINDOW_LOW + lane] = low
-        work[r.WINDOW_HIGH + lane] = high
-        work[r.WINDOW_SUM + lane] += 0.5 * (before + speed)
-        work[r.WINDOW_COUNT + lane] += 1.0
-        # A window that ends within rounding of a step's end ends with it.
-        if end * (1.0 + 1e-12) >= work[r.WINDOW_END + lane]:
-            mean = work[r.WINDOW_SUM + lane] / work[r.WINDOW_COUNT + lane]
-            work[r.LEVEL_NEXT + lane] = _next_level(law, work[r.LEVEL + lane], low, high, mean)
-            work[r.LEVEL_FROM + lane] = work[r.WINDOW_END + lane] + law.delay
-            work[r.WINDOW_END + lane] += law.window
-            _open_window(work, lane, speed)
+def _follow_alarm(weight: Any, work: Any, before: Any, end: float) -> None:
+    law = law_at(weight, work, r.WEIGHT)
+    signal_before = at(work, r.SIGNAL)
+    speed = _sense(law, work, before.bit_speed)
+    low, high = least(speed, at(work, r.WINDOW_LOW)), most(speed, at(work, r.WINDOW_HIGH))
+    total = at(work, r.WINDOW_SUM) + 0.5 * (signal_before + speed)
+    count, ends = at(work, r.WINDOW_COUNT) + 1.0, at(work, r.WINDOW_END)
+    # A window that ends within rounding of a step's end ends with it.
+    over = ends <= end * (1.0 + 1e-12)
+    if any_of(over):
+        level = _next_level(law, at(work, r.LEVEL), low, high, total / count)
+        put(work, r.LEVEL_NEXT, pick(over, level, at(work, r.LEVEL_NEXT)))
+        put(work, r.LEVEL_FROM, pick(over, ends + law.delay, at(work, r.LEVEL_FROM)))
+        put(work, r.WINDOW_END, pick(over, ends + law.window, ends))
+    put(work, r.WINDOW_LOW, pick(over, speed, low))
+    put(work, r.WINDOW_HIGH, pick(over, speed, high))
+    put(work, r.WINDOW_SUM, pick(over, 0.0, total))
+    put(work, r.WINDOW_COUNT, pick(over, 0.0, count))
