@@ -53,7 +53,10 @@ class Observer:
         return len(self.read)
 
     def state(self, angle: Array, speed: Array) -> Array:
-        """State that a string in this motion (rad, rad/s; frame) leaves the observer with."""
+        """State that a string in this motion leaves the observer with.
+
+        `angle`, `speed`, shape (nodes,), in the frame (rad, rad/s).
+        """
         return np.asarray(self.from_angle @ angle + self.from_speed @ speed)
 
     def transfer(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:

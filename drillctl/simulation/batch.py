@@ -6,6 +6,7 @@ what they measured into arrays by name.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -129,7 +130,7 @@ def _turns(lanes: Lanes) -> Array:
     return found[found > 0.0]
 
 
-def run_batch(lanes: Lanes, prepared: Prepared) -> Batch:
+def run_batch(lanes: Lanes, prepared: Prepared, give_up: float = math.inf) -> Batch:
     """Simulate every lane.
 
     Parameters
@@ -138,13 +139,16 @@ def run_batch(lanes: Lanes, prepared: Prepared) -> Batch:
         On the string that was prepared.
     prepared : Prepared
         From `prepare`.
+    give_up : float
+        J1 (s) over which nothing more is asked of a lane: it is stopped soon after, its status
+        is `censored`, its J1 a lower bound, and it has no other measure. Infinite for none.
 
     Returns
     -------
     Batch
         The same bits for any order of lanes and any number of threads.
     """
-    raw = [_run(part, prepared, 0)[0] for part in _chunks(lanes)]
+    raw = [_run(part, prepared, 0, give_up)[0] for part in _chunks(lanes)]
     return _measured(np.concatenate(raw, axis=1), lanes, prepared)
 
 
@@ -187,7 +191,9 @@ def _chunks(lanes: Lanes) -> Iterator[Lanes]:
         yield lanes[first : first + CHUNK]
 
 
-def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
+def _run(
+    lanes: Lanes, prepared: Prepared, every: int, give_up: float = math.inf
+) -> tuple[Array, Array]:
     """Raw measures, shape (MEASURES, lanes), and traces, shape (samples, signals, lanes)."""
     from drillctl.simulation.kernels.advance import TRACED, Clock, run
     from drillctl.simulation.kernels.rows import MEASURES, ROWS, WIDTH
@@ -197,24 +203,23 @@ def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
     padded = lanes[np.minimum(np.arange(-(-count // WIDTH) * WIDTH), count - 1)]
     rock = padded.before if np.any(padded.program.rock_until > 0.0) else padded.friction
     static = rock.static_torque(padded.weight_at_rest)
-    angle, speed = start(
-        padded.string, padded.start, padded.set_speed, padded.turning_speed, static
-    )
-    state = prepared.stepper.state(angle, speed, padded.set_speed)
+    begin = start(padded.string, padded.start, padded.set_speed, padded.turning_speed, static)
+    state = prepared.stepper.state(begin, padded.set_speed)
+    top_speed, bit_speed = begin.turn[0] * begin.speed, begin.turn[-1] * begin.speed
     scheme, duration = prepared.scheme, prepared.duration
     samples = scheme.steps // every + 1 if every else 0
     measures = np.empty((MEASURES, len(padded)))
     traces = np.empty((samples, len(TRACED), len(padded)))
     window = min(m.WINDOW, duration)
     observer = padded.observer
-    start_of_observer = np.zeros((0, 0)) if observer is None else observer.state(angle, speed)
     ticks = Clock(
         scheme.step, scheme.steps, prepared.j1_from, duration - window, every, scheme.sampling,
         remembered(padded.weight, scheme.step), 0 if observer is None else observer.states,
+        give_up,
     )  # fmt: skip
     numbers = np.stack([
-        padded.set_speed, speed[-1] + padded.set_speed, padded.table_low, padded.table_high,
-        speed[0],
+        padded.set_speed, bit_speed + padded.set_speed, padded.table_low, padded.table_high,
+        top_speed,
     ])  # fmt: skip
     arguments = (
         prepared.stepper.string, padded.friction, padded.before,
@@ -222,7 +227,7 @@ def _run(lanes: Lanes, prepared: Prepared, every: int) -> tuple[Array, Array]:
             _at_whole_steps(padded.drive, scheme), scheme.step, prepared.stepper.string
         ),
         weight_step(padded.weight, scheme.step), program_step(padded.program),
-        observer_step(observer, scheme.step, start_of_observer),
+        observer_step(observer, scheme.step, begin),
         numbers, np.ascontiguousarray(state), ticks,
     )  # fmt: skip
     rows = ROWS + 2 * len(state) + ticks.remembered + 2 * ticks.estimated
@@ -293,6 +298,11 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
     status = _statuses(finite, row(r.LATE_STUCK), window, values["settling_time_wide"])
     for name in FLOATS:  # a lane that failed has no measures at all
         values[name] = _where(finite, values[name])
+    given_up = row(r.BOUND) > 0.0
+    status[given_up] = m.STATUSES.index("censored")
+    for name in FLOATS:
+        values[name] = _where(~given_up, values[name])
+    values["j1"] = np.where(given_up, row(r.BOUND) / lanes.set_speed, values["j1"])
     return Batch(values, status)
 
 

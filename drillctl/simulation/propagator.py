@@ -20,6 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from drillctl.drillstring import Drillstring
 from drillctl.simulation.kernels.string_step import BlockString, DenseString, UndampedString
+from drillctl.simulation.start import Start
 from drillctl.simulation.undamped_step import undamped_step
 
 Array = NDArray[np.float64]
@@ -55,14 +56,19 @@ class StringStep:
     modes: int
     step: float
 
-    def state(self, angle: Array, speed: Array, set_speed: Array) -> Array:
-        """State of lanes, shape (states, lanes), from nodal angles and speeds, (nodes, lanes).
+    def state(self, start: Start, set_speed: Array) -> Array:
+        """State of lanes, shape (states, lanes), at their start.
 
-        `set_speed`, shape (lanes,), in rad/s.
+        `set_speed`, shape (lanes,), in rad/s. Shape by shape: the bits of a lane do not depend on
+        how many there are, as those of a product of matrices may.
         """
+        twisted = self.angle_to_state @ start.twist
+        turning = self.speed_to_state @ start.turn
+        at_rest = self.angle_to_state @ self.rest
         return (
-            self.angle_to_state @ (angle - np.outer(self.rest, set_speed))
-            + self.speed_to_state @ speed
+            np.outer(twisted, start.angle)
+            + np.outer(turning, start.speed)
+            - np.outer(at_rest, set_speed)
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -13,10 +14,38 @@ Array = NDArray[np.float64]
 Kind = Literal["rest", "turning", "wound_up"]
 
 
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Motion of the string at time zero: one shape along the string, times a number of each lane.
+
+    Attributes
+    ----------
+    twist, turn : ndarray, shape (nodes,)
+        Shapes of the angles and of the speeds in the frame.
+    angle, speed : ndarray, shape (lanes,)
+        What they are to be multiplied with (rad or N m; rad/s).
+    """
+
+    twist: Array
+    angle: Array
+    turn: Array
+    speed: Array
+
+    @property
+    def angles(self) -> Array:
+        """Angles of every node in the frame (rad), shape (nodes, lanes)."""
+        return np.outer(self.twist, self.angle)
+
+    @property
+    def speeds(self) -> Array:
+        """Speeds of every node in the frame (rad/s), shape (nodes, lanes)."""
+        return np.outer(self.turn, self.speed)
+
+
 def start(
     string: Drillstring, kind: Kind, set_speed: Array, turning_speed: Array, static_torque: Array
-) -> tuple[Array, Array]:
-    """Angles and speeds of every node for a number of lanes.
+) -> Start:
+    """Motion at time zero of a number of lanes.
 
     Parameters
     ----------
@@ -33,16 +62,14 @@ def start(
 
     Returns
     -------
-    angle, speed : ndarray, shape (nodes, lanes)
-        In the frame (rad, rad/s). The top drive is at angle zero, and so is its integral
-        action. A bit at rest has exactly minus the set speed.
+    Start
+        The top drive is at angle zero, and so is its integral action. A bit at rest has exactly
+        minus the set speed.
     """
-    ones = np.ones(string.nodes)
-    still = np.zeros((string.nodes, len(set_speed)))
+    ones, none = np.ones(string.nodes), np.zeros(string.nodes)
     if kind == "rest":
-        return still, np.outer(ones, -set_speed)
+        return Start(none, 0.0 * set_speed, ones, -set_speed)
     if kind == "turning":
-        return still, np.outer(ones, turning_speed - set_speed)
+        return Start(none, 0.0 * set_speed, ones, turning_speed - set_speed)
     compliance = np.concatenate([[0.0], np.cumsum(1.0 / string.element_stiffness)])
-    share = compliance / compliance[-1]
-    return np.outer(compliance, -static_torque), np.outer(share, -set_speed)
+    return Start(compliance, -static_torque, compliance / compliance[-1], -set_speed)

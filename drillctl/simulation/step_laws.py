@@ -10,6 +10,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from drillctl.linear.observer import Observer
+from drillctl.simulation.start import Start
 from drillctl.top_drive import RealDrive, SampledDrive
 from drillctl.weight_on_bit import PATHS, AlarmWeight
 
@@ -140,7 +141,7 @@ def remembered(weight: Any, step: float) -> int:
     return 1 << (steps - 1).bit_length()  # a power of two
 
 
-def observer_step(observer: Observer | None, step: float, start: Array) -> Any:
+def observer_step(observer: Observer | None, step: float, start: Start) -> Any:
     """The kernel's form of an observer.
 
     Parameters
@@ -149,8 +150,8 @@ def observer_step(observer: Observer | None, step: float, start: Array) -> Any:
         Its continuous form.
     step : float
         Length of a step (s).
-    start : ndarray, shape (states, lanes)
-        States at time zero.
+    start : Start
+        Motion at time zero.
     """
     from drillctl.simulation.kernels.observer_step import NoObserver, ObserverStep
 
@@ -165,13 +166,15 @@ def observer_step(observer: Observer | None, step: float, start: Array) -> Any:
     augmented[n + 1, n + 2] = 1.0
     propagated = scipy.linalg.expm(augmented)
     by_end = propagated[:n, n + 2]
+    still = np.zeros_like(start.turn)
     return ObserverStep(
         np.ascontiguousarray(propagated[:n, :n]),
         np.ascontiguousarray(propagated[:n, n]),
         np.ascontiguousarray(propagated[:n, n + 1] - by_end),
         np.ascontiguousarray(by_end),
         np.ascontiguousarray(observer.read),
-        np.ascontiguousarray(start),
+        np.outer(observer.state(start.twist, still), start.angle)
+        + np.outer(observer.state(still, start.turn), start.speed),
     )
 
 

@@ -93,12 +93,9 @@ class System:
         table = design.tables.start
         turning = design.speed if table.speed is None else table.speed
         static = self.rock(0.0).static_torque(self.weight_at_rest(design))
-        angle, speed = (
-            x[:, 0]
-            for x in start(
-                self.string, table.kind, *(np.array([x]) for x in (design.speed, turning, static))
-            )
-        )
+        numbers = (np.array([x]) for x in (design.speed, turning, static))
+        begin = start(self.string, table.kind, *numbers)
+        angle, speed = begin.angles[:, 0], begin.speeds[:, 0]
         bit = float(speed[-1]) + self.set_speed
         memories = (self.drive.start(float(speed[0])), self.weight.start(bit, angle, speed))
         self._begin = np.concatenate([angle, speed, np.zeros(WORKS), *memories])

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import at, fma, pick, put
+from drillctl.simulation.kernels.arithmetic import any_of, at, fma, pick, put
 from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined
 from drillctl.simulation.kernels.drive_step import (
     begin_drive,
@@ -57,6 +57,9 @@ TRACED = (
 )  # fmt: skip
 """Signals of a trace, in the order in which they leave the kernel."""
 
+LOOK = 64
+"""Steps from one look at whether lanes may be given up to the next."""
+
 
 class Clock(NamedTuple):
     """Time of a run.
@@ -77,6 +80,8 @@ class Clock(NamedTuple):
         Steps whose signals a weight law may ask for; 0 if none does.
     estimated : int
         States of the observer; 0 without one.
+    give_up : float
+        J1 (s) over which nothing more is asked of a lane; infinite for none.
     """
 
     step: float
@@ -87,6 +92,7 @@ class Clock(NamedTuple):
     sampling: int
     remembered: int
     estimated: int
+    give_up: float
 
 
 @inlined
@@ -190,6 +196,18 @@ def _conclude(string: Any, drive: Any, observer: Any, swing: Any, reduced: Any, 
 
 
 @compiled
+def _all_given_up(work: Any, level: float) -> bool:
+    """Note the lanes whose J1 has passed the level; whether these are all.
+
+    J1 only grows. Each lane is judged by itself, at the same steps whatever its company.
+    """
+    j1, bound = at(work, r.J1), at(work, r.BOUND)
+    over = (j1 > level * at(work, r.SET_SPEED)) & (bound == 0.0)
+    put(work, r.BOUND, pick(over, j1, bound))
+    return not any_of(at(work, r.BOUND) == 0.0)
+
+
+@compiled
 def _advance_block(
     string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any, observer: Any,
     speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any, first: int,
@@ -233,6 +251,8 @@ def _advance_block(
         in_window = _share_after(begin, clock.step, clock.window_from)
         measure(work, was, outcome, begin, clock.step, in_j1, in_window)
         measure_load(weight, program, work, was, outcome, clock.step)
+        if n % LOOK == LOOK - 1 and _all_given_up(work, clock.give_up):
+            break
     conclude_bands(work, clock.steps * clock.step)
     conclude_load(weight, program, work, clock.steps * clock.step)
     for measured in range(r.MEASURES):

@@ -124,6 +124,7 @@ WORK = _next()
 WEIGHT_SUM = _next()
 ROP_SUM = _next()
 OUTSIDE_TABLE = _next()
+BOUND = _next()  # J1 of a lane that was found over the level at which lanes are given up; else 0
 
 ROWS = _taken
 FIRST_MEASURE = J1
