@@ -78,7 +78,7 @@ def newton(right, half, rise, beta, before, fall, last):
         new = np.maximum(
             u + (right - u - half * (rise[0] + falling)) / (1 - half * beta * falling), 0
         )
-        far = np.abs(new - u) > 3e-5 * (1 + u)
+        far = np.abs(new - u) > 1e-3 * (1 + u)
         u, slope = np.where(is_open, new, u), np.where(is_open, -beta * falling, slope)
         is_open &= far
     return u, slope

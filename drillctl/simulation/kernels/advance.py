@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import any_of, at, fma, pick, put
+from drillctl.simulation.kernels.arithmetic import aligned_stack, any_of, at, fma, pick, put
 from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined
 from drillctl.simulation.kernels.drive_step import (
     begin_drive,
@@ -213,6 +213,7 @@ def _advance_block(
     speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any, first: int,
 ) -> None:  # fmt: skip
     """Advance the lanes from `first` on, one block, from time zero to the end."""
+    aligned_stack()
     work = kept[: r.ROWS * WIDTH]
     ring = r.ROWS * WIDTH + 2 * start.shape[0] * WIDTH
     estimate = ring + clock.remembered * WIDTH

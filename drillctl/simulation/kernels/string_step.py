@@ -165,11 +165,11 @@ def _by_modes(tracks_top: bool) -> Any:
         for mode in range(string.kappa.shape[0]):
             at_x = 2 * mode * WIDTH
             at_y = at_x + WIDTH
-            force = fma(-string.ratio[mode], bit, top)
+            force = top - string.ratio[mode] * bit
             x = fma(string.push[mode, 0], force, at(state, at_x))
             y = fma(string.push[mode, 1], force, at(state, at_y))
             pipe = fma(string.pipe[mode], x, pipe)
-            y = fma(-string.kappa[mode], x, y)
+            y = y - string.kappa[mode] * x
             x = x + y
             put(state, at_x, x)
             put(state, at_y, y)
