@@ -2,6 +2,9 @@
 
 - `grid.py`: axes over a design's parameters, and the lanes they stand for.
 - `sweeps.py`: measures over a grid; the J1 map is one case.
+- `adaptive.py`: contours of J1 at a grid's resolution from a fraction of its cells;
+  `contour_search.py`: which cells; `lattices.py`: nested lattices of a grid;
+  `chosen_cells.py`: their lanes; `adaptive_checks.py`: a sample, or all, of what was left out.
 - `loop_maps.py`: figures of the linear loop over a grid.
 - `regions.py`: cells and outlines at or under a level.
 - `three_regions.py`: locally stable, J1 under a level, attracted: three regions of one map.
@@ -19,6 +22,7 @@
 - `memory.py`: grids too large for the memory.
 """
 
+from drillctl.studies.adaptive import AdaptiveMap, adaptive_map
 from drillctl.studies.comparison import Comparison, compare
 from drillctl.studies.draws import Draws, draw, uncertain_parameters
 from drillctl.studies.grid import Axis
@@ -37,6 +41,7 @@ from drillctl.studies.three_regions import ThreeRegions, three_regions
 from drillctl.studies.weight_delay import WeightDelay, weight_delay
 
 __all__ = [
+    "AdaptiveMap",
     "Axis",
     "Comparison",
     "Draws",
@@ -46,6 +51,7 @@ __all__ = [
     "Sweep",
     "ThreeRegions",
     "WeightDelay",
+    "adaptive_map",
     "compare",
     "draw",
     "loop_map",
