@@ -32,6 +32,7 @@ from drillctl.studies.regularisation import Regularisation, regularisation
 from drillctl.studies.responses import responses
 from drillctl.studies.sweeps import Sweep, stability_map, sweep
 from drillctl.studies.tables import (
+    write_adaptive_tables,
     write_comparison,
     write_loop_table,
     write_tables,
@@ -63,6 +64,7 @@ __all__ = [
     "three_regions",
     "uncertain_parameters",
     "weight_delay",
+    "write_adaptive_tables",
     "write_comparison",
     "write_loop_table",
     "write_tables",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from itertools import pairwise
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -112,13 +112,20 @@ class AdaptiveMap:
         found.ravel()[self.cells] = True
         return found
 
+    @property
+    def j1(self) -> np.ma.MaskedArray[Any, Any]:
+        """J1 over the grid (s), masked where it was not simulated; NaN where a cell failed."""
+        found = np.ma.masked_all(self.bands.shape)
+        found[np.unravel_index(self.cells, found.shape)] = self.measures["j1"]
+        return found
+
     @cached_property
     def values(self) -> Array:
         """J1 where it was simulated, a value of the cell's band elsewhere (s), shape of the map.
 
         For contours at the levels: they cross simulated cells alone. NaN where a cell failed.
         """
-        return _banded(self.bands, self.levels, self.cells, self.measures["j1"])
+        return banded(self.bands, self.levels, self.cells, self.measures["j1"])
 
     @cached_property
     def regions(self) -> dict[float, Region]:
@@ -200,8 +207,24 @@ class AdaptiveMap:
         return save(self, folder)
 
 
-def _banded(bands: Bands, levels: tuple[float, ...], cells: Cells, j1: Array) -> Array:
-    """Values in the bands of their cells, those of J1 where it is known."""
+def banded(bands: Bands, levels: tuple[float, ...], cells: Cells, j1: Array) -> Array:
+    """Values in the bands of their cells, those of J1 where it is known.
+
+    Parameters
+    ----------
+    bands : ndarray of int8, shape of the map
+        Number of levels that each cell lies above.
+    levels : tuple of float
+        Increasing (s).
+    cells : ndarray of int, shape (trajectories,)
+        Simulated cells of the flattened map.
+    j1 : ndarray, shape (trajectories,)
+        Of these (s).
+
+    Returns
+    -------
+    ndarray, shape of the map
+    """
     between = [0.5 * (low + high) for low, high in pairwise(levels)]
     stand_in = np.array([0.5 * levels[0], *between, 2.0 * levels[-1]])
     values = stand_in[bands]
@@ -221,9 +244,9 @@ def adaptive_map(
 ) -> AdaptiveMap:
     """Find the regions of J1 over two parameters without simulating every cell.
 
-    Each outline is that of the full grid to the bit, or was missed as a whole between the cells
-    that were simulated (`contour_search`); a random sample of the cells left out tells how
-    likely that is.
+    Each contour is that of the full grid to the bit, or was missed from end to end between the
+    cells that were simulated (`contour_search`); a random sample of the cells left out tells how
+    much that can be.
 
     Parameters
     ----------
@@ -296,7 +319,7 @@ def _whole(found: ContourSearch, lanes: _Lanes) -> FullAudit:
     left = np.flatnonzero(~found.seen.ravel())
     if len(left):
         j1.ravel()[left] = lanes.look(left)
-    adaptive = _banded(found.bands, found.levels, cells, found.values.ravel()[cells])
+    adaptive = banded(found.bands, found.levels, cells, found.values.ravel()[cells])
     return full_audit(adaptive, j1, found.levels, len(left))
 
 

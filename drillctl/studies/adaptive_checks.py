@@ -118,7 +118,8 @@ class Mismatch:
         Their share of the map.
     farthest : float
         Largest distance of one of them from the edge of the full grid's region (cells along the
-        axis where it is larger); 0 without any, infinite where that region is empty.
+        axis where it is larger): 1 for a cell next to one of the other side; 0 without any,
+        infinite where that region has no edge.
     hausdorff : float
         Distance of the outlines from each other (cells): no point of either is farther from the
         other. 0 where both are empty, infinite where one is.
@@ -217,7 +218,10 @@ def mismatch(found: Region, full: Region) -> Mismatch:
 
 
 def _farthest(wrong: Mask, full: Mask) -> float:
-    """Largest distance of the wrong cells from the edge of a region (cells)."""
+    """Largest distance of the wrong cells from the edge of a region (cells).
+
+    Cells that touch one of the other side are the first along the edge.
+    """
     from scipy.ndimage import binary_erosion, distance_transform_cdt
 
     if not wrong.any():
@@ -227,7 +231,7 @@ def _farthest(wrong: Mask, full: Mask) -> float:
     edge = ~(inner | outer)
     if not edge.any():
         return float("inf")
-    return float(distance_transform_cdt(~edge, metric="chessboard")[wrong].max())
+    return 1.0 + float(distance_transform_cdt(~edge, metric="chessboard")[wrong].max())
 
 
 def _hausdorff(one: shapely.MultiPolygon | None, other: shapely.MultiPolygon | None) -> float:

@@ -10,9 +10,11 @@ all in the same band. On each lattice:
 3. every quad whose corners lie in different bands is looked at as a whole, again and again until
    there is no other: a contour that was met anywhere is followed to its end.
 
-After the third step on the finest lattice each quad that a contour crosses was looked at whole.
-So an outline is that of the full grid to the bit, or it is missed as a whole: what can go wrong
-is an island or a hole between the cells, and nothing else.
+After the third step on the finest lattice each quad that a contour is known to cross was looked
+at whole. A contour goes from quad to quad across sides whose ends lie in different bands, and a
+side that was seen in one quad is known to the next: so a contour, closed or from rim to rim, is
+that of the full grid to the bit, or it is missed from end to end. What can go wrong is an island,
+a hole or a bite of the rim between the cells, and nothing else.
 """
 
 from __future__ import annotations
