@@ -42,9 +42,11 @@ Mask = NDArray[np.bool_]
 
 INTERVALS = 40
 """Of the coarsest lattice along an axis, at least: what a map has by default."""
-HIDDEN_SHARE = 0.5
-"""Of the second differences at its corners, that a function may bulge beyond a quad's corners:
-four times what it does where they tell the curvature, as J1 is not smooth."""
+BULGE = 0.5
+"""Share of the second differences at its corners that a function may bulge beyond those of a
+quad: four times what it does where they tell the curvature, as J1 is not smooth."""
+BULGE_AT_EXTREMA = 1.0
+"""The same at a least or greatest value among its neighbours, where islands and holes hide."""
 UNKNOWN = -1
 """Band of a cell before the search has come to it."""
 
@@ -162,7 +164,8 @@ class ContourSearch:
         """
         values = self.values[lattice.points]
         at = corners(values)
-        bulge = HIDDEN_SHARE * corners(_bend(values) + _bend(values.T).T).max(axis=0)
+        share = np.where(corners(_extreme(values)).any(axis=0), BULGE_AT_EXTREMA, BULGE)
+        bulge = share * corners(_bend(values) + _bend(values.T).T).max(axis=0)
         low, high = at.min(axis=0), at.max(axis=0)  # NaN where a corner was not seen
         found = np.zeros(low.shape, dtype=bool)
         for level in self.levels:
@@ -182,6 +185,17 @@ def _bend(values: Array) -> Array:
         found[1:-1] = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
         found[0], found[-1] = found[1], found[-2]
     return np.nan_to_num(found)
+
+
+def _extreme(values: Array) -> Mask:
+    """Points where no neighbour that was seen is less, or none is greater."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    unseen = np.isnan(values)
+    low = np.where(unseen, np.inf, values)
+    high = np.where(unseen, -np.inf, values)
+    found: Mask = (minimum_filter(low, 3) == low) | (maximum_filter(high, 3) == high)
+    return found & ~unseen
 
 
 def search(
