@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from drillctl.simulation import simulate as simulate
     from drillctl.simulation.limit_cycle import limit_cycle as limit_cycle
     from drillctl.store import open as open
+    from drillctl.studies import adaptive_map as adaptive_map
     from drillctl.studies import compare as compare
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
@@ -51,6 +52,7 @@ _HOME = {
     "simulate": "drillctl.simulation",
     "limit_cycle": "drillctl.simulation.limit_cycle",
     "sweep": "drillctl.studies",
+    "adaptive_map": "drillctl.studies",
     "compare": "drillctl.studies",
     "stability_map": "drillctl.studies",
     "open": "drillctl.store",

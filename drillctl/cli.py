@@ -367,6 +367,12 @@ def map_(
     audit: Annotated[
         int | None, typer.Option("--audit", help="Cells to audit with the reference solver.")
     ] = None,
+    adaptive: Annotated[
+        bool, typer.Option("--adaptive", help="Simulate the cells near the contours alone.")
+    ] = False,
+    full_audit: Annotated[
+        bool, typer.Option("--full-audit", help="Set an adaptive map beside the full grid.")
+    ] = False,
     out: Out = None,
     json: Json = False,
     threads: Threads = None,
@@ -381,7 +387,13 @@ def map_(
     found = _with_axes(_load(design, sets), axis)
     if audit is not None:
         found = found.replace({"map.audit_cells": audit})
-    verbs.stability_map(found, Options(out, json, units, verbose))
+    options = Options(out, json, units, verbose)
+    if adaptive:
+        verbs.adaptive_map(found, full_audit, options)
+    elif full_audit:
+        raise InputError("goes with --adaptive: any other map is the full grid", "--full-audit")
+    else:
+        verbs.stability_map(found, options)
 
 
 def _with_axes(design: Design, axes: list[str] | None) -> Design:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from drillctl.simulation import Simulation
     from drillctl.simulation.limit_cycle import LimitCycle
     from drillctl.studies import (
+        AdaptiveMap,
         Axis,
         Comparison,
         Region,
@@ -73,6 +74,15 @@ def simulation(result: Simulation, system: units.System) -> None:
 
 def sweep(result: Sweep, system: units.System) -> None:
     """Regions, minimum, audit and time of a map."""
+    regions_of_map(result, system)
+    line(
+        f"{result.j1.size} cells: {result.seconds:.3f} s in the lanes, "
+        f"{result.total_seconds:.1f} s in all"
+    )
+
+
+def regions_of_map(result: Sweep | AdaptiveMap, system: units.System) -> None:
+    """Regions, minimum and audit of a map."""
     scales = [units.displayed(1.0, axis.unit, system) for axis in result.axes]
     rows = [
         [
@@ -98,10 +108,6 @@ def sweep(result: Sweep, system: units.System) -> None:
     audit = result.audit
     worst = f", worst relative difference in J1 {sized(audit.worst, 2)}" if len(audit.cells) else ""
     line(f"audit: {audit.verdict}, {len(audit.cells)} cells{worst}")
-    line(
-        f"{result.j1.size} cells: {result.seconds:.3f} s in the lanes, "
-        f"{result.total_seconds:.1f} s in all"
-    )
 
 
 def loop(result: LoopAnalysis, system: units.System) -> None:

@@ -33,9 +33,12 @@ from drillctl.simulation.limit_cycle import LimitCycle
 from drillctl.simulation.trajectory import Simulation
 from drillctl.store_blocks import FolderBlocks
 from drillctl.store_reading import READERS, stored_name
+from drillctl.studies.adaptive import AdaptiveMap
+from drillctl.studies.adaptive_checks import CHECK_CELLS
 from drillctl.studies.audit import choose_cells
 from drillctl.studies.cases import case_designs
 from drillctl.studies.comparison import Comparison
+from drillctl.studies.contour_search import INTERVALS
 from drillctl.studies.grid import axes_of
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.regularisation import WIDTHS, Regularisation
@@ -212,6 +215,7 @@ def write_data(result: Any, folder: Path) -> None:
 
 
 VERBS = {
+    "AdaptiveMap": "adaptive-map",
     "Sweep": "map",
     "Simulation": "simulate",
     "Modes": "modes",
@@ -274,6 +278,8 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["axes"] = axes
         if not np.array_equal(cells, result.audit.cells):
             settings["audited"] = result.audit.cells.tolist()
+    elif isinstance(result, AdaptiveMap):
+        settings = _asked_of_adaptive(result)
     elif isinstance(result, LoopMap):
         axes = [[a.path, a.values.tolist()] for a in result.axes]
         settings = {"quantities": list(result.values)} | (
@@ -302,6 +308,25 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
     return design, settings
 
 
+def _asked_of_adaptive(result: AdaptiveMap) -> dict[str, Any]:
+    """What the command says of an adaptive map, and what only Python can ask for."""
+    settings: dict[str, Any] = {"full_grid": result.full_audit is not None}
+    axes = [[a.path, a.values.tolist()] for a in result.axes]
+    if axes != _own_axes(result.design):
+        settings["axes"] = axes
+    if result.intervals != INTERVALS:
+        settings["intervals"] = result.intervals
+    check = result.self_check
+    left = result.bands.size - result.trajectories + len(check.cells) + check.followed
+    if len(check.cells) != min(CHECK_CELLS, left):
+        settings["checked"] = len(check.cells)
+    count = result.design.tables.map.audit_cells
+    cells = choose_cells(result.j1.filled(np.nan), result.levels, count)
+    if not np.array_equal(cells, result.audit.cells):
+        settings["audited"] = result.audit.cells.tolist()
+    return settings
+
+
 def _own_cases(design: Design) -> list[Any] | None:
     try:
         return list(case_designs(design).items())
@@ -327,7 +352,7 @@ def open(folder: str | Path) -> Any:
 
     Returns
     -------
-    Sweep, Simulation, Modes, LoopAnalysis, LoopMap, Comparison, LimitCycle, ThreeRegions, ...
+    Sweep, AdaptiveMap, Simulation, Modes, LoopAnalysis, LoopMap, Comparison, LimitCycle, ...
         Equal to what was saved, to the bit; a simulation without its events.
 
     Raises

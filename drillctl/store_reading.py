@@ -23,6 +23,8 @@ from drillctl.simulation.limit_cycle.returns import Returns
 from drillctl.simulation.measures import Measures
 from drillctl.simulation.reference import EnergyAudit
 from drillctl.simulation.trajectory import SIGNALS, Simulation
+from drillctl.studies.adaptive import AdaptiveMap, banded
+from drillctl.studies.adaptive_checks import SelfCheck, full_audit
 from drillctl.studies.audit import Audit
 from drillctl.studies.comparison import MEASURES, ComparedCase, Comparison
 from drillctl.studies.delayed_lanes import MEASURES as DELAY_MEASURES
@@ -65,6 +67,41 @@ def read_sweep(design: Design, data: xarray.Dataset, summary: dict[str, Any]) ->
         modes=summary["modes"],
         seconds=summary["seconds"],
         total_seconds=summary["total_seconds"],
+        provenance={key: str(value) for key, value in data.attrs.items()},
+    )
+
+
+def read_adaptive_map(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> AdaptiveMap:
+    """An `AdaptiveMap` as it was saved."""
+    axes = tuple(_axis(path, data[stored_name(path)]) for path in summary["axes"])
+    cells, j1 = data["cell"].values.astype(np.int64), data["j1"].values
+    audited = data["audited_cell"].values.astype(np.int64)
+    over_grid = np.full(len(axes[0]) * len(axes[1]), np.nan)
+    over_grid[cells] = j1
+    bands, levels = data["band"].values.astype(np.int8), design.tables.map.levels
+    check = SelfCheck(
+        data["checked_cell"].values.astype(np.int64),
+        data["said_band"].values.astype(np.int8),
+        data["found_band"].values.astype(np.int8),
+        summary["self_check"]["followed"],
+    )
+    full = None
+    if summary["full_audit"] is not None:
+        values = banded(bands, levels, cells, j1)
+        count = summary["full_audit"]["trajectories"]
+        full = full_audit(values, data["full_j1"].values, levels, count)
+    return AdaptiveMap(
+        design=design,
+        axes=axes,
+        levels=levels,
+        cells=cells,
+        measures={name: data[name].values for name in FLOATS},
+        status=data["status"].values.astype(np.int8),
+        bands=bands,
+        audit=Audit(audited, over_grid[audited], data["audited_j1"].values),
+        self_check=check,
+        full_audit=full,
+        **{n: summary[n] for n in ("intervals", "step", "modes", "seconds", "total_seconds")},
         provenance={key: str(value) for key, value in data.attrs.items()},
     )
 
@@ -313,6 +350,7 @@ def _resolved(text: str, like: Design) -> Design:
 
 READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "map": read_sweep,
+    "adaptive-map": read_adaptive_map,
     "simulate": read_simulation,
     "modes": read_modes,
     "compare": read_comparison,

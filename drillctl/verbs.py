@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from drillctl.studies import LoopMap
 
 DPI = 150
+RESUMED = ("map", "adaptive-map")
+"""Runs that go on from what was finished; the others have no finished parts to go on from."""
 
 
 def _draw(figure: Figure, path: Path) -> None:
@@ -48,7 +50,7 @@ def _running(folder: RunFolder) -> Iterator[None]:
         folder.discard()
         raise
     except KeyboardInterrupt:
-        if folder.verb == "map":  # the others have no finished parts to go on from
+        if folder.verb in RESUMED:
             console.note(f"what is finished is kept: the same with --out {folder.path} goes on")
         else:
             folder.discard()
@@ -300,3 +302,35 @@ def stability_map(design: Design, options: Options) -> None:
     if result.audit.verdict == "look":
         console.note("audit: look: the engines differ by more than 1 % in J1 in some cell")
     _conclude(folder, summary, options)
+
+
+def adaptive_map(design: Design, full_grid: bool, options: Options) -> None:
+    """The regions of a map from the cells near their contours, with checks, figure and tables."""
+    from drillctl import plots, printing_adaptive, store, studies
+
+    def told(result: studies.AdaptiveMap) -> None:
+        printing_adaptive.adaptive_map(result, options.units)
+
+    folder = store.claim("adaptive-map", design, options.out, full_grid=full_grid)
+    if _shown_again(folder, options, lambda: told(store.open(folder.path))):
+        return
+    with _running(folder), console.progress() as bar:
+        blocks = folder.blocks()
+        result = studies.adaptive_map(design, full_grid=full_grid, progress=bar, blocks=blocks)
+    if result.minimum is None:
+        console.note("warning: no cell gives a finite answer; see the statuses")
+    store.write_data(result, folder.path)
+    studies.write_adaptive_tables(result, folder.path)
+    _draw(plots.adaptive_map(result, system=options.units), folder.path / "map.png")
+    if not options.json:
+        told(result)
+    if result.share == 1.0:
+        console.note("every cell was simulated: cells are left out on axes of 81 points or more")
+    for name, check, reason in (
+        ("self-check", result.self_check, "a cell left out was in another band than said"),
+        ("full audit", result.full_audit, "a region is not that of the full grid to one cell"),
+        ("audit", result.audit, "the engines differ by more than 1 % in J1 in some cell"),
+    ):
+        if check is not None and check.verdict == "look":
+            console.note(f"{name}: look: {reason}")
+    _conclude(folder, result.summary(), options)

@@ -8,6 +8,7 @@
 - `root_locus.py`: `root_locus`, poles of the loop against a parameter.
 - `friction.py`: `friction_curves`, bit torque against bit speed at each weight on bit.
 - `map.py`: `stability_map` with regions and audit; `sweep_line` for a single parameter.
+- `adaptive_map.py`: `adaptive_map`, regions with the cells simulated to find them.
 - `comparison.py`: `j1_distributions`, `paired_differences`, `j1_against_weight` of cases.
 - `nominal_cases.py`: `compared_regions` and `compared_responses` of cases at their own values.
 - `limit_cycle.py`: `limit_cycle`, one period by each method.
@@ -22,6 +23,7 @@ figure and never shows it. Nothing here touches the state of pyplot. Axes are in
 the rig floor: rpm, kN, kN m, m.
 """
 
+from drillctl.plots.adaptive_map import adaptive_map
 from drillctl.plots.comparison import j1_against_weight, j1_distributions, paired_differences
 from drillctl.plots.frequency import bode
 from drillctl.plots.friction import friction_curves
@@ -40,6 +42,7 @@ from drillctl.plots.time_response import time_response
 from drillctl.plots.weight_delay import weight_delay
 
 __all__ = [
+    "adaptive_map",
     "bode",
     "compared_regions",
     "compared_responses",

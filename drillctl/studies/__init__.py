@@ -2,6 +2,9 @@
 
 - `grid.py`: axes over a design's parameters, and the lanes they stand for.
 - `sweeps.py`: measures over a grid; the J1 map is one case.
+- `adaptive.py`: contours of J1 at a grid's resolution from a fraction of its cells;
+  `contour_search.py`: which cells; `lattices.py`: nested lattices of a grid;
+  `chosen_cells.py`: their lanes; `adaptive_checks.py`: a sample, or all, of what was left out.
 - `loop_maps.py`: figures of the linear loop over a grid.
 - `regions.py`: cells and outlines at or under a level.
 - `three_regions.py`: locally stable, J1 under a level, attracted: three regions of one map.
@@ -19,6 +22,7 @@
 - `memory.py`: grids too large for the memory.
 """
 
+from drillctl.studies.adaptive import AdaptiveMap, adaptive_map
 from drillctl.studies.comparison import Comparison, compare
 from drillctl.studies.draws import Draws, draw, uncertain_parameters
 from drillctl.studies.grid import Axis
@@ -28,6 +32,7 @@ from drillctl.studies.regularisation import Regularisation, regularisation
 from drillctl.studies.responses import responses
 from drillctl.studies.sweeps import Sweep, stability_map, sweep
 from drillctl.studies.tables import (
+    write_adaptive_tables,
     write_comparison,
     write_loop_table,
     write_tables,
@@ -37,6 +42,7 @@ from drillctl.studies.three_regions import ThreeRegions, three_regions
 from drillctl.studies.weight_delay import WeightDelay, weight_delay
 
 __all__ = [
+    "AdaptiveMap",
     "Axis",
     "Comparison",
     "Draws",
@@ -46,6 +52,7 @@ __all__ = [
     "Sweep",
     "ThreeRegions",
     "WeightDelay",
+    "adaptive_map",
     "compare",
     "draw",
     "loop_map",
@@ -57,6 +64,7 @@ __all__ = [
     "three_regions",
     "uncertain_parameters",
     "weight_delay",
+    "write_adaptive_tables",
     "write_comparison",
     "write_loop_table",
     "write_tables",
