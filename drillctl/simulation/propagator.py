@@ -106,6 +106,7 @@ def string_step(string: Drillstring, step: float, modes: int) -> StringStep:
     modes = min(modes, string.nodes)
     with threadpool_limits(limits=1, user_api="blas"):
         frequency, shapes = string.undamped_modes
+        left_out = _left_out(string, frequency[modes:], shapes[:, modes:])
         frequency, shapes = frequency[:modes], shapes[:, :modes]
         rest = _rest(string)
         to_modal = shapes.T @ string.mass.toarray()
@@ -114,6 +115,8 @@ def string_step(string: Drillstring, step: float, modes: int) -> StringStep:
         "drag": float(string.ground_damping.sum()),
         "pipe_offset": float(string.element_stiffness[0] * (rest[0] - rest[1])),
         "twist_offset": float(rest[0] - rest[-1]),
+        "pipe_by_top": float(left_out[0]),
+        "pipe_by_bit": float(left_out[-1]),
     }
     return StringStep(
         string=kind(**fields, **constants),
@@ -123,6 +126,16 @@ def string_step(string: Drillstring, step: float, modes: int) -> StringStep:
         modes=modes,
         step=step,
     )
+
+
+def _left_out(string: Drillstring, frequency: Array, shapes: Array) -> Array:
+    """Pipe torque per torque on each node that modes left out carry, at rest (static correction).
+
+    A torque on the bit that brakes counts positive.
+    """
+    pipe = string.element_stiffness[0] * (shapes[0] - shapes[1])
+    by_node = shapes @ (pipe / frequency**2)
+    return np.concatenate([by_node[:-1], -by_node[-1:]])
 
 
 def _stepped(

@@ -60,6 +60,8 @@ class UndampedString(NamedTuple):
     drag: Any
     pipe_offset: Any
     twist_offset: Any
+    pipe_by_top: Any
+    pipe_by_bit: Any
 
 
 class BlockString(NamedTuple):
@@ -86,6 +88,9 @@ class BlockString(NamedTuple):
         Torque of all damping to ground per set speed (N m s/rad).
     pipe_offset, twist_offset : float
         Pipe torque (N m s/rad) and twist (s) that this drag causes, per set speed.
+    pipe_by_top, pipe_by_bit : float
+        Pipe torque per held torque on the top and on the bit (braking) that the modes left out
+        carry: faster than a step, they follow at once.
     """
 
     free: Any
@@ -102,6 +107,8 @@ class BlockString(NamedTuple):
     drag: Any
     pipe_offset: Any
     twist_offset: Any
+    pipe_by_top: Any
+    pipe_by_bit: Any
 
 
 class DenseString(NamedTuple):
@@ -127,6 +134,8 @@ class DenseString(NamedTuple):
     drag: Any
     pipe_offset: Any
     twist_offset: Any
+    pipe_by_top: Any
+    pipe_by_bit: Any
 
 
 class Swing(NamedTuple):
@@ -161,7 +170,8 @@ def _by_modes(tracks_top: bool) -> Any:
     @inlined
     def step(string: Any, state: Any, work: Any) -> Any:
         top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-        top_angle, bit_speed, pipe, top_speed = each(0.0), each(0.0), each(0.0), each(0.0)
+        top_angle, bit_speed, top_speed = each(0.0), each(0.0), each(0.0)
+        pipe = fma(string.pipe_by_top, top, string.pipe_by_bit * bit)
         for mode in range(string.kappa.shape[0]):
             at_x = 2 * mode * WIDTH
             at_y = at_x + WIDTH
@@ -188,7 +198,8 @@ def _by_blocks(tracks_top: bool) -> Any:
     @inlined
     def step(string: Any, state: Any, work: Any) -> Any:
         top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-        top_angle, bit_speed, pipe, top_speed = each(0.0), each(0.0), each(0.0), each(0.0)
+        top_angle, bit_speed, top_speed = each(0.0), each(0.0), each(0.0)
+        pipe = fma(string.pipe_by_top, top, string.pipe_by_bit * bit)
         for block in range(string.free.shape[0]):
             a11, a12 = string.free[block, 0], string.free[block, 1]
             a21, a22 = string.free[block, 2], string.free[block, 3]
@@ -218,7 +229,8 @@ def _by_matrix(string: Any, state: Any, work: Any) -> Any:
     states = string.free.shape[0]
     complete = states * WIDTH
     top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-    top_angle, bit_speed, pipe, top_speed = each(0.0), each(0.0), each(0.0), each(0.0)
+    top_angle, bit_speed, top_speed = each(0.0), each(0.0), each(0.0)
+    pipe = fma(string.pipe_by_top, top, string.pipe_by_bit * bit)
     for i in range(states):
         z = fma(string.push[i, 0], top, at(state, i * WIDTH))
         z = fma(string.push[i, 1], bit, z)
