@@ -1,7 +1,8 @@
 """The peers, one file each, all with the same small protocol.
 
 A module has `TITLE` and `make(job) -> list[Peer]`, and imports what drillctl does not need inside
-`make`: a peer whose library is missing is told in the table, and the rest goes on.
+`make`: a peer whose library is missing is told in the table, and the rest goes on. What has to be
+compiled is compiled in `make`.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.job import Array, Job
-from benchmarks.peers.compiled import event, packed, rates
+from benchmarks.peers.compiled import compile_for, event, packed, rates
 from benchmarks.peers.phases import Phases, march, phases
 
 TITLE = "CVODE (scikit-sundae)"
@@ -65,6 +65,7 @@ def make(job: Job) -> list[Cvode]:
     import sksundae  # noqa: F401
 
     systems = {cell: phases(job.rig(cell)) for cell in job.cells}
+    compile_for(systems[job.cells[0]])
     solves = "set-valued friction; stick and slip as phases, changes located; Adams"
     jobs = tuple((cell,) for cell in job.cells)
-    return [Cvode(f"CVODE (scikit-sundae), rtol {RTOL:.0e}", solves, 1, jobs, systems)]
+    return [Cvode(f"{TITLE}, rtol {RTOL:.0e}", solves, 1, jobs, systems)]

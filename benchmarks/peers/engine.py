@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numba
 
 from benchmarks.job import Array, Job
-from drillctl.simulation.batch import prepare, run_batch, warm_up
+from drillctl.simulation.batch import Prepared, prepare, run_batch, warm_up
+from drillctl.simulation.lanes import Lanes
 from drillctl.studies.grid import groups
 
 TITLE = "drillctl"
@@ -27,26 +29,23 @@ class Engine:
     solves: str
     cores: int
     jobs: tuple[tuple[int, ...], ...]
-    job: Job
-    values: dict[str, Any]
-
-    @cached_property
-    def ready(self) -> tuple[Any, Any]:
-        """All lanes of the map, and their scheme; the kernel compiled."""
-        design = self.job.design.replace(self.values)
-        (group,) = groups(design, self.job.axes)
-        prepared = prepare(group.lanes, design.tables.simulation)
-        warm_up(group.lanes, prepared)
-        return group.lanes, prepared
+    lanes: Lanes
+    prepared: Prepared
 
     def run(self, cells: tuple[int, ...]) -> Array:
-        lanes, prepared = self.ready
-        before = numba.get_num_threads()
-        numba.set_num_threads(self.cores)
-        try:
-            return run_batch(lanes, prepared).measures["j1"]
-        finally:
-            numba.set_num_threads(before)
+        with on_cores(self.cores):
+            return run_batch(self.lanes, self.prepared).measures["j1"]
+
+
+@contextmanager
+def on_cores(cores: int) -> Iterator[None]:
+    """Hold the engine to so many cores."""
+    before = numba.get_num_threads()
+    numba.set_num_threads(cores)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
 
 
 def make(job: Job) -> list[Engine]:
@@ -62,5 +61,15 @@ def make(job: Job) -> list[Engine]:
 
 def engine(job: Job, name: str, cores: int, values: dict[str, Any]) -> Engine:
     """One row: the engine with these values of the design."""
-    solves = "set-valued friction; modes propagated exactly, a scalar inclusion a step"
-    return Engine(name, solves, cores, (tuple(range(job.size)),), job, values)
+    lanes, prepared = map_lanes(job, values)
+    warm_up(lanes, prepared)
+    scheme = prepared.scheme
+    solves = f"set-valued friction; {scheme.modes} exact modes, steps of {1e3 * scheme.step:g} ms"
+    return Engine(name, solves, cores, (tuple(range(job.size)),), lanes, prepared)
+
+
+def map_lanes(job: Job, values: dict[str, Any]) -> tuple[Lanes, Prepared]:
+    """All lanes of the map with these values in its design, and their scheme."""
+    design = job.design.replace(values)
+    (group,) = groups(design, job.axes)
+    return group.lanes, prepare(group.lanes, design.tables.simulation)

@@ -1,0 +1,124 @@
+"""What was measured, in words and columns."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from benchmarks.peers.cvode import TITLE as CVODE
+from benchmarks.peers.cvode_library import TITLE as CVODE_LIBRARY
+from benchmarks.peers.engine import HEADLINE, ONE_CORE
+from benchmarks.peers.scipy_events import LSODA
+
+LSODA_BAR, CVODE_BAR = 20_000.0, 1_000.0
+LANES_BAR, ELEMENTS_BAR = 0.03, 1.25
+"""Largest distance of the slope over lanes from 1, and largest ratio of costs over elements."""
+
+
+def duration(seconds: float) -> str:
+    """A time in three digits and a fitting unit."""
+    for unit, scale in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if seconds >= scale or unit == "us":
+            return f"{seconds / scale:.3g} {unit}"
+    raise AssertionError
+
+
+def peers_table(found: dict[str, Any]) -> list[str]:
+    """One line a peer; ratios to drillctl at its standard accuracy."""
+    rows = found["rows"]
+    by_name = {row["name"]: row for row in rows}
+    one, whole = by_name[ONE_CORE], by_name[HEADLINE]
+    width = max(len(row["name"]) for row in rows)
+    head = (
+        f"{'':{width}} {'J1 error':>9} {'one core':>10} {'machine':>10} {'range as run':>20} "
+        f"{'x core':>9} {'x as run':>9} {'cores':>6}"
+    )
+    lines = [head, "-" * len(head)]
+    for row in rows:
+        spread = f"{duration(row['low_s'])} - {duration(row['high_s'])}"
+        lines.append(
+            f"{row['name']:{width}} {row['j1_error']:9.1e} {duration(row['one_core_s']):>10} "
+            f"{duration(row['machine_s']):>10} {spread:>20} "
+            f"{row['one_core_s'] / one['one_core_s']:9,.3g} "
+            f"{row['as_run_s'] / whole['as_run_s']:9,.3g} {row['cores_used']:6.2f}"
+        )
+    lines += [f"{name}: {why}" for name, why in found["missing"]]
+    cells = rows[0]["cells_compared"]
+    return [
+        *lines, "",
+        f"Time of one trajectory of 100 s. J1 error: worst of {cells} cells against located events.",
+        "one core: core time; machine: all cores busy; x: over drillctl at standard accuracy, core "
+        "for core and as run (its", "whole machine beside their one core); cores: processor time "
+        "over time on the wall.",
+    ]  # fmt: skip
+
+
+def bars(found: dict[str, Any]) -> list[dict[str, Any]]:
+    """What the suite has to show, with what it did show; `met` is None where it was not measured."""
+    rows = {row["name"]: row for row in found["rows"]}
+    result = []
+    wanted = ((LSODA, LSODA_BAR), (CVODE, CVODE_BAR), (CVODE_LIBRARY, CVODE_BAR))
+    for start, bar in wanted:
+        name = next((n for n in rows if n.startswith(start)), None)
+        for how, key, ours in (
+            ("whole machine beside its one core", "as_run_s", HEADLINE),
+            ("core for core", "one_core_s", ONE_CORE),
+        ):
+            ratio = None if name is None else rows[name][key] / rows[ours][key]
+            what = f"times faster than {name or start}, {how}"
+            result.append(_bar(what, ratio, f">= {bar:,.0f}", lambda v, bar=bar: v >= bar))
+    scaling = found["scaling"]
+    largest = max(scaling["lanes"]["sizes"])
+    result.append(
+        _bar(
+            f"slope of log cost against log lanes, to {largest:,} lanes",
+            scaling["lanes"]["slope"], f"1 +- {LANES_BAR}", lambda v: abs(v - 1.0) <= LANES_BAR,
+        )
+    )  # fmt: skip
+    result.append(
+        _bar(
+            "largest over smallest cost, 30 to 1,000 elements",
+            scaling["elements"]["largest_over_smallest"], f"<= {ELEMENTS_BAR}",
+            lambda v: v <= ELEMENTS_BAR,
+        )
+    )  # fmt: skip
+    return result
+
+
+def _bar(what: str, value: float | None, bar: str, meets: Any) -> dict[str, Any]:
+    met = None if value is None else bool(meets(value))
+    return {"what": what, "value": value, "bar": bar, "met": met}
+
+
+def bars_table(found: list[dict[str, Any]]) -> list[str]:
+    """One line a bar."""
+    told = {True: "met", False: "NOT MET", None: "not measured"}
+    width = max(len(bar["what"]) for bar in found)
+    lines = []
+    for bar in found:
+        value = "" if bar["value"] is None else f"{bar['value']:,.4g}"
+        lines.append(f"{bar['what']:{width}} {value:>9}  {bar['bar']:>10}  {told[bar['met']]}")
+    return lines
+
+
+def roofline_table(roofline: dict[str, Any]) -> list[str]:
+    """The modal pass in three lines."""
+    r, s = roofline, roofline["standard"]
+    return [
+        f"modal pass: {1e9 * r['mode_s']:.3g} ns a lane, step and mode; {r['flops_a_mode']:g} "
+        f"operations, {r['bytes_a_mode']:g} bytes; {r['flops'] / 1e9:.3g} Gflop/s",
+        f"  {100 * r['share_of_peak']:.3g} % of the multiply-add peak of a core, "
+        f"{100 * r['share_of_first_cache']:.3g} % of its in-place bandwidth of the first cache",
+        f"  at {s['modes']} modes it is {100 * s['pass_share_of_step']:.3g} % of a step; "
+        f"laws and measures take {1e9 * r['laws_s']:.3g} ns a lane and step "
+        f"(straight line within {100 * r['worst_fit']:.2g} %)",
+    ]
+
+
+def scaling_table(scaling: dict[str, Any]) -> list[str]:
+    """Sizes and seconds."""
+    lines = []
+    for name, found in scaling.items():
+        pairs = zip(found["sizes"], found["seconds"], strict=True)
+        lines.append(f"{name:9}" + "  ".join(f"{n:,.4g}: {duration(s)}" for n, s in pairs))
+        lines.append(f"{'':9}slope {found['slope']:.3f}")
+    return lines
