@@ -34,7 +34,9 @@ def main() -> None:
         one = cell_design(design, axes, cell)
         j1[str(cell)] = exact_j1(one)
         moved[str(cell)] = exact_j1(one, LOOSER) / j1[str(cell)] - 1.0
-        print(f"cell {cell}: J1 {j1[str(cell)]:.12g}, at {LOOSER:g} moved by {moved[str(cell)]:.1e}")
+        print(
+            f"cell {cell}: J1 {j1[str(cell)]:.12g}, at {LOOSER:g} moved by {moved[str(cell)]:.1e}"
+        )
     kept = {
         "design": DESIGN,
         "duration": design.tables.simulation.duration,

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -104,7 +105,7 @@ def measure() -> Machine:
 class _Loop:
     """A compiled loop, and what one of its iterations counts."""
 
-    call: Callable[[int], Any]
+    call: Callable[[int], float]
     counts: float
 
 
@@ -190,7 +191,10 @@ def _chain(width: int) -> _Loop:
 
 def _at(i: int, vector: str) -> list[str]:
     """Address of the i-th vector of this iteration, round and round the buffer."""
-    return [f"%o{i} = add i64 %base, {i}", f"%p{i} = getelementptr {vector}, ptr %buffer, i64 %o{i}"]
+    return [
+        f"%o{i} = add i64 %base, {i}",
+        f"%p{i} = getelementptr {vector}, ptr %buffer, i64 %o{i}",
+    ]
 
 
 def _sum(names: list[str], vector: str) -> list[str]:
@@ -222,7 +226,7 @@ def _loop(phis: list[str], steps: list[str], end: list[str], width: int) -> str:
     return "\n".join(lines)
 
 
-def _compiled(code: str) -> Callable[[int], Any]:
+def _compiled(code: str) -> Callable[[int], float]:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     target = llvm.Target.from_default_triple().create_target_machine(
@@ -233,21 +237,19 @@ def _compiled(code: str) -> Callable[[int], Any]:
     kind = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_void_p)
     function = kind(engine.get_function_address("f"))
 
-    def call(iterations: int) -> Any:
+    # The engine owns the code: it must live as long as the function.
+    def call(iterations: int, owner: Any = engine) -> float:
         raw = ctypes.create_string_buffer(BUFFER + 4096)
-        function(iterations, (ctypes.addressof(raw) + 4095) & ~4095)
-        return engine  # kept alive as long as its code is called
+        return float(function(iterations, (ctypes.addressof(raw) + 4095) & ~4095))
 
     return call
 
 
 def nominal_clock() -> float | None:
     """Clock that the system names (Hz), where it does."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as info:
-            found = [float(line.split(":")[1]) for line in info if line.startswith("cpu MHz")]
-    except OSError:
-        return None
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text(encoding="utf-8").splitlines() if info.is_file() else []
+    found = [float(line.split(":")[1]) for line in lines if line.startswith("cpu MHz")]
     return 1e6 * max(found) if found else None
 
 

@@ -14,23 +14,26 @@ BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#666666"
 
 FAMILIES = (
-    ("drillctl", BLUE), ("SciPy", ORANGE), ("CVODE", GREEN), ("NumPy", PURPLE), ("diffrax", VERMILION),
-    ("python-control", BLACK),
+    ("drillctl", BLUE), ("SciPy", ORANGE), ("CVODE", GREEN), ("NumPy", PURPLE),
+    ("diffrax", VERMILION), ("python-control", BLACK),
 )  # fmt: skip
 MARKERS = "osD^v<>P"
+GROWTHS = (
+    ("lanes", "lanes", 1.0), ("elements", "elements of the string", 0.0),
+    ("horizon", "horizon (s)", 1.0),
+)  # fmt: skip
+"""Key, axis label and expected power of each growth of cost."""
 
 
 def draw(found: dict[str, Any], path: Path) -> None:
     """Costs and errors of the peers, roofline, and cost against lanes, elements and horizon."""
     figure = Figure(figsize=(13.5, 8.6), layout="constrained")
-    axes = figure.subplot_mosaic([["peers", "peers", "roof"], ["lanes", "elements", "horizon"]])
-    _peers(axes["peers"], found["rows"])
-    _roof(axes["roof"], found["machine"], found["roofline"])
-    for key, label, like in (
-        ("lanes", "lanes", 1.0), ("elements", "elements of the string", 0.0),
-        ("horizon", "horizon (s)", 1.0),
-    ):  # fmt: skip
-        _growth(axes[key], found["scaling"][key], label, like)
+    above, below = figure.subfigures(2, 1)
+    peers, roof = above.subplots(1, 2, width_ratios=[2.0, 1.1])
+    _peers(peers, found["rows"])
+    _roof(roof, found["machine"], found["roofline"])
+    for ax, (key, label, like) in zip(below.subplots(1, 3), GROWTHS, strict=True):
+        _growth(ax, found["scaling"][key], label, like)
     processor = found["provenance"]["processor"]
     figure.suptitle(
         f"drillctl {found['provenance']['drillctl']}: 41 x 41 map, 100 s a lane, 30 elements; "
@@ -52,12 +55,14 @@ def _peers(ax: Axes, rows: list[dict[str, Any]]) -> None:
         ax.plot(
             row["j1_error"], row["one_core_s"], MARKERS[number % len(MARKERS)], color=colour,
             markerfacecolor="white" if smooth else colour, markersize=9, markeredgewidth=1.6,
-            linestyle="none", label=row["name"] + (" (regularised)" if smooth else ""),
+            linestyle="none", label=row["name"],
         )  # fmt: skip
-    ax.set(xscale="log", yscale="log", xlabel="worst relative error in J1")
-    ax.set(ylabel="core time of a trajectory (s)", title="What a trajectory costs, and how exact it is")
+    ax.set(
+        xscale="log", yscale="log", xlabel="worst relative error in J1 (open: friction regularised)"
+    )
+    ax.set(ylabel="core time per trajectory (s)", title="Cost against accuracy")
     ax.grid(alpha=0.3)
-    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=9, frameon=False)
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8.5, frameon=False)
 
 
 def _roof(ax: Axes, machine: dict[str, Any], roofline: dict[str, Any]) -> None:
@@ -78,7 +83,12 @@ def _roof(ax: Axes, machine: dict[str, Any], roofline: dict[str, Any]) -> None:
     whole = standard["pass_flops_over_whole_step"] / 1e9
     share = 100 * standard["pass_flops_over_whole_step_share_of_peak"]
     ax.plot(
-        at, whole, "s", color=ORANGE, markersize=8, label=f"the same over whole steps: {share:.0f} %"
+        at,
+        whole,
+        "s",
+        color=ORANGE,
+        markersize=8,
+        label=f"the same over whole steps: {share:.0f} %",
     )
     ax.set(xscale="log", yscale="log", ylim=(1.0, 2.0 * peak), xlim=(0.05, 20.0))
     ax.set(xlabel="operations per byte", ylabel="Gflop/s, one core", title="Roofline, measured")
@@ -99,14 +109,13 @@ def _growth(ax: Axes, found: dict[str, Any], label: str, like: float) -> None:
     ax.plot(sizes, middle * sizes**like, "--", color=GREY, label=power)
     ax.set(xscale="log", yscale="log", xlabel=label, ylabel="time, all cores (s)")
     if not like:
-        ax.set_ylim(seconds.min() / 10.0, seconds.max() * 10.0)
+        ax.set_ylim(seconds.min() / 6.0, seconds.max() * 6.0)
+        ax.set_xlim(sizes.min() / 1.7, sizes.max() * 1.7)
     ax.set_title(f"{label.partition(' (')[0].capitalize()}: slope {found['slope']:.3f}")
-    for size, second in zip(sizes, seconds, strict=True):
+    for size in sizes:
         modes = found.get("chosen", {}).get(f"{size:g}", {}).get("modes")
         if modes is not None:
-            ax.annotate(
-                f"{modes} modes", (size, second), textcoords="offset points", xytext=(0, 12),
-                ha="center", fontsize=8,
-            )  # fmt: skip
+            place = ax.get_xaxis_transform()  # along the lower edge
+            ax.text(size, 0.05, f"{modes} modes", transform=place, ha="center", fontsize=8)
     ax.grid(alpha=0.3)
     ax.legend(loc="upper left", fontsize=8)

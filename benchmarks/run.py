@@ -75,8 +75,9 @@ def run(job: Job, modules: tuple[str, ...], rounds: int, lanes: int, told: Any) 
 def report(found: dict[str, Any], folder: Path) -> None:
     """Print the table; write JSON and picture."""
     parts = [
-        found["machine_in_words"], table.peers_table(found), table.roofline_table(found["roofline"]),
-        table.scaling_table(found["scaling"]), table.bars_table(found["bars"]),
+        found["machine_in_words"], table.peers_table(found),
+        table.roofline_table(found["roofline"]), table.scaling_table(found["scaling"]),
+        table.bars_table(found["bars"]),
     ]  # fmt: skip
     print("\n\n".join("\n".join(part) for part in parts))
     folder.mkdir(parents=True, exist_ok=True)

@@ -42,18 +42,21 @@ def peers_table(found: dict[str, Any]) -> list[str]:
             f"{row['as_run_s'] / whole['as_run_s']:9,.3g} {row['cores_used']:6.2f}"
         )
     lines += [f"{name}: {why}" for name, why in found["missing"]]
-    cells = rows[0]["cells_compared"]
+    cells = max(row["cells_compared"] for row in rows)
+    fewer = [row["name"] for row in rows if row["cells_compared"] < cells]
+    short = [f"Not all cells were run by: {', '.join(fewer)}."] if fewer else []
     return [
-        *lines, "",
-        f"Time of one trajectory of 100 s. J1 error: worst of {cells} cells against located events.",
-        "one core: core time; machine: all cores busy; x: over drillctl at standard accuracy, core "
-        "for core and as run (its", "whole machine beside their one core); cores: processor time "
-        "over time on the wall.",
-    ]  # fmt: skip
+        *lines,
+        "",
+        *short,
+        f"Time of one trajectory of 100 s. J1 error: worst of {cells} cells, to located events.",
+        "one core: core time. machine: with all cores busy. cores: processor time over wall time.",
+        "x: over drillctl, standard; core for core, and as run (all our cores, one of theirs).",
+    ]
 
 
 def bars(found: dict[str, Any]) -> list[dict[str, Any]]:
-    """What the suite has to show, with what it did show; `met` is None where it was not measured."""
+    """What the suite has to show, and what it shows; `met` is None where nothing was measured."""
     rows = {row["name"]: row for row in found["rows"]}
     result = []
     wanted = ((LSODA, LSODA_BAR), (CVODE, CVODE_BAR), (CVODE_LIBRARY, CVODE_BAR))

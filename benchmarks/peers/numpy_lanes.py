@@ -64,7 +64,9 @@ class NumPyLanes:
     def run(self, cells: tuple[int, ...]) -> Array:
         chosen = np.array(cells)
         parts = np.array_split(chosen, -(-len(chosen) // LANES))
-        return np.concatenate([self._block(Lanes(*(v[part] for v in self.lanes))) for part in parts])
+        return np.concatenate(
+            [self._block(Lanes(*(v[part] for v in self.lanes))) for part in parts]
+        )
 
     def _block(self, lanes: Lanes) -> Array:
         block = Block(self.modes, lanes, STEP)
@@ -149,13 +151,15 @@ def modes_of(rig: Rig, step: float) -> Modes:
     if shapes[-1, 0] < 0.0:
         shapes[:, 0] *= -1.0
     c, s = np.cos(w * step), np.sin(w * step)
-    column = [
+    rows = [
         np.concatenate([[rigid], elastic])
         for rigid, elastic in (
-            (1.0, c), (step, s / w), (0.0, -w * s), (0.5 * step**2, (1.0 - c) / w**2), (step, s / w),
+            (1.0, c), (step, s / w), (0.0, -w * s), (0.5 * step**2, (1.0 - c) / w**2),
         )
     ]  # fmt: skip
-    return Modes(*(a[:, None] for a in column[:3]), *column[3:], shapes[0], shapes[-1])
+    cosine, sine_over, minus_w_sine, angle_push = rows
+    columns = cosine[:, None], sine_over[:, None], minus_w_sine[:, None]
+    return Modes(*columns, angle_push, sine_over, shapes[0], shapes[-1])
 
 
 def make(job: Job) -> list[NumPyLanes]:
