@@ -53,7 +53,7 @@ def _peers(ax: Axes, rows: list[dict[str, Any]]) -> None:
         number = seen[family] = seen.get(family, -1) + 1
         smooth = row["solves"].startswith("regularised")
         ax.plot(
-            row["j1_error"], row["one_core_s"], MARKERS[number % len(MARKERS)], color=colour,
+            row["j1_error"], row["core_s"], MARKERS[number % len(MARKERS)], color=colour,
             markerfacecolor="white" if smooth else colour, markersize=9, markeredgewidth=1.6,
             linestyle="none", label=row["name"],
         )  # fmt: skip
@@ -111,7 +111,11 @@ def _growth(ax: Axes, found: dict[str, Any], label: str, like: float) -> None:
     if not like:
         ax.set_ylim(seconds.min() / 6.0, seconds.max() * 6.0)
         ax.set_xlim(sizes.min() / 1.7, sizes.max() * 1.7)
-    ax.set_title(f"{label.partition(' (')[0].capitalize()}: slope {found['slope']:.3f}")
+    ax.set_title(
+        f"{label.partition(' (')[0].capitalize()}: slope {found['slope']:.3f}, "
+        f"of processor time {found['core_slope']:.3f}",
+        fontsize=10,
+    )
     for size in sizes:
         modes = found.get("chosen", {}).get(f"{size:g}", {}).get("modes")
         if modes is not None:

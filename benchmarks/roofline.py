@@ -68,10 +68,10 @@ def measure(job: Job, machine: Machine, rounds: int) -> dict[str, Any]:
         warm_up(lanes, prepared)
         runs[modes] = lambda lanes=lanes, prepared=prepared: run_batch(lanes, prepared)
     with on_cores(1):
-        seconds = in_turn(runs, dict.fromkeys(runs, rounds))
+        calls = in_turn(runs, dict.fromkeys(runs, rounds))
     per = 1.0 / (job.size * round(DURATION / STEP))
     # The best of several, as the peaks are: what others take of the machine is not the pass.
-    step = {modes: min(s) * per for modes, s in seconds.items()}
+    step = {modes: min(c.core_seconds for c in made) * per for modes, made in calls.items()}
     slope, rest = np.polyfit(list(step), list(step.values()), 1)
     fitted = np.array([slope * modes + rest for modes in step])
     counted = count(prepared.stepper.string)

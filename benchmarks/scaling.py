@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.job import Job
 from benchmarks.peers.engine import map_lanes
-from benchmarks.timing import in_turn
+from benchmarks.timing import Call, in_turn
 from drillctl.design import Design
 from drillctl.simulation.batch import prepare, run_batch, warm_up
 from drillctl.simulation.lanes import Lanes, lane_numbers, lanes_of
@@ -68,17 +68,26 @@ def over_horizons(job: Job, rounds: int) -> dict[str, Any]:
     return _summary(in_turn(runs, dict.fromkeys(runs, rounds)), None)
 
 
-def _summary(seconds: dict[Any, list[float]], chosen: dict[str, Any] | None) -> dict[str, Any]:
-    """Medians and ranges by size, and the slope of log seconds against log size."""
-    sizes = list(seconds)
-    medians = [statistics.median(seconds[size]) for size in sizes]
+def _summary(calls: dict[Any, list[Call]], chosen: dict[str, Any] | None) -> dict[str, Any]:
+    """Medians and ranges by size, and slopes of logarithms, on the clock and of processor time."""
+    sizes = list(calls)
+    clock = {size: [call.seconds for call in calls[size]] for size in sizes}
+    seconds = [statistics.median(clock[size]) for size in sizes]
+    core = [statistics.median(call.core_seconds for call in calls[size]) for size in sizes]
     found: dict[str, Any] = {
         "sizes": sizes,
-        "seconds": medians,
-        "low": [min(seconds[size]) for size in sizes],
-        "high": [max(seconds[size]) for size in sizes],
-        "repeats": [len(seconds[size]) for size in sizes],
-        "slope": float(np.polyfit(np.log(sizes), np.log(medians), 1)[0]),
-        "largest_over_smallest": max(medians) / min(medians),
+        "seconds": seconds,
+        "core_seconds": core,
+        "low": [min(clock[size]) for size in sizes],
+        "high": [max(clock[size]) for size in sizes],
+        "repeats": [len(clock[size]) for size in sizes],
+        "slope": _slope(sizes, seconds),
+        "core_slope": _slope(sizes, core),
+        "largest_over_smallest": max(seconds) / min(seconds),
+        "core_largest_over_smallest": max(core) / min(core),
     }
     return found if chosen is None else found | {"chosen": chosen}
+
+
+def _slope(sizes: list[float], seconds: list[float]) -> float:
+    return float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0])

@@ -22,6 +22,11 @@ def duration(seconds: float) -> str:
     raise AssertionError
 
 
+def times(ratio: float) -> str:
+    """A ratio in three digits or to the unit."""
+    return f"{ratio:,.0f}" if ratio >= 100.0 else f"{ratio:.3g}"
+
+
 def peers_table(found: dict[str, Any]) -> list[str]:
     """One line a peer; ratios to drillctl at its standard accuracy."""
     rows = found["rows"]
@@ -29,17 +34,17 @@ def peers_table(found: dict[str, Any]) -> list[str]:
     one, whole = by_name[ONE_CORE], by_name[HEADLINE]
     width = max(len(row["name"]) for row in rows)
     head = (
-        f"{'':{width}} {'J1 error':>9} {'one core':>10} {'machine':>10} {'range as run':>20} "
+        f"{'':{width}} {'J1 error':>9} {'core time':>10} {'machine':>10} {'range as run':>20} "
         f"{'x core':>9} {'x as run':>9} {'cores':>6}"
     )
     lines = [head, "-" * len(head)]
     for row in rows:
         spread = f"{duration(row['low_s'])} - {duration(row['high_s'])}"
         lines.append(
-            f"{row['name']:{width}} {row['j1_error']:9.1e} {duration(row['one_core_s']):>10} "
+            f"{row['name']:{width}} {row['j1_error']:9.1e} {duration(row['core_s']):>10} "
             f"{duration(row['machine_s']):>10} {spread:>20} "
-            f"{row['one_core_s'] / one['one_core_s']:9,.3g} "
-            f"{row['as_run_s'] / whole['as_run_s']:9,.3g} {row['cores_used']:6.2f}"
+            f"{times(row['core_s'] / one['core_s']):>9} "
+            f"{times(row['as_run_s'] / whole['as_run_s']):>9} {row['cores_used']:6.2f}"
         )
     lines += [f"{name}: {why}" for name, why in found["missing"]]
     cells = max(row["cells_compared"] for row in rows)
@@ -49,9 +54,9 @@ def peers_table(found: dict[str, Any]) -> list[str]:
         *lines,
         "",
         *short,
-        f"Time of one trajectory of 100 s. J1 error: worst of {cells} cells, to located events.",
-        "one core: core time. machine: with all cores busy. cores: processor time over wall time.",
-        "x: over drillctl, standard; core for core, and as run (all our cores, one of theirs).",
+        f"Time of one trajectory of 100 s. J1 error: worst of {cells} cells, beside exact ones.",
+        "core time: of the processor. machine: on the clock, all cores busy. cores: really used.",
+        "x: over drillctl, standard: core for core, and as run (all our cores, one of theirs).",
     ]
 
 
@@ -63,27 +68,26 @@ def bars(found: dict[str, Any]) -> list[dict[str, Any]]:
     for start, bar in wanted:
         name = next((n for n in rows if n.startswith(start)), None)
         for how, key, ours in (
-            ("whole machine beside its one core", "as_run_s", HEADLINE),
-            ("core for core", "one_core_s", ONE_CORE),
+            ("as run", "as_run_s", HEADLINE),
+            ("core for core", "core_s", ONE_CORE),
         ):
             ratio = None if name is None else rows[name][key] / rows[ours][key]
             what = f"times faster than {name or start}, {how}"
             result.append(_bar(what, ratio, f">= {bar:,.0f}", lambda v, bar=bar: v >= bar))
-    scaling = found["scaling"]
-    largest = max(scaling["lanes"]["sizes"])
-    result.append(
-        _bar(
-            f"slope of log cost against log lanes, to {largest:,} lanes",
-            scaling["lanes"]["slope"], f"1 +- {LANES_BAR}", lambda v: abs(v - 1.0) <= LANES_BAR,
+    lanes, elements = found["scaling"]["lanes"], found["scaling"]["elements"]
+    for prefix, time in (("", "time on the clock"), ("core_", "processor time")):
+        slope = f"slope of log {time} over log lanes, to {max(lanes['sizes']):,}"
+        result.append(
+            _bar(
+                slope,
+                lanes[f"{prefix}slope"],
+                f"1 +- {LANES_BAR}",
+                lambda v: abs(v - 1) <= LANES_BAR,
+            )
         )
-    )  # fmt: skip
-    result.append(
-        _bar(
-            "largest over smallest cost, 30 to 1,000 elements",
-            scaling["elements"]["largest_over_smallest"], f"<= {ELEMENTS_BAR}",
-            lambda v: v <= ELEMENTS_BAR,
-        )
-    )  # fmt: skip
+        ratio = f"largest over smallest {time}, 30 to 1,000 elements"
+        value = elements[f"{prefix}largest_over_smallest"]
+        result.append(_bar(ratio, value, f"<= {ELEMENTS_BAR}", lambda v: v <= ELEMENTS_BAR))
     return result
 
 
@@ -98,7 +102,8 @@ def bars_table(found: list[dict[str, Any]]) -> list[str]:
     width = max(len(bar["what"]) for bar in found)
     lines = []
     for bar in found:
-        value = "" if bar["value"] is None else f"{bar['value']:,.4g}"
+        digits = 0 if bar["value"] is not None and bar["value"] >= 100.0 else 3
+        value = "" if bar["value"] is None else f"{bar['value']:,.{digits}f}"
         lines.append(f"{bar['what']:{width}} {value:>9}  {bar['bar']:>10}  {told[bar['met']]}")
     return lines
 
@@ -123,5 +128,7 @@ def scaling_table(scaling: dict[str, Any]) -> list[str]:
     for name, found in scaling.items():
         pairs = zip(found["sizes"], found["seconds"], strict=True)
         lines.append(f"{name:9}" + "  ".join(f"{n:,.4g}: {duration(s)}" for n, s in pairs))
-        lines.append(f"{'':9}slope {found['slope']:.3f}")
+        lines.append(
+            f"{'':9}slope {found['slope']:.3f}, of processor time {found['core_slope']:.3f}"
+        )
     return lines

@@ -16,7 +16,8 @@ from benchmarks.job import Array, Job
 from benchmarks.peers import Peer
 
 SLOW = 1.0
-"""A peer whose call takes longer (s) does each of its calls once, others once a round."""
+"""A peer whose call takes longer (s) is let off after `FEWEST` calls, each cell's done once."""
+FEWEST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +28,14 @@ class Call:
     ----------
     seconds : float
         On the wall.
-    cores : float
-        Processor time over that: cores that were really used.
+    core_seconds : float
+        Processor time, of all threads: what others take of the machine is not in it.
     value : object
         What it returned.
     """
 
     seconds: float
-    cores: float
+    core_seconds: float
     value: Any
 
 
@@ -50,7 +51,7 @@ def timed(function: Callable[[], Any]) -> Call:
             used = time.process_time() - used
     finally:
         gc.enable()
-    return Call(seconds, used / seconds, value)
+    return Call(seconds, used, value)
 
 
 @dataclass(eq=False)
@@ -59,27 +60,27 @@ class Timed:
 
     peer: Peer
     calls: list[Call] = field(default_factory=list)
-    costs: dict[tuple[int, ...], list[float]] = field(default_factory=dict)
+    of_cells: dict[tuple[int, ...], list[Call]] = field(default_factory=dict)
     j1: dict[int, float] = field(default_factory=dict)
 
     @property
     def done(self) -> bool:
-        """Whether a slow peer has done all its calls."""
+        """Whether a slow peer has done enough."""
         slow = self.calls and max(call.seconds for call in self.calls) > SLOW
-        return bool(slow) and len(self.calls) >= len(self.peer.jobs)
+        return bool(slow) and len(self.calls) >= max(FEWEST, len(self.peer.jobs))
 
     def run(self, round_: int) -> None:
         cells = self.peer.jobs[round_ % len(self.peer.jobs)]
         call = timed(lambda: self.peer.run(cells))
         self.calls.append(call)
-        self.costs.setdefault(cells, []).append(call.seconds / len(cells))
+        self.of_cells.setdefault(cells, []).append(call)
         self.j1.update(zip(cells, (float(v) for v in call.value), strict=True))
 
 
 def interleave(
     peers: list[Peer], rounds: int, told: Callable[[str], None] = lambda text: None
 ) -> list[Timed]:
-    """Round after round every peer once, in an order that turns; slow ones each call once."""
+    """Round after round every peer once, in an order that turns; slow ones a few times."""
     rows = [Timed(peer) for peer in peers]
     for round_ in range(rounds):
         first = round_ % len(rows)
@@ -90,44 +91,51 @@ def interleave(
     return rows
 
 
-def in_turn(jobs: dict[Any, Callable[[], Any]], repeats: dict[Any, int]) -> dict[Any, list[float]]:
-    """Seconds of each job, all taken in turn, some more often than others."""
-    seconds: dict[Any, list[float]] = {name: [] for name in jobs}
+def in_turn(jobs: dict[Any, Callable[[], Any]], repeats: dict[Any, int]) -> dict[Any, list[Call]]:
+    """Calls of each job, all taken in turn, some more often than others."""
+    calls: dict[Any, list[Call]] = {name: [] for name in jobs}
     for round_ in range(max(repeats.values())):
         for name, job in jobs.items():
             if round_ < repeats[name]:
-                seconds[name].append(timed(job).seconds)
-    return seconds
+                calls[name].append(timed(job))
+    return calls
 
 
 def row_of(row: Timed, job: Job, machine_cores: int) -> dict[str, Any]:
     """What the table shows of a peer, by name.
 
-    `one_core_s`: seconds of one core that a trajectory takes, median over cells and rounds.
-    `machine_s`: the same of the whole machine. A peer of one core is taken to run on all cores
-    at once without loss. `as_run_s`: seconds on the wall over trajectories, with the cores that
-    the row has. `low_s`, `high_s`: range of the last over all calls. `j1_error`: worst relative
-    one over the cells whose J1 is known.
+    All seconds are of one trajectory, medians over rounds and then over cells. `core_s`: processor
+    time. `as_run_s`: on the clock, with the cores that the row has. `low_s`, `high_s`: range of
+    that over all calls. `machine_s`: on the clock with all cores busy; a peer of one core is taken
+    to run on all of them without loss. `j1_error`: worst relative one over the cells whose J1 is
+    known.
     """
-    medians = [statistics.median(costs) for costs in row.costs.values()]
-    every = [cost for costs in row.costs.values() for cost in costs]
-    as_run, cores = statistics.median(medians), row.peer.cores
+    as_run, core = (_median(row, attribute) for attribute in ("seconds", "core_seconds"))
+    every = [c.seconds / len(cells) for cells, calls in row.of_cells.items() for c in calls]
     known = np.array([[row.j1[c], job.exact[c]] for c in job.cells if c in row.j1])
     return {
         "name": row.peer.name,
         "solves": row.peer.solves,
-        "cores": cores,
-        "cores_used": statistics.median(call.cores for call in row.calls),
+        "cores": row.peer.cores,
+        "cores_used": statistics.median(c.core_seconds / c.seconds for c in row.calls),
         "trajectories_a_call": len(row.peer.jobs[0]),
         "calls": len(row.calls),
         "as_run_s": as_run,
         "low_s": min(every),
         "high_s": max(every),
-        "one_core_s": as_run * cores,
-        "machine_s": as_run * cores / machine_cores,
+        "core_s": core,
+        "machine_s": as_run * row.peer.cores / machine_cores,
         "j1_error": worst_error(known),
         "cells_compared": len(known),
     }
+
+
+def _median(row: Timed, attribute: str) -> float:
+    """Of a trajectory: over calls, then over cells."""
+    return statistics.median(
+        statistics.median(getattr(call, attribute) for call in calls) / len(cells)
+        for cells, calls in row.of_cells.items()
+    )
 
 
 def worst_error(known: Array) -> float:

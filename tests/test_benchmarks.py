@@ -131,9 +131,9 @@ def test_the_peak_loop_does_what_it_counts(width):
 def test_runs_take_turns():
     order = []
     jobs = {name: lambda name=name: order.append(name) for name in "ab"}
-    seconds = in_turn(jobs, {"a": 3, "b": 1})
+    calls = in_turn(jobs, {"a": 3, "b": 1})
     assert "".join(order) == "abaa"
-    assert [len(s) for s in seconds.values()] == [3, 1]
+    assert [len(made) for made in calls.values()] == [3, 1]
 
 
 def test_a_row_is_the_median_of_its_cells():
@@ -145,10 +145,11 @@ def test_a_row_is_the_median_of_its_cells():
 
     job = Job(None, (), {1: 10.0, 2: 25.0})
     (row,) = interleave([Peer()], 4)
-    assert [len(costs) for costs in row.costs.values()] == [2, 2]
+    assert [len(calls) for calls in row.of_cells.values()] == [2, 2]
     found = row_of(row, job, 2)
     assert found["j1_error"] == pytest.approx(0.2)
-    assert found["machine_s"] == pytest.approx(found["one_core_s"] / 2)
+    assert found["machine_s"] == pytest.approx(found["as_run_s"] / 2)
+    assert found["core_s"] >= 0.0
     assert found["low_s"] <= found["as_run_s"] <= found["high_s"]
 
 
