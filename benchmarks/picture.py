@@ -19,7 +19,7 @@ FAMILIES = (
 )  # fmt: skip
 MARKERS = "osD^v<>P"
 GROWTHS = (
-    ("lanes", "lanes", 1.0), ("elements", "elements of the string", 0.0),
+    ("lanes", "lanes", 1.0), ("elements", "elements", 0.0),
     ("horizon", "horizon (s)", 1.0),
 )  # fmt: skip
 """Key, axis label and expected power of each growth of cost."""
@@ -109,7 +109,8 @@ def _growth(ax: Axes, found: dict[str, Any], label: str, like: float) -> None:
     ax.plot(sizes, middle * sizes**like, "--", color=GREY, label=power)
     ax.set(xscale="log", yscale="log", xlabel=label, ylabel="time, all cores (s)")
     if not like:
-        ax.set_ylim(seconds.min() / 6.0, seconds.max() * 6.0)
+        decades = np.floor(np.log10(seconds.min() / 2.0)), np.ceil(np.log10(2.0 * seconds.max()))
+        ax.set_ylim(10.0 ** decades[0], 10.0 ** decades[1])
         ax.set_xlim(sizes.min() / 1.7, sizes.max() * 1.7)
     ax.set_title(
         f"{label.partition(' (')[0].capitalize()}: slope {found['slope']:.3f}, "
