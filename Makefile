@@ -42,10 +42,11 @@ format: $(BIN)/drillctl
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+# The table, the JSON file and the picture of benchmarks/README.md. A peer that cannot be installed
+# is told there as missing. `make bench BENCH=--quick` for a look.
 bench: $(BIN)/drillctl
-	$(BIN)/python benchmarks/map_speed.py
-	$(BIN)/python benchmarks/linear_speed.py
-	$(BIN)/python benchmarks/law_speed.py
+	-$(BIN)/python -m pip install --quiet -e ".[bench]"
+	$(BIN)/python -m benchmarks.run $(BENCH)
 
 clean:
 	rm -rf runs build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis

@@ -1,6 +1,6 @@
 """What a lane costs under real laws, beside the plain PI lane at the same step, in one run.
 
-python benchmarks/law_speed.py
+python -m benchmarks.law_speed
 """
 
 from __future__ import annotations

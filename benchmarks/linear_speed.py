@@ -1,6 +1,6 @@
 """Time of the linear side's large jobs, each the median of three.
 
-python benchmarks/linear_speed.py
+python -m benchmarks.linear_speed
 """
 
 from __future__ import annotations
