@@ -34,12 +34,9 @@ from drillctl.top_drive import SampledDrive
 
 Array = NDArray[np.float64]
 
-CHUNK = 4096
-"""Lanes given to the kernels at a time: half a second's work, so that progress and an
+CHUNK = 16384
+"""Lanes given to the kernels at a time: a fraction of a second, so that progress and an
 interruption are felt."""
-
-SHARES = 12
-"""Shares of the work that each thread takes: they end together though lanes differ."""
 
 FLOATS = (
     "j1", "j1_rate", "stuck_time", "sticks", "stick_slip_index", "mean_bit_speed",
@@ -254,10 +251,17 @@ def _in_threads(advance: Callable[[int, int], Any], blocks: int) -> None:
     if threads == 1:
         advance(0, blocks)
         return
-    share = max(1, blocks // (SHARES * threads))
-    begins = range(0, blocks, share)
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda begin: advance(begin, min(begin + share, blocks)), begins))
+        list(pool.map(lambda share: advance(*share), _shares(blocks, threads)))
+
+
+def _shares(blocks: int, threads: int) -> Iterator[tuple[int, int]]:
+    """Half of what each thread has left at a time: few calls, and all threads end together."""
+    begin = 0
+    while begin < blocks:
+        end = begin + max(1, (blocks - begin) // (2 * threads))
+        yield begin, end
+        begin = end
 
 
 def _at_whole_steps(drive: Any, scheme: Scheme) -> Any:
