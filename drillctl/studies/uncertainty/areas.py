@@ -1,0 +1,132 @@
+"""Areas of regions, and how well they are known.
+
+The area of a region of given probability is the share of the cells whose probability is at
+least that. Its sampling error is that of a count of cells which depend on the same realizations:
+told by a bootstrap over realizations, or by leaving out replicates one by one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.studies.intervals import CONFIDENCE, Interval
+from drillctl.studies.uncertainty.probability import ProbabilityMap, needed
+from drillctl.studies.uncertainty.scatter import Scatter
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+RESAMPLES = 2000
+"""Of the bootstrap of an area."""
+AT_A_TIME = 4_000_000
+"""Weights of realizations held at a time: bounds the memory."""
+NEVER = 1e-10
+"""Probability below which a cell is taken not to change side in a resample."""
+
+
+class Area(NamedTuple):
+    """Share of the cells of a map in a region, with its sampling error.
+
+    Attributes
+    ----------
+    value : float
+        Share of the cells.
+    interval : tuple of float
+        Interval of the confidence asked for.
+    """
+
+    value: float
+    interval: Interval
+
+
+def region_areas(
+    j1: Array,
+    maps: list[ProbabilityMap],
+    probability: float,
+    scatter: Scatter,
+    seed: int,
+    confidence: float = CONFIDENCE,
+) -> list[Area]:
+    """Areas where levels are kept with a probability, with their intervals.
+
+    Parameters
+    ----------
+    j1 : ndarray, shape (realizations, cells)
+        J1 (s), as it was counted.
+    maps : list of ProbabilityMap
+        One a level.
+    probability : float
+        Of the region.
+    scatter : Scatter
+        Which realizations are independent.
+    seed : int
+        Of the resampling.
+    confidence : float
+        Of each interval.
+    """
+    values = [float(one.region(probability).mean()) for one in maps]
+    if scatter.independent:
+        intervals = _bootstrap(j1, maps, probability, seed, confidence)
+    else:
+        intervals = [_jackknife(one, probability, scatter, confidence) for one in maps]
+    return [Area(value, found) for value, found in zip(values, intervals, strict=True)]
+
+
+def _bootstrap(
+    j1: Array, maps: list[ProbabilityMap], probability: float, seed: int, confidence: float
+) -> list[Interval]:
+    """Percentile intervals of resampled areas; all levels from the same resamples."""
+    total, cells = j1.shape
+    least = needed(probability, total)
+    doubtful = [_may_change(one.counts.ravel(), total, least) for one in maps]
+    hits = [
+        (j1[:, cell] <= one.level).astype(np.float32)
+        for one, cell in zip(maps, doubtful, strict=True)
+    ]
+    sure = [
+        int((one.counts.ravel() >= least)[~cell].sum())
+        for one, cell in zip(maps, doubtful, strict=True)
+    ]
+    random = np.random.Generator(np.random.Philox(seed))
+    rows = max(1, AT_A_TIME // total)
+    areas = np.empty((len(maps), RESAMPLES))
+    for done in range(0, RESAMPLES, rows):
+        size = min(rows, RESAMPLES - done)
+        weights = random.multinomial(total, np.full(total, 1.0 / total), size=size)
+        weights = weights.astype(np.float32)
+        for k, (certain, hit) in enumerate(zip(sure, hits, strict=True)):
+            # Whole numbers below 2^24: the same in whatever order a product adds them up.
+            counts = weights @ hit
+            areas[k, done : done + size] = (certain + (counts >= least).sum(axis=1)) / cells
+    tail = 0.5 * (1.0 - confidence)
+    ends = np.quantile(areas, [tail, 1.0 - tail], axis=1)
+    return [(float(low), float(high)) for low, high in ends.T]
+
+
+def _may_change(counts: NDArray[np.int64], total: int, least: int) -> Mask:
+    """Cells that a resample may move into a region or out of it."""
+    from scipy.stats import binom
+
+    share = counts / total
+    inside = counts >= least
+    change = np.where(inside, binom.cdf(least - 1, total, share), binom.sf(least - 1, total, share))
+    return np.asarray(change > NEVER)
+
+
+def _jackknife(
+    found: ProbabilityMap, probability: float, scatter: Scatter, confidence: float
+) -> Interval:
+    """Interval by leaving out one replicate at a time, with Student's t."""
+    left = found.total - found.total // scatter.replicates
+    least = needed(probability, left)
+    without = np.array([
+        float((found.counts - own >= least).mean()) for own in found.by_replicate
+    ])  # fmt: skip
+    replicates = scatter.replicates
+    spread = (replicates - 1) / replicates * ((without - without.mean()) ** 2).sum()
+    half = scatter.quantile(confidence) * float(np.sqrt(spread))
+    value = float(found.region(probability).mean())
+    return max(value - half, 0.0), min(value + half, 1.0)
