@@ -7,6 +7,7 @@ Latin hypercube are not, on purpose; but whole replicates of them are.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scatter:
     """Which realizations are independent of each other.
 
@@ -22,18 +23,28 @@ class Scatter:
     ----------
     replicates : int
         Independent sets that take turns; 1 where every realization is independent.
+    numbers : ndarray of int, or None
+        Of the realizations that are looked at, where those are not all from the first on.
     """
 
     replicates: int
+    numbers: NDArray[np.int64] | None = None
 
     @property
     def independent(self) -> bool:
         """Whether every realization is independent of the others."""
         return self.replicates == 1
 
-    def rows(self, count: int) -> list[slice]:
-        """The realizations of each replicate, among the first `count`."""
-        return [slice(k, count, self.replicates) for k in range(self.replicates)]
+    def of(self, chosen: NDArray[np.bool_]) -> Scatter:
+        """The same of some of the realizations."""
+        return self if chosen.all() else Scatter(self.replicates, np.flatnonzero(chosen))
+
+    def rows(self, count: int) -> list[Any]:
+        """The realizations of each replicate, among the first `count` that are looked at."""
+        if self.numbers is None:
+            return [slice(k, count, self.replicates) for k in range(self.replicates)]
+        of = self.numbers[:count] % self.replicates
+        return [np.flatnonzero(of == k) for k in range(self.replicates)]
 
     def standard_error(self, influence: Array) -> Array:
         """Standard error of the mean of an influence function.

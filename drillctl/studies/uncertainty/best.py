@@ -1,0 +1,236 @@
+"""The best cell of a map under uncertainty, and the cells that cannot be told apart from it.
+
+All cells saw the same realizations, so cells are compared by differences, realization by
+realization. A cell is told apart from the best one when its difference is above zero beyond the
+sampling error, corrected for the number of cells (Bonferroni).
+
+A lane that was stopped early is known to be worse than it says. An objective is still certain
+where no such lane enters it, and the best cell is still certain where every other cell is worse
+even by what is known; otherwise the answer is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.errors import InputError
+from drillctl.studies.intervals import CONFIDENCE, mean_interval, share_interval
+from drillctl.studies.uncertainty.objectives import (
+    Exceedance,
+    Mean,
+    Objective,
+    Quantile,
+    TailMean,
+)
+from drillctl.studies.uncertainty.scatter import Scatter
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+CELLS = 128
+"""Cells looked at at a time: bounds the memory."""
+NEEDS_FULL = "lanes were stopped at the highest level: run with --full"
+
+
+@dataclass(frozen=True, eq=False)
+class Best:
+    """The best cell of a map by one objective.
+
+    Attributes
+    ----------
+    name : str
+        Of the objective.
+    cell : int
+        In the flattened map.
+    value : float
+        Objective there: s, or a probability.
+    interval : tuple of float or None
+        95 % interval of the value in that cell, which was chosen on the same realizations;
+        None for an end that is not known.
+    alike : ndarray of bool, shape (cells,), or None
+        Cells that cannot be told apart from it, itself included; None if lanes were stopped.
+    """
+
+    name: str
+    cell: int
+    value: float
+    interval: tuple[float | None, float | None]
+    alike: Mask | None
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """An objective in every cell.
+
+    Attributes
+    ----------
+    values : ndarray, shape (cells,)
+        What is known at least; NaN in a cell where a lane failed.
+    certain : ndarray of bool, shape (cells,)
+        Where no stopped lane enters the value.
+    """
+
+    values: Array
+    certain: Mask
+
+
+def objectives(levels: tuple[float, ...]) -> tuple[Objective, ...]:
+    """What the best cells are looked for by.
+
+    Parameters
+    ----------
+    levels : tuple of float
+        Levels of J1 (s).
+    """
+    return (Mean(), Quantile(), TailMean(), *(Exceedance(level) for level in levels))
+
+
+def values_of(objective: Objective, j1: Array, censored: Mask) -> Values:
+    """An objective in every cell.
+
+    Parameters
+    ----------
+    objective : Objective
+        Which.
+    j1 : ndarray, shape (realizations, cells)
+        J1 (s) of the realizations that a rig can have.
+    censored : ndarray of bool, shape (realizations, cells)
+        Lanes whose J1 is a lower bound.
+    """
+    values = np.empty(j1.shape[1])
+    certain = np.empty(j1.shape[1], dtype=bool)
+    for cells in _slabs(j1.shape[1]):
+        values[cells] = objective.values(np.sort(j1[:, cells], axis=0))
+        bound = np.where(censored[:, cells], j1[:, cells], np.inf).min(axis=0)
+        if isinstance(objective, Exceedance):
+            certain[cells] = bound > objective.level
+        elif isinstance(objective, Quantile):
+            certain[cells] = values[cells] < bound
+        else:
+            certain[cells] = np.isinf(bound)
+    return Values(np.where(np.isnan(j1).any(axis=0), np.nan, values), certain)
+
+
+def best(objective: Objective, j1: Array, censored: Mask, scatter: Scatter, seed: int) -> Best:
+    """The best cell by an objective.
+
+    Parameters
+    ----------
+    objective : Objective
+        Smaller is better.
+    j1 : ndarray, shape (realizations, cells)
+        J1 (s) of the realizations that a rig can have.
+    censored : ndarray of bool, shape (realizations, cells)
+        Lanes whose J1 is a lower bound.
+    scatter : Scatter
+        Which realizations are independent.
+    seed : int
+        Of resampling.
+
+    Raises
+    ------
+    InputError
+        No cell without failed lanes, or too many lanes were stopped to know.
+    """
+    found = values_of(objective, j1, censored)
+    known = np.where(found.certain, found.values, np.nan)
+    if np.isnan(found.values).all():
+        raise InputError("every cell has failed lanes", objective.name)
+    if np.isnan(known).all() or np.nanmin(known) > np.nanmin(found.values):
+        raise InputError(NEEDS_FULL, objective.name)
+    cell = _chosen(known, j1)
+    alike = None
+    if not censored.any():
+        alike = _alike(objective, j1, found.values, cell, scatter)
+    low, high = _interval(objective, j1[:, cell], censored[:, cell], scatter, seed)
+    value = float(known[cell])
+    if isinstance(objective, Exceedance):  # told as the probability of the level being kept
+        value, low, high = 1.0 - value, *_swapped(low, high)
+    return Best(objective.name, cell, value, (low, high), alike)
+
+
+def _swapped(low: float | None, high: float | None) -> tuple[float | None, float | None]:
+    return tuple(None if end is None else 1.0 - end for end in (high, low))  # type: ignore[return-value]
+
+
+def _chosen(known: Array, j1: Array) -> int:
+    """The smallest; among equals, as probabilities often are, that of the smallest mean."""
+    equal = np.flatnonzero(known == np.nanmin(known))
+    if len(equal) == 1:
+        return int(equal[0])
+    return int(equal[np.argmin(j1[:, equal].mean(axis=0))])
+
+
+def _alike(objective: Objective, j1: Array, values: Array, cell: int, scatter: Scatter) -> Mask:
+    cells = j1.shape[1]
+    own = j1[:, cell : cell + 1]
+    reference = objective.influence(own, np.sort(own, axis=0))
+    # One side only: nothing is better than the best but by chance.
+    quantile = scatter.quantile(1.0 - 2.0 * (1.0 - CONFIDENCE) / max(cells - 1, 1))
+    alike = np.zeros(cells, dtype=bool)
+    for some in _slabs(cells):
+        influence = objective.influence(j1[:, some], np.sort(j1[:, some], axis=0))
+        error = scatter.standard_error(influence - reference)
+        with np.errstate(invalid="ignore"):  # of cells with failed lanes
+            alike[some] = values[some] - values[cell] <= quantile * error
+    return alike
+
+
+def _interval(
+    objective: Objective, j1: Array, censored: Mask, scatter: Scatter, seed: int
+) -> tuple[float | None, float | None]:
+    if scatter.independent and isinstance(objective, Exceedance):
+        return share_interval(int((j1 > objective.level).sum()), len(j1))
+    if scatter.independent and isinstance(objective, Mean):
+        return mean_interval(j1, seed) or (None, None)
+    if scatter.independent and isinstance(objective, Quantile):
+        bound = float(np.where(censored, j1, np.inf).min())
+        return quantile_interval(np.sort(j1), objective.probability, bound)
+    if censored.any():
+        return None, None
+    column = j1[:, None]
+    ordered = np.sort(column, axis=0)
+    value = float(objective.values(ordered)[0])
+    error = float(scatter.standard_error(objective.influence(column, ordered))[0])
+    half = scatter.quantile(CONFIDENCE) * error
+    return value - half, value + half
+
+
+def quantile_interval(
+    ordered: Array, probability: float, bound: float = np.inf
+) -> tuple[float | None, float | None]:
+    """Interval of a quantile by order statistics, whatever the distribution.
+
+    David & Nagaraja, Order Statistics (2003), section 7.1.
+
+    Parameters
+    ----------
+    ordered : ndarray, shape (realizations,)
+        Increasing and independent.
+    probability : float
+        Of the quantile.
+    bound : float
+        From which on values are not known.
+
+    Returns
+    -------
+    tuple of float or None
+        None for an end that so few realizations do not bound.
+    """
+    from scipy.stats import binom
+
+    count, tail = len(ordered), 0.5 * (1.0 - CONFIDENCE)
+    low = int(binom.ppf(tail, count, probability))
+    high = int(binom.ppf(1.0 - tail, count, probability)) + 1
+    known = high <= count and ordered[high - 1] < bound
+    upper = float(ordered[high - 1]) if known else None
+    return (float(ordered[low - 1]) if low > 0 else None), upper
+
+
+def _slabs(cells: int) -> Iterator[slice]:
+    for first in range(0, cells, CELLS):
+        yield slice(first, first + CELLS)
