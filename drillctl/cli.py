@@ -337,6 +337,63 @@ def compare(
 
 
 @app.command()
+def uncertainty(
+    design: DesignName,
+    sets: Sets = None,
+    axis: Axes = None,
+    realizations: Annotated[
+        int | None, typer.Option("--realizations", help="Draws; more than before adds to a run.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the draws.")] = None,
+    sampling: Annotated[
+        Literal["monte-carlo", "sobol", "latin-hypercube"] | None,
+        typer.Option("--sampling", help="How they are drawn."),
+    ] = None,
+    full: Annotated[
+        bool | None, typer.Option("--full", help="Run every lane to its end, for moments.")
+    ] = None,
+    sensitivity: Annotated[
+        int | None, typer.Option("--sensitivity", help="Sobol indices from so many points.")
+    ] = None,
+    audit: Annotated[
+        int | None, typer.Option("--audit", help="Lanes to audit with the reference solver.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the run in --out, or else fail.")
+    ] = False,
+    allow_mixed: Annotated[
+        bool, typer.Option("--allow-mixed", help="Go on on another type of processor.")
+    ] = False,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", help="Address of a dask.distributed scheduler.")
+    ] = None,
+    interim: Annotated[
+        float | None, typer.Option("--interim", min=0.0, help="Seconds between interim pictures.")
+    ] = None,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """A map at thousands of draws: regions by probability, intervals, best cells, indices."""
+    from drillctl import verbs_uncertainty as verbs
+
+    _use(threads)
+    found = _with_draws(_with_axes(_load(design, sets), axis), realizations, seed)
+    given = {
+        "uncertainty.sampling": sampling, "uncertainty.full": full,
+        "uncertainty.sensitivity.samples": sensitivity, "map.audit_cells": audit,
+    }  # fmt: skip
+    asked = {path: value for path, value in given.items() if value is not None}
+    how = verbs.How(resume, allow_mixed, scheduler, interim)
+    verbs.uncertainty(
+        found.replace(asked) if asked else found, how, Options(out, json, units, verbose)
+    )
+
+
+@app.command()
 def simulate(
     design: DesignName,
     sets: Sets = None,

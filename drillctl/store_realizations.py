@@ -83,7 +83,7 @@ class StoredRealizations:
         with _told(self._path):
             for name in (*self._job.measures, "status"):
                 array = self._group[name]
-                if len(array) < count:
+                if array.shape[0] < count:
                     array.resize((count, *array.shape[1:]))
             status = self._group["status"]
             done = status[:count].reshape(count, -1)[:, 0] != NOT_RUN

@@ -23,11 +23,12 @@ if TYPE_CHECKING:
 DPI = 150
 
 
-def _draw(figure: Figure, path: Path) -> None:
+def draw(figure: Figure, path: Path) -> None:
+    """Write a figure."""
     figure.savefig(path, dpi=DPI)
 
 
-def _shown_again(folder: RunFolder, options: Options, show: Callable[[], None]) -> bool:
+def shown_again(folder: RunFolder, options: Options, show: Callable[[], None]) -> bool:
     """Whether the folder held the finished run, whose summary is then shown once more."""
     if not folder.finished:
         return False
@@ -40,7 +41,7 @@ def _shown_again(folder: RunFolder, options: Options, show: Callable[[], None]) 
 
 
 @contextmanager
-def _running(folder: RunFolder) -> Iterator[None]:
+def running(folder: RunFolder) -> Iterator[None]:
     """A run in its folder: an impossible one leaves none, an interrupted map can go on."""
     try:
         yield
@@ -48,14 +49,15 @@ def _running(folder: RunFolder) -> Iterator[None]:
         folder.discard()
         raise
     except KeyboardInterrupt:
-        if folder.verb == "map":  # the others have no finished parts to go on from
+        if folder.verb in ("map", "uncertainty"):  # the others have no finished parts to go on from
             console.note(f"what is finished is kept: the same with --out {folder.path} goes on")
         else:
             folder.discard()
         raise
 
 
-def _conclude(folder: RunFolder, summary: dict[str, Any], options: Options) -> None:
+def conclude(folder: RunFolder, summary: dict[str, Any], options: Options) -> None:
+    """Finish a folder and say where it is."""
     folder.finish(summary)
     if options.json:
         console.emit(summary)
@@ -69,19 +71,19 @@ def modes(design: Design, count: int, options: Options) -> None:
     from drillctl import linear, plots, printing, store
 
     folder = store.claim("modes", design, options.out, count=count)
-    if _shown_again(folder, options, lambda: printing.modes(folder.summary())):
+    if shown_again(folder, options, lambda: printing.modes(folder.summary())):
         return
-    with _running(folder):
+    with running(folder):
         result = linear.modes(design, count)
     summary = result.summary()
     store.write_data(result, folder.path)
-    _draw(plots.mode_shapes(result), folder.path / "modes.png")
+    draw(plots.mode_shapes(result), folder.path / "modes.png")
     string, frequencies = design.string, linear.telling_frequencies(design.string)
-    _draw(plots.bode(linear.frequency_response(string, frequencies)), folder.path / "bode.png")
-    _draw(plots.friction_curves(design), folder.path / "friction.png")
+    draw(plots.bode(linear.frequency_response(string, frequencies)), folder.path / "bode.png")
+    draw(plots.friction_curves(design), folder.path / "friction.png")
     if not options.json:
         printing.modes(summary)
-    _conclude(folder, summary, options)
+    conclude(folder, summary, options)
 
 
 def loop(design: Design, options: Options) -> None:
@@ -91,16 +93,16 @@ def loop(design: Design, options: Options) -> None:
     from drillctl.loop_pictures import loop_figures, over_gains
 
     folder = store.claim("loop", design, options.out)
-    if _shown_again(folder, options, lambda: printing.loop(store.open(folder.path), options.units)):
+    if shown_again(folder, options, lambda: printing.loop(store.open(folder.path), options.units)):
         return
-    with _running(folder), console.progress() as bar:
+    with running(folder), console.progress() as bar:
         result = linear.loop(design)
         found = _loop_map(design, bar)
     store.write_data(result, folder.path)
     for name in ("model.mat", "model.npz"):
         write_matrices(design, folder.path / name)
     for name, figure in loop_figures(result).items():
-        _draw(figure, folder.path / f"{name}.png")
+        draw(figure, folder.path / f"{name}.png")
     summary = result.summary()
     if found is not None:
         summary["map"] = found.summary()
@@ -110,10 +112,10 @@ def loop(design: Design, options: Options) -> None:
             kp, ki = ((float(a.values[0]), float(a.values[-1])) for a in found.axes)
             boundary = linear.gain_boundary(design, window=(kp, ki))
         picture = plots.loop_map(found, boundary=boundary, system=options.units)
-        _draw(picture, folder.path / "slope-margin.png")
+        draw(picture, folder.path / "slope-margin.png")
     if not options.json:
         printing.loop(result, options.units)
-    _conclude(folder, summary, options)
+    conclude(folder, summary, options)
 
 
 def _loop_map(design: Design, bar: Progress) -> LoopMap | None:
@@ -149,18 +151,16 @@ def cycle(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store
 
     folder = store.claim("cycle", design, options.out)
-    if _shown_again(
-        folder, options, lambda: printing.cycle(store.open(folder.path), options.units)
-    ):
+    if shown_again(folder, options, lambda: printing.cycle(store.open(folder.path), options.units)):
         return
-    with _running(folder), console.progress() as bar:
+    with running(folder), console.progress() as bar:
         bar.begin("following the motion", 1)
         result = drillctl.limit_cycle(design)
     store.write_data(result, folder.path)
-    _draw(plots.limit_cycle(result), folder.path / "limit-cycle.png")
+    draw(plots.limit_cycle(result), folder.path / "limit-cycle.png")
     if not options.json:
         printing.cycle(result, options.units)
-    _conclude(folder, result.summary(), options)
+    conclude(folder, result.summary(), options)
 
 
 def regions(design: Design, options: Options) -> None:
@@ -168,18 +168,18 @@ def regions(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("regions", design, options.out)
-    if _shown_again(folder, options, lambda: printing.regions(store.open(folder.path))):
+    if shown_again(folder, options, lambda: printing.regions(store.open(folder.path))):
         return
-    with _running(folder), console.progress() as bar:
+    with running(folder), console.progress() as bar:
         if len(design.tables.map.axes) != 2:
             count = len(design.tables.map.axes)
             raise InputError(f"regions are shown over 2 parameters, got {count}", "map.axes")
         result = studies.three_regions(design, progress=bar)
     store.write_data(result, folder.path)
-    _draw(plots.three_regions(result, system=options.units), folder.path / "three-regions.png")
+    draw(plots.three_regions(result, system=options.units), folder.path / "three-regions.png")
     if not options.json:
         printing.regions(result)
-    _conclude(folder, result.summary(), options)
+    conclude(folder, result.summary(), options)
 
 
 def regularisation(design: Design, options: Options) -> None:
@@ -187,15 +187,15 @@ def regularisation(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("regularisation", design, options.out)
-    if _shown_again(folder, options, lambda: printing.regularisation(store.open(folder.path))):
+    if shown_again(folder, options, lambda: printing.regularisation(store.open(folder.path))):
         return
-    with _running(folder), console.progress() as bar:
+    with running(folder), console.progress() as bar:
         result = studies.regularisation(design, progress=bar)
     store.write_data(result, folder.path)
-    _draw(plots.regularisation(result), folder.path / "regularisation.png")
+    draw(plots.regularisation(result), folder.path / "regularisation.png")
     if not options.json:
         printing.regularisation(result)
-    _conclude(folder, result.summary(), options)
+    conclude(folder, result.summary(), options)
 
 
 def delay(design: Design, options: Options) -> None:
@@ -203,18 +203,18 @@ def delay(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("delay", design, options.out)
-    if _shown_again(
+    if shown_again(
         folder, options, lambda: printing.weight_delay(store.open(folder.path), options.units)
     ):
         return
-    with _running(folder), console.progress() as bar:
+    with running(folder), console.progress() as bar:
         result = studies.weight_delay(design, progress=bar)
     store.write_data(result, folder.path)
     studies.write_weight_delay(result, folder.path)
-    _draw(plots.weight_delay(result, system=options.units), folder.path / "weight-delay.png")
+    draw(plots.weight_delay(result, system=options.units), folder.path / "weight-delay.png")
     if not options.json:
         printing.weight_delay(result, options.units)
-    _conclude(folder, result.summary(), options)
+    conclude(folder, result.summary(), options)
 
 
 def compare(design: Design, options: Options) -> None:
@@ -223,29 +223,29 @@ def compare(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("compare", design, options.out)
-    if _shown_again(
+    if shown_again(
         folder, options, lambda: printing.comparison(store.open(folder.path), options.units)
     ):
         return
-    with _running(folder), console.progress() as bar:
+    with running(folder), console.progress() as bar:
         result = drillctl.compare(design, progress=bar)
     store.write_data(result, folder.path)
     studies.write_comparison(result, folder.path)
-    _draw(plots.j1_distributions(result), folder.path / "distributions.png")
+    draw(plots.j1_distributions(result), folder.path / "distributions.png")
     picture = plots.j1_against_weight(result, system=options.units)
-    _draw(picture, folder.path / "weight.png")
+    draw(picture, folder.path / "weight.png")
     picture = plots.compared_responses(result, system=options.units)
-    _draw(picture, folder.path / "responses.png")
+    draw(picture, folder.path / "responses.png")
     if any(case.nominal.map is not None for case in result.cases):
         picture = plots.compared_regions(result, system=options.units)
-        _draw(picture, folder.path / "regions.png")
+        draw(picture, folder.path / "regions.png")
     if len(result.cases) > 1:
-        _draw(plots.paired_differences(result), folder.path / "differences.png")
+        draw(plots.paired_differences(result), folder.path / "differences.png")
     else:
         console.note("one case only: give others in compare.cases to compare it with")
     if not options.json:
         printing.comparison(result, options.units)
-    _conclude(folder, result.summary(), options)
+    conclude(folder, result.summary(), options)
 
 
 def simulate(design: Design, options: Options) -> None:
@@ -254,22 +254,22 @@ def simulate(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store
 
     folder = store.claim("simulate", design, options.out)
-    if _shown_again(
+    if shown_again(
         folder, options, lambda: printing.simulation(store.open(folder.path), options.units)
     ):
         return
-    with _running(folder), console.progress() as bar:
+    with running(folder), console.progress() as bar:
         bar.begin("simulating", 1)
         result = drillctl.simulate(design)
     store.write_data(result, folder.path)
-    _draw(plots.time_response(result), folder.path / "time-response.png")
+    draw(plots.time_response(result), folder.path / "time-response.png")
     summary = result.summary()
     share = result.share_of_yield
     if share is not None:
         summary["share_of_torsional_yield"] = share
     if not options.json:
         printing.simulation(result, options.units)
-    _conclude(folder, summary, options)
+    conclude(folder, summary, options)
 
 
 def stability_map(design: Design, options: Options) -> None:
@@ -277,26 +277,24 @@ def stability_map(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("map", design, options.out)
-    if _shown_again(
-        folder, options, lambda: printing.sweep(store.open(folder.path), options.units)
-    ):
+    if shown_again(folder, options, lambda: printing.sweep(store.open(folder.path), options.units)):
         return
-    with _running(folder), console.progress() as bar:
+    with running(folder), console.progress() as bar:
         result = studies.sweep(design, progress=bar, blocks=folder.blocks())
     if result.minimum is None:
         console.note("warning: no cell gives a finite answer; see the statuses")
     store.write_data(result, folder.path)
     studies.write_tables(result, folder.path)
     if len(result.axes) == 2:
-        _draw(plots.stability_map(result, system=options.units), folder.path / "map.png")
+        draw(plots.stability_map(result, system=options.units), folder.path / "map.png")
         runs = studies.responses(result)
         paths = [axis.path for axis in result.axes]
-        _draw(plots.time_response(runs, paths=paths), folder.path / "responses.png")
+        draw(plots.time_response(runs, paths=paths), folder.path / "responses.png")
     elif len(result.axes) == 1:
-        _draw(plots.sweep_line(result, system=options.units), folder.path / "map.png")
+        draw(plots.sweep_line(result, system=options.units), folder.path / "map.png")
     summary = result.summary()
     if not options.json:
         printing.sweep(result, options.units)
     if result.audit.verdict == "look":
         console.note("audit: look: the engines differ by more than 1 % in J1 in some cell")
-    _conclude(folder, summary, options)
+    conclude(folder, summary, options)

@@ -52,7 +52,8 @@ class Best:
         95 % interval of the value in that cell, which was chosen on the same realizations;
         None for an end that is not known.
     alike : ndarray of bool, shape (cells,), or None
-        Cells that cannot be told apart from it, itself included; None if lanes were stopped.
+        Cells that cannot be told apart from it, itself included; None if lanes were stopped or
+        realizations are too few to say.
     """
 
     name: str
@@ -144,7 +145,7 @@ def best(objective: Objective, j1: Array, censored: Mask, scatter: Scatter, seed
         raise InputError(NEEDS_FULL, objective.name)
     cell = _chosen(known, j1)
     alike = None
-    if not censored.any():
+    if not censored.any() and objective.enough(len(j1)):
         alike = _alike(objective, j1, found.values, cell, scatter)
     low, high = _interval(objective, j1[:, cell], censored[:, cell], scatter, seed)
     value = float(known[cell])
@@ -190,7 +191,7 @@ def _interval(
     if scatter.independent and isinstance(objective, Quantile):
         bound = float(np.where(censored, j1, np.inf).min())
         return quantile_interval(np.sort(j1), objective.probability, bound)
-    if censored.any():
+    if censored.any() or not objective.enough(len(j1)):
         return None, None
     column = j1[:, None]
     ordered = np.sort(column, axis=0)

@@ -1,9 +1,10 @@
 """Blocks of realizations on dask.distributed: many machines, workers that come, go and die.
 
 The job, with the strings that were prepared once, goes out with every block, some tens of kB;
-what comes back is J1 and status. Nothing that only a worker holds is needed by another. The scheduler gives the blocks of a worker that died to others. What
-a block holds follows from its realizations alone, so that it does not matter who computed it, as
-long as all processors are of one type.
+what comes back is J1 and status. Nothing that only a worker holds is needed by another. The
+scheduler gives the blocks of a worker that died to others. What a block holds follows from its
+realizations alone, so that it does not matter who computed it, as long as all processors are of
+one type.
 """
 
 from __future__ import annotations

@@ -85,12 +85,18 @@ def maps(result: Uncertainty) -> dict[str, Any]:
     }
     found |= {name: (["level", *paths], np.stack(rows), {}) for name, rows in columns.items()}
     return found | {
-        f"j1_{name}": (paths, values, {"units": "s"}) for name, values in _known(result).items()
+        f"j1_{name}": (paths, values, {"units": "s"}) for name, values in known(result).items()
     }
 
 
-def _known(result: Uncertainty) -> dict[str, Array]:
-    """Mean, 95 % quantile and tail mean in every cell; NaN where stopped lanes enter."""
+def known(result: Uncertainty) -> dict[str, Array]:
+    """Mean, 95 % quantile and tail mean in every cell (s); NaN where stopped lanes enter.
+
+    Parameters
+    ----------
+    result : Uncertainty
+        To be labelled.
+    """
     flat = (len(result.status), -1)
     j1 = result.j1.reshape(flat)[result.possible]
     censored = result.censored.reshape(flat)[result.possible]

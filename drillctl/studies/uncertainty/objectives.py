@@ -18,6 +18,10 @@ from drillctl.studies.uncertainty.probability import needed
 Array = NDArray[np.float64]
 
 
+FEWEST_BEYOND = 10.0 - 1e-9
+"""Realizations that are to be expected beyond a quantile for its error to be told from them."""
+
+
 class Objective(Protocol):
     """A functional of the distribution of J1."""
 
@@ -32,6 +36,10 @@ class Objective(Protocol):
 
     def influence(self, j1: Array, ordered: Array) -> Array:
         """Influence of every realization, shape (realizations, cells); its mean is about 0."""
+        ...
+
+    def enough(self, count: int) -> bool:
+        """Whether so many realizations tell an error by way of the influence function."""
         ...
 
 
@@ -49,6 +57,10 @@ class Mean(NamedTuple):
         """Deviations from the mean."""
         deviations: Array = j1 - ordered.mean(axis=0)
         return deviations
+
+    def enough(self, count: int) -> bool:
+        """Two have a scatter."""
+        return count > 1
 
 
 class Quantile(NamedTuple):
@@ -81,6 +93,10 @@ class Quantile(NamedTuple):
         influence: Array = (p - (j1 <= self.values(ordered))) * sparsity
         return influence
 
+    def enough(self, count: int) -> bool:
+        """Some must be expected beyond the quantile."""
+        return count * (1.0 - self.probability) >= FEWEST_BEYOND
+
 
 class TailMean(NamedTuple):
     """The mean of J1 (s) over the worst realizations: conditional value at risk.
@@ -109,6 +125,10 @@ class TailMean(NamedTuple):
         influence: Array = each - self.values(ordered)
         return influence
 
+    def enough(self, count: int) -> bool:
+        """Some must be expected in the tail."""
+        return count * (1.0 - self.probability) >= FEWEST_BEYOND
+
 
 class Exceedance(NamedTuple):
     """The probability that J1 is above a level (s)."""
@@ -129,3 +149,7 @@ class Exceedance(NamedTuple):
         """Whether above, less how often."""
         influence: Array = (j1 > self.level) - self.values(ordered)
         return influence
+
+    def enough(self, count: int) -> bool:
+        """Two have a scatter."""
+        return count > 1

@@ -254,7 +254,7 @@ class _Study:
         errors, broken = [], 0
         for row in np.flatnonzero(~found.possible):
             try:
-                first.replace(_of(found.drawn, row))
+                first.replace(_of(found.drawn, int(row)))
                 broken += 1
             except InputError as error:
                 errors.append(error)
