@@ -24,14 +24,16 @@ def uncertainty(result: Uncertainty, system: units.System) -> None:
         Units of the parameters.
     """
     _areas(result)
+    for one in result.slices().values():
+        _areas(one)
     _best(result, system)
     if result.sensitivity is not None:
         _indices(result)
-    for one in result.looks:
-        low, high = one.interval
+    for seen in result.looks:
+        low, high = seen.interval
         line(
-            f"look at {one.realizations} realizations: area {one.area:.2%} ({low:.2%} to "
-            f"{high:.2%}, {one.confidence:.2%} interval)"
+            f"look at {seen.realizations} realizations: area {seen.area:.2%} ({low:.2%} to "
+            f"{high:.2%}, {seen.confidence:.2%} interval)"
         )
     for failure in result.failures:
         line(

@@ -124,10 +124,12 @@ def _tables_and_pictures(result: Uncertainty, path: Path, system: units.System) 
     studies.write_uncertainty_tables(result, path)
     draw(plots.area_convergence(result), path / "convergence.png")
     draw(plots.cell_distributions(result, system=system), path / "distributions.png")
-    if len(result.axes) == 2:
-        draw(plots.uncertain_regions(result, system=system), path / "regions.png")
-        draw(plots.probability_map(result, system=system), path / "probability.png")
-        draw(plots.region_error(result, system=system), path / "sampling-error.png")
+    flat = {"": result} if len(result.axes) == 2 else {}
+    flat |= {f"-{k}": one for k, one in enumerate(result.slices().values(), start=1)}
+    for ending, one in flat.items():
+        draw(plots.uncertain_regions(one, system=system), path / f"regions{ending}.png")
+        draw(plots.probability_map(one, system=system), path / f"probability{ending}.png")
+        draw(plots.region_error(one, system=system), path / f"sampling-error{ending}.png")
     if result.sensitivity is not None:
         draw(plots.sensitivity_bars(result), path / "sensitivity.png")
     (path / "interim.png").unlink(missing_ok=True)

@@ -148,7 +148,7 @@ def sensitivity_bars(result: Uncertainty, ax: Sequence[Axes] | None = None) -> F
     columns = min(len(shown), 2)
     rows = -(-len(shown) // columns)
     if ax is None:
-        height = (0.32 * len(found.parameters) + 1.3) * rows + 0.6
+        height = (0.24 * len(found.parameters) + 1.0) * rows + 0.8
         figure, panels = grid_or_new(None, rows, columns, 4.6 * columns + 1.6, height)
     else:
         figure, panels = grid_or_new(ax, 1, len(shown), 0.0, 0.0)
@@ -156,16 +156,28 @@ def sensitivity_bars(result: Uncertainty, ax: Sequence[Axes] | None = None) -> F
         spare.remove()
     places = np.arange(len(found.parameters))
     for number, (panel, one) in enumerate(zip(panels, shown, strict=False)):
-        for shift, key, colour in ((0.19, "first", COLOURS[0]), (-0.19, "total", COLOURS[1])):
+        for shift, key, colour in ((-0.19, "first", COLOURS[0]), (0.19, "total", COLOURS[1])):
             panel.barh(
                 places + shift, getattr(one, key), 0.36, xerr=getattr(one, f"{key}_error"),
-                color=colour, label=key, error_kw={"linewidth": 1.0, "capsize": 2},
+                color=colour, label=f"{key} index", error_kw={"linewidth": 1.0, "capsize": 2},
             )  # fmt: skip
         left = ax is not None or number % columns == 0
-        panel.set_yticks(places, found.parameters if left else [""] * len(places))
+        names = [path.removeprefix("drillstring.sections.") for path in found.parameters]
+        panel.set_yticks(places, names if left else [""] * len(places))
         panel.invert_yaxis()
-        panel.set_xlim(min(0.0, panel.get_xlim()[0]), max(1.0, panel.get_xlim()[1]))
-        dress(panel, "Sobol index", "", one.of)
-    panels[0].legend(fontsize=SMALL, frameon=False, loc="lower right")
-    figure.supxlabel(f"{found.samples} points of Saltelli's design; 95 % intervals", fontsize=SMALL)
+        panel.set_xlim(-0.25, 1.1)  # what reaches further is error
+        dress(panel, "Sobol index", "", _short(one.of))
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False,
+        title=f"{found.samples} points of Saltelli's design; bars: 95 % interval of the error",
+        title_fontsize=SMALL,
+    )  # fmt: skip
     return figure
+
+
+def _short(of: str) -> str:
+    """What is explained, by the usual names and without the units of gains."""
+    for path, name in NAMES.items():
+        of = of.replace(path, name)
+    return of.replace(" N*m*s/rad", "").replace(" N*m/rad", "")

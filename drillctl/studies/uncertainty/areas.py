@@ -3,6 +3,12 @@
 The area of a region of given probability is the share of the cells whose probability is at
 least that. Its sampling error is that of a count of cells which depend on the same realizations:
 told by a bootstrap over realizations, or by leaving out replicates one by one.
+
+Neither knows of what happens in fewer than some tens of realizations: by itself the bootstrap of
+a 95 % region held its area in 61 % of the cases at 16 realizations and in 88 % at 128, on the
+paper's map. The other interval is that of the cells whose own intervals, each by itself, lie
+above the probability or reach it: as good as the bootstrap where that is good, and right at few
+realizations too. What is told is the hull of both.
 """
 
 from __future__ import annotations
@@ -72,7 +78,20 @@ def region_areas(
         intervals = _bootstrap(j1, maps, probability, seed, confidence)
     else:
         intervals = [_jackknife(one, probability, scatter, confidence) for one in maps]
-    return [Area(value, found) for value, found in zip(values, intervals, strict=True)]
+    return [
+        Area(value, _hull(value, found, _of_cells(one, probability, confidence)))
+        for value, found, one in zip(values, intervals, maps, strict=True)
+    ]
+
+
+def _of_cells(found: ProbabilityMap, probability: float, confidence: float) -> Interval:
+    """Shares of the cells whose own interval lies above a probability, and reaches it."""
+    low, high = found.interval_at(confidence)
+    return float((low >= probability).mean()), float((high >= probability).mean())
+
+
+def _hull(value: float, *intervals: Interval) -> Interval:
+    return min(value, *(low for low, _ in intervals)), max(value, *(high for _, high in intervals))
 
 
 def _bootstrap(

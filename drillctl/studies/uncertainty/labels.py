@@ -150,6 +150,13 @@ def summary(result: Uncertainty) -> dict[str, Any]:
         "seconds": result.seconds,
         "total_seconds": result.total_seconds,
     }  # fmt: skip
+    if len(result.axes) == 3:
+        told["slices"] = {
+            result.axes[2].path: [
+                {"value": value, "levels": {f"{x:g}": _level(one, x) for x in one.levels}}
+                for value, one in result.slices().items()
+            ]
+        }
     if result.sensitivity is not None:
         told["sensitivity"] = result.sensitivity.summary()
     return told

@@ -81,14 +81,15 @@ class ProbabilityMap:
     @property
     def interval(self) -> tuple[Array, Array]:
         """95 % interval of each cell's probability, by itself."""
-        return self._interval(CONFIDENCE)
+        return self.interval_at(CONFIDENCE)
 
     @property
     def simultaneous(self) -> tuple[Array, Array]:
         """Intervals that hold the probabilities of all cells at once, with 95 % (Bonferroni)."""
-        return self._interval(1.0 - (1.0 - CONFIDENCE) / self.counts.size)
+        return self.interval_at(1.0 - (1.0 - CONFIDENCE) / self.counts.size)
 
-    def _interval(self, confidence: float) -> tuple[Array, Array]:
+    def interval_at(self, confidence: float) -> tuple[Array, Array]:
+        """Interval of each cell's probability, by itself, of any confidence."""
         exact = share_intervals(self.counts, self.total, confidence)
         replicates = len(self.by_replicate)
         if replicates == 1:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl import units
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.provenance import provenance
@@ -247,6 +248,33 @@ class Uncertainty:
         if len(self.axes) != 2:
             raise InputError("outlines are of maps over 2 parameters", "contours")
         return outline(self.j1[realization], self.axes, level)
+
+    def slices(self) -> dict[float, Uncertainty]:
+        """The map over the first two of three parameters, by value (SI) of the third.
+
+        Empty for a map over another number of parameters.
+        """
+        if len(self.axes) != 3:
+            return {}
+        last = self.axes[2]
+        name = last.path.rpartition(".")[2].replace("_", " ")
+        title = self.design.tables.title or self.design.name
+        found = {}
+        for k, value in enumerate(last.values):
+            shown, unit = units.displayed(float(value), last.unit, "si")
+            values = {last.path: units.SI(value), "title": f"{title}, {name} {shown:g} {unit}"}
+            found[float(value)] = replace(
+                self,
+                design=self.design.replace(values),
+                axes=self.axes[:2],
+                measures={key: v[..., k] for key, v in self.measures.items()},
+                status=self.status[..., k],
+                nominal=self.nominal[..., k],
+                audit=Audit(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)),
+                looks=(),
+                sensitivity=None,
+            )
+        return found
 
     def at(self, cell: int) -> dict[str, float]:
         """Parameters (SI) of a cell of the flattened map."""

@@ -313,7 +313,6 @@ def _cells(design: Design, axes: tuple[Axis, ...], table: SensitivityTable) -> d
             place.append(int(np.argmin(np.abs(a.values - (middle if value is None else value)))))
         cell = int(np.ravel_multi_index(place, shape_of(axes)))
         found[cell] = ", ".join(
-            f"{a.path} = {a.values[k]:g} {a.unit}".rstrip()
-            for a, k in zip(axes, place, strict=True)
+            f"{a.path} {a.values[k]:g} {a.unit}".rstrip() for a, k in zip(axes, place, strict=True)
         )
     return found
