@@ -356,7 +356,7 @@ def _refuse_ends(
         raise InputError("holds nothing to draw from", "samples")
     if table.distribution == "normal":
         assert mean is not None
-        inside = (low is None or low < mean) and (high is None or mean < high)
+        inside = (low is None or low <= mean) and (high is None or mean <= high)
         if not inside or target.refusal(mean):
             problem = target.refusal(mean) or "it must lie between min and max"
             raise InputError(f"{mean:g} {target.si_unit}".strip() + f": {problem}", "mean")

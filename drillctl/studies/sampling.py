@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 
 _PER_COUNTER = 4
 """Numbers that Philox makes of one state of its counter."""
-_BITS = 52
-"""Of a Sobol point: as many as Monte Carlo draws have."""
+_BITS = 30
+"""Of a Sobol point; of more, SciPy does not skip any."""
 _EDGE = 2.0**-53
 """Nearest to 0 and to 1 that a number comes, where quantiles are infinite."""
 

@@ -2,7 +2,8 @@
 
 All cells saw the same realizations, so cells are compared by differences, realization by
 realization. A cell is told apart from the best one when its difference is above zero beyond the
-sampling error, corrected for the number of cells (Bonferroni).
+sampling error, corrected for the number of cells (Bonferroni): the truly best cell is among those
+that are left with at least 95 % (Gupta, Technometrics 7 (1965) 225-245).
 
 A lane that was stopped early is known to be worse than it says. An objective is still certain
 where no such lane enters it, and the best cell is still certain where every other cell is worse
