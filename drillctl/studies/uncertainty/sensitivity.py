@@ -114,6 +114,21 @@ def read_sensitivity(told: dict[str, Any]) -> Sensitivity:
     return Sensitivity(parameters, told["samples"], told["trajectories"], tuple(found))
 
 
+def refuse_correlated(design: Design) -> None:
+    """Refuse (`InputError`) correlated parameters, of which Sobol indices say nothing.
+
+    Parameters
+    ----------
+    design : Design
+        With what is uncertain.
+    """
+    if design.tables.uncertainty.correlations:
+        raise InputError(
+            "Sobol indices are of independent parameters: leave correlations or sensitivity out",
+            "uncertainty.sensitivity",
+        )
+
+
 def points(design: Design, samples: int, seed: int) -> dict[str, Array]:
     """Realizations of Saltelli's design, in the order in which SALib takes their results.
 
@@ -138,11 +153,7 @@ def points(design: Design, samples: int, seed: int) -> dict[str, Array]:
     """
     from SALib.sample import sobol
 
-    if design.tables.uncertainty.correlations:
-        raise InputError(
-            "Sobol indices are of independent parameters: leave correlations or sensitivity out",
-            "uncertainty.sensitivity",
-        )
+    refuse_correlated(design)
     found = uncertain_parameters(design)
     table = sobol.sample(_problem(tuple(p.path for p in found)), samples,
                          calc_second_order=False, scramble=True, seed=seed)  # fmt: skip

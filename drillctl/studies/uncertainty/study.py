@@ -140,9 +140,9 @@ class _Study:
         self.shelf, self.workers, self.interim = shelf, workers, interim
         self.table = design.tables.uncertainty
         self.levels = design.tables.map.levels
+        refuse_impossible(design, axes)
         self.measures = _kept(self.table.keep)
         self.draw = drawing(design, self.table.seed)
-        refuse_drawn_axes(design, axes)
         cells = int(np.prod(shape_of(axes)))
         refuse_more_bytes(
             COPIES * 8 * self.table.realizations * cells * len(self.measures),
@@ -268,8 +268,8 @@ def _of(drawn: dict[str, Array], row: int) -> dict[str, units.SI]:
     return {path: units.SI(column[row]) for path, column in drawn.items()}
 
 
-def refuse_drawn_axes(design: Design, axes: tuple[Axis, ...]) -> None:
-    """Refuse (`InputError`) a parameter that is uncertain and an axis of the map as well.
+def refuse_impossible(design: Design, axes: tuple[Axis, ...]) -> None:
+    """Refuse (`InputError`) what a study under uncertainty cannot be asked for.
 
     Parameters
     ----------
@@ -278,6 +278,7 @@ def refuse_drawn_axes(design: Design, axes: tuple[Axis, ...]) -> None:
     axes : tuple of Axis
         Of the map.
     """
+    table = design.tables.uncertainty
     for a in axes:
         if a.path in design.tables.uncertain:
             where = f"uncertain.{a.path}"
@@ -285,6 +286,13 @@ def refuse_drawn_axes(design: Design, axes: tuple[Axis, ...]) -> None:
                 "is an axis of the map, which gives it its values, and cannot be drawn",
                 f"{design.origin}: {where}" if design.origin else where,
             )
+    drawing(design, table.seed)
+    _kept(table.keep)
+    if table.until is not None:
+        level_of(table.until, design.tables.map.levels)
+    if table.sensitivity is not None:
+        _cells(design, axes, table.sensitivity)
+        indices.refuse_correlated(design)
 
 
 def _kept(names: tuple[str, ...]) -> tuple[str, ...]:
