@@ -381,16 +381,18 @@ def uncertainty(
     debug: Debug = False,
 ) -> None:
     """A map at thousands of draws: regions by probability, intervals, best cells, indices."""
-    from drillctl import verbs_uncertainty as verbs
+    from drillctl import verbs
+    from drillctl.uncertain_runs import How
 
     _use(threads)
-    found = _with_draws(_with_axes(_load(design, sets), axis), realizations, seed)
+    found = _with_axes(_load(design, sets), axis)
     given = {
+        "uncertainty.realizations": realizations, "uncertainty.seed": seed,
         "uncertainty.sampling": sampling, "uncertainty.full": full,
         "uncertainty.sensitivity.samples": sensitivity, "map.audit_cells": audit,
     }  # fmt: skip
     asked = {path: value for path, value in given.items() if value is not None}
-    how = verbs.How(resume, allow_mixed, scheduler, interim)
+    how = How(resume, allow_mixed, scheduler, interim)
     verbs.uncertainty(
         found.replace(asked) if asked else found, how, Options(out, json, units, verbose)
     )

@@ -237,7 +237,8 @@ def _same_run(path: Path, about: dict[str, Any], same: Design, allow_mixed: bool
         if came_from != drillctl.__version__:
             reason = f"version {came_from}, this is {drillctl.__version__}"
         else:
-            reason += difference(path / "design.toml", same)
+            grown = ("uncertainty.realizations",) if "count" in about else ()
+            reason += difference(path / "design.toml", same, grown)
         raise InputError(f"holds a run of {reason}; give another folder", where)
     more = about.get("count", 0) - held.get("count", 0)
     if held.get("finished") and more < 0:

@@ -12,9 +12,11 @@ from drillctl.errors import shown
 
 MOST = 3
 """Keys that are named at most."""
+LONGEST = 57
+"""Length of a list that is told in full (characters)."""
 
 
-def difference(path: Path, design: Design) -> str:
+def difference(path: Path, design: Design, grown: tuple[str, ...] = ()) -> str:
     """The keys in which a design differs from a resolved one on disk, for a message.
 
     Parameters
@@ -23,6 +25,8 @@ def difference(path: Path, design: Design) -> str:
         Resolved design as TOML.
     design : Design
         To be told from it.
+    grown : tuple of str
+        Keys that may differ.
 
     Returns
     -------
@@ -36,7 +40,7 @@ def difference(path: Path, design: Design) -> str:
     here = _leaves(to_tree(design.tables))
     keys = [
         key for key in dict.fromkeys((*held, *here))
-        if held.get(key) != here.get(key) and key != "uncertainty.realizations"
+        if held.get(key) != here.get(key) and key not in grown
     ]  # fmt: skip
     if not keys:
         return ""
@@ -46,7 +50,13 @@ def difference(path: Path, design: Design) -> str:
 
 
 def _told(leaves: dict[str, Any], key: str) -> str:
-    return shown(leaves[key]) if key in leaves else "not given"
+    if key not in leaves:
+        return "not given"
+    value = leaves[key]
+    if isinstance(value, list):
+        text = ", ".join(map(str, value))
+        return f"[{text}]" if len(text) <= LONGEST else f"[{text[:LONGEST]}...]"
+    return shown(value)
 
 
 def _leaves(tree: Any, prefix: str = "") -> dict[str, Any]:

@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from drillctl.progress import Progress
     from drillctl.store import RunFolder
     from drillctl.studies import LoopMap
+    from drillctl.uncertain_runs import How
 
 DPI = 150
 
 
-def draw(figure: Figure, path: Path) -> None:
-    """Write a figure."""
+def _draw(figure: Figure, path: Path) -> None:
     figure.savefig(path, dpi=DPI)
 
 
-def shown_again(folder: RunFolder, options: Options, show: Callable[[], None]) -> bool:
+def _shown_again(folder: RunFolder, options: Options, show: Callable[[], None]) -> bool:
     """Whether the folder held the finished run, whose summary is then shown once more."""
     if not folder.finished:
         return False
@@ -41,7 +41,7 @@ def shown_again(folder: RunFolder, options: Options, show: Callable[[], None]) -
 
 
 @contextmanager
-def running(folder: RunFolder) -> Iterator[None]:
+def _running(folder: RunFolder) -> Iterator[None]:
     """A run in its folder: an impossible one leaves none, an interrupted map can go on."""
     try:
         yield
@@ -56,8 +56,7 @@ def running(folder: RunFolder) -> Iterator[None]:
         raise
 
 
-def conclude(folder: RunFolder, summary: dict[str, Any], options: Options) -> None:
-    """Finish a folder and say where it is."""
+def _conclude(folder: RunFolder, summary: dict[str, Any], options: Options) -> None:
     folder.finish(summary)
     if options.json:
         console.emit(summary)
@@ -71,19 +70,19 @@ def modes(design: Design, count: int, options: Options) -> None:
     from drillctl import linear, plots, printing, store
 
     folder = store.claim("modes", design, options.out, count=count)
-    if shown_again(folder, options, lambda: printing.modes(folder.summary())):
+    if _shown_again(folder, options, lambda: printing.modes(folder.summary())):
         return
-    with running(folder):
+    with _running(folder):
         result = linear.modes(design, count)
     summary = result.summary()
     store.write_data(result, folder.path)
-    draw(plots.mode_shapes(result), folder.path / "modes.png")
+    _draw(plots.mode_shapes(result), folder.path / "modes.png")
     string, frequencies = design.string, linear.telling_frequencies(design.string)
-    draw(plots.bode(linear.frequency_response(string, frequencies)), folder.path / "bode.png")
-    draw(plots.friction_curves(design), folder.path / "friction.png")
+    _draw(plots.bode(linear.frequency_response(string, frequencies)), folder.path / "bode.png")
+    _draw(plots.friction_curves(design), folder.path / "friction.png")
     if not options.json:
         printing.modes(summary)
-    conclude(folder, summary, options)
+    _conclude(folder, summary, options)
 
 
 def loop(design: Design, options: Options) -> None:
@@ -93,16 +92,16 @@ def loop(design: Design, options: Options) -> None:
     from drillctl.loop_pictures import loop_figures, over_gains
 
     folder = store.claim("loop", design, options.out)
-    if shown_again(folder, options, lambda: printing.loop(store.open(folder.path), options.units)):
+    if _shown_again(folder, options, lambda: printing.loop(store.open(folder.path), options.units)):
         return
-    with running(folder), console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         result = linear.loop(design)
         found = _loop_map(design, bar)
     store.write_data(result, folder.path)
     for name in ("model.mat", "model.npz"):
         write_matrices(design, folder.path / name)
     for name, figure in loop_figures(result).items():
-        draw(figure, folder.path / f"{name}.png")
+        _draw(figure, folder.path / f"{name}.png")
     summary = result.summary()
     if found is not None:
         summary["map"] = found.summary()
@@ -112,10 +111,10 @@ def loop(design: Design, options: Options) -> None:
             kp, ki = ((float(a.values[0]), float(a.values[-1])) for a in found.axes)
             boundary = linear.gain_boundary(design, window=(kp, ki))
         picture = plots.loop_map(found, boundary=boundary, system=options.units)
-        draw(picture, folder.path / "slope-margin.png")
+        _draw(picture, folder.path / "slope-margin.png")
     if not options.json:
         printing.loop(result, options.units)
-    conclude(folder, summary, options)
+    _conclude(folder, summary, options)
 
 
 def _loop_map(design: Design, bar: Progress) -> LoopMap | None:
@@ -151,16 +150,18 @@ def cycle(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store
 
     folder = store.claim("cycle", design, options.out)
-    if shown_again(folder, options, lambda: printing.cycle(store.open(folder.path), options.units)):
+    if _shown_again(
+        folder, options, lambda: printing.cycle(store.open(folder.path), options.units)
+    ):
         return
-    with running(folder), console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         bar.begin("following the motion", 1)
         result = drillctl.limit_cycle(design)
     store.write_data(result, folder.path)
-    draw(plots.limit_cycle(result), folder.path / "limit-cycle.png")
+    _draw(plots.limit_cycle(result), folder.path / "limit-cycle.png")
     if not options.json:
         printing.cycle(result, options.units)
-    conclude(folder, result.summary(), options)
+    _conclude(folder, result.summary(), options)
 
 
 def regions(design: Design, options: Options) -> None:
@@ -168,18 +169,18 @@ def regions(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("regions", design, options.out)
-    if shown_again(folder, options, lambda: printing.regions(store.open(folder.path))):
+    if _shown_again(folder, options, lambda: printing.regions(store.open(folder.path))):
         return
-    with running(folder), console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         if len(design.tables.map.axes) != 2:
             count = len(design.tables.map.axes)
             raise InputError(f"regions are shown over 2 parameters, got {count}", "map.axes")
         result = studies.three_regions(design, progress=bar)
     store.write_data(result, folder.path)
-    draw(plots.three_regions(result, system=options.units), folder.path / "three-regions.png")
+    _draw(plots.three_regions(result, system=options.units), folder.path / "three-regions.png")
     if not options.json:
         printing.regions(result)
-    conclude(folder, result.summary(), options)
+    _conclude(folder, result.summary(), options)
 
 
 def regularisation(design: Design, options: Options) -> None:
@@ -187,15 +188,15 @@ def regularisation(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("regularisation", design, options.out)
-    if shown_again(folder, options, lambda: printing.regularisation(store.open(folder.path))):
+    if _shown_again(folder, options, lambda: printing.regularisation(store.open(folder.path))):
         return
-    with running(folder), console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         result = studies.regularisation(design, progress=bar)
     store.write_data(result, folder.path)
-    draw(plots.regularisation(result), folder.path / "regularisation.png")
+    _draw(plots.regularisation(result), folder.path / "regularisation.png")
     if not options.json:
         printing.regularisation(result)
-    conclude(folder, result.summary(), options)
+    _conclude(folder, result.summary(), options)
 
 
 def delay(design: Design, options: Options) -> None:
@@ -203,18 +204,18 @@ def delay(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("delay", design, options.out)
-    if shown_again(
+    if _shown_again(
         folder, options, lambda: printing.weight_delay(store.open(folder.path), options.units)
     ):
         return
-    with running(folder), console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         result = studies.weight_delay(design, progress=bar)
     store.write_data(result, folder.path)
     studies.write_weight_delay(result, folder.path)
-    draw(plots.weight_delay(result, system=options.units), folder.path / "weight-delay.png")
+    _draw(plots.weight_delay(result, system=options.units), folder.path / "weight-delay.png")
     if not options.json:
         printing.weight_delay(result, options.units)
-    conclude(folder, result.summary(), options)
+    _conclude(folder, result.summary(), options)
 
 
 def compare(design: Design, options: Options) -> None:
@@ -223,29 +224,58 @@ def compare(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("compare", design, options.out)
-    if shown_again(
+    if _shown_again(
         folder, options, lambda: printing.comparison(store.open(folder.path), options.units)
     ):
         return
-    with running(folder), console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         result = drillctl.compare(design, progress=bar)
     store.write_data(result, folder.path)
     studies.write_comparison(result, folder.path)
-    draw(plots.j1_distributions(result), folder.path / "distributions.png")
+    _draw(plots.j1_distributions(result), folder.path / "distributions.png")
     picture = plots.j1_against_weight(result, system=options.units)
-    draw(picture, folder.path / "weight.png")
+    _draw(picture, folder.path / "weight.png")
     picture = plots.compared_responses(result, system=options.units)
-    draw(picture, folder.path / "responses.png")
+    _draw(picture, folder.path / "responses.png")
     if any(case.nominal.map is not None for case in result.cases):
         picture = plots.compared_regions(result, system=options.units)
-        draw(picture, folder.path / "regions.png")
+        _draw(picture, folder.path / "regions.png")
     if len(result.cases) > 1:
-        draw(plots.paired_differences(result), folder.path / "differences.png")
+        _draw(plots.paired_differences(result), folder.path / "differences.png")
     else:
         console.note("one case only: give others in compare.cases to compare it with")
     if not options.json:
         printing.comparison(result, options.units)
-    conclude(folder, result.summary(), options)
+    _conclude(folder, result.summary(), options)
+
+
+def uncertainty(design: Design, how: How, options: Options) -> None:
+    """Regions of a map under uncertainty, with pictures and tables."""
+    from drillctl import printing_uncertainty as printing
+    from drillctl import store, studies, uncertain_runs
+
+    if how.resume:
+        uncertain_runs.refuse_nothing_to_resume(options.out)
+    growing = store.growing_realizations(design)
+    folder = store.claim("uncertainty", design, options.out, growing, how.allow_mixed)
+    if _shown_again(
+        folder, options, lambda: printing.uncertainty(store.open(folder.path), options.units)
+    ):
+        return
+    with _running(folder), console.progress() as bar:
+        result = uncertain_runs.computed(design, how, folder, bar, options.units)
+    summary = result.summary()
+    store.write_data(result, folder.path)
+    studies.write_uncertainty_tables(result, folder.path)
+    for name, figure in uncertain_runs.pictures(result, options.units):
+        _draw(figure, folder.path / f"{name}.png")
+    for reason in {one["reason"] for one in summary["best"].values() if "reason" in one}:
+        console.note(f"note: best gains: {reason}")
+    if result.audit.verdict == "look":
+        console.note("audit: look: the engines differ by more than 1 % in J1 in some lane")
+    if not options.json:
+        printing.uncertainty(result, options.units)
+    _conclude(folder, summary, options)
 
 
 def simulate(design: Design, options: Options) -> None:
@@ -254,22 +284,22 @@ def simulate(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store
 
     folder = store.claim("simulate", design, options.out)
-    if shown_again(
+    if _shown_again(
         folder, options, lambda: printing.simulation(store.open(folder.path), options.units)
     ):
         return
-    with running(folder), console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         bar.begin("simulating", 1)
         result = drillctl.simulate(design)
     store.write_data(result, folder.path)
-    draw(plots.time_response(result), folder.path / "time-response.png")
+    _draw(plots.time_response(result), folder.path / "time-response.png")
     summary = result.summary()
     share = result.share_of_yield
     if share is not None:
         summary["share_of_torsional_yield"] = share
     if not options.json:
         printing.simulation(result, options.units)
-    conclude(folder, summary, options)
+    _conclude(folder, summary, options)
 
 
 def stability_map(design: Design, options: Options) -> None:
@@ -277,24 +307,26 @@ def stability_map(design: Design, options: Options) -> None:
     from drillctl import plots, printing, store, studies
 
     folder = store.claim("map", design, options.out)
-    if shown_again(folder, options, lambda: printing.sweep(store.open(folder.path), options.units)):
+    if _shown_again(
+        folder, options, lambda: printing.sweep(store.open(folder.path), options.units)
+    ):
         return
-    with running(folder), console.progress() as bar:
+    with _running(folder), console.progress() as bar:
         result = studies.sweep(design, progress=bar, blocks=folder.blocks())
     if result.minimum is None:
         console.note("warning: no cell gives a finite answer; see the statuses")
     store.write_data(result, folder.path)
     studies.write_tables(result, folder.path)
     if len(result.axes) == 2:
-        draw(plots.stability_map(result, system=options.units), folder.path / "map.png")
+        _draw(plots.stability_map(result, system=options.units), folder.path / "map.png")
         runs = studies.responses(result)
         paths = [axis.path for axis in result.axes]
-        draw(plots.time_response(runs, paths=paths), folder.path / "responses.png")
+        _draw(plots.time_response(runs, paths=paths), folder.path / "responses.png")
     elif len(result.axes) == 1:
-        draw(plots.sweep_line(result, system=options.units), folder.path / "map.png")
+        _draw(plots.sweep_line(result, system=options.units), folder.path / "map.png")
     summary = result.summary()
     if not options.json:
         printing.sweep(result, options.units)
     if result.audit.verdict == "look":
         console.note("audit: look: the engines differ by more than 1 % in J1 in some cell")
-    conclude(folder, summary, options)
+    _conclude(folder, summary, options)

@@ -113,6 +113,10 @@ def _refuse_more(error: BaseException, times: int) -> None:
     raise error
 
 
+ANSWER = 10.0
+"""How long a scheduler may take to answer (s)."""
+
+
 def connect(address: str) -> Client:
     """A client of a scheduler.
 
@@ -133,6 +137,6 @@ def connect(address: str) -> Client:
             'needs dask.distributed: pip install "drillctl[distributed]"', "--scheduler"
         ) from None
     try:
-        return Client(address, timeout="10s", set_as_default=False)
+        return Client(address, timeout=ANSWER, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"{address} does not answer: {error}", "--scheduler") from None

@@ -1,21 +1,20 @@
-"""What `drillctl uncertainty` does: claim or take up a folder, compute, save, draw, print."""
+"""How a run under uncertainty is carried out from the command line, and its pictures."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from drillctl import console
 from drillctl.errors import InputError
-from drillctl.verbs import DPI, conclude, draw, running, shown_again
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from matplotlib.figure import Figure
+
     from drillctl import units
-    from drillctl.cli import Options
     from drillctl.design import Design
     from drillctl.progress import Progress
     from drillctl.store import RunFolder
@@ -45,45 +44,38 @@ class How:
     interim: float | None
 
 
-def uncertainty(design: Design, how: How, options: Options) -> None:
-    """Regions of a map under uncertainty, with pictures and tables."""
-    from drillctl import printing_uncertainty, store
+def refuse_nothing_to_resume(out: Path | None) -> None:
+    """Refuse (`InputError`) to go on with a run that is not there.
 
-    if how.resume:
-        _refuse_nothing_to_resume(options.out)
-    folder = store.claim(
-        "uncertainty", design, options.out, store.growing_realizations(design), how.allow_mixed
-    )
-    if shown_again(
-        folder, options,
-        lambda: printing_uncertainty.uncertainty(store.open(folder.path), options.units),
-    ):  # fmt: skip
-        return
-    with running(folder), console.progress() as bar:
-        result = _computed(design, how, folder, bar, options.units)
-    summary = result.summary()
-    store.write_data(result, folder.path)
-    _tables_and_pictures(result, folder.path, options.units)
-    for lacking in (one for one in summary["best"].values() if "reason" in one):
-        console.note(f"note: {lacking['reason']}")
-        break
-    if result.audit.verdict == "look":
-        console.note("audit: look: the engines differ by more than 1 % in J1 in some lane")
-    if not options.json:
-        printing_uncertainty.uncertainty(result, options.units)
-    conclude(folder, summary, options)
-
-
-def _refuse_nothing_to_resume(out: Path | None) -> None:
+    Parameters
+    ----------
+    out : Path or None
+        Its folder, if one was given.
+    """
     if out is None:
         raise InputError("goes with --out, the folder of the run to go on with", "--resume")
     if not (out / "run.json").is_file():
         raise InputError(f"{out} holds no run to go on with", "--resume")
 
 
-def _computed(
+def computed(
     design: Design, how: How, folder: RunFolder, bar: Progress, system: units.System
 ) -> Uncertainty:
+    """The result of a run in its folder.
+
+    Parameters
+    ----------
+    design : Design
+        Of the run.
+    how : How
+        Threads or cluster, interim pictures.
+    folder : RunFolder
+        Where finished blocks are kept.
+    bar : Progress
+        Told of lanes.
+    system : {'si', 'field'}
+        Units of interim pictures.
+    """
     from drillctl import studies
     from drillctl.studies.uncertainty.cluster import Cluster, connect
 
@@ -110,26 +102,33 @@ class _Interim:
             return
         from drillctl import plots
 
-        part = self._folder / "interim.part.png"
-        if len(so_far().axes) == 2:
-            figure = plots.probability_map(so_far(), system=self._system)
-            figure.savefig(part, dpi=DPI)
+        result = so_far()
+        if len(result.axes) == 2:
+            part = self._folder / "interim.part.png"
+            plots.probability_map(result, system=self._system).savefig(part)
             part.replace(self._folder / "interim.png")
         self._next = time.monotonic() + self._every
 
 
-def _tables_and_pictures(result: Uncertainty, path: Path, system: units.System) -> None:
-    from drillctl import plots, studies
+def pictures(result: Uncertainty, system: units.System) -> Iterator[tuple[str, Figure]]:
+    """Pictures of a result, one after the other, each with its name.
 
-    studies.write_uncertainty_tables(result, path)
-    draw(plots.area_convergence(result), path / "convergence.png")
-    draw(plots.cell_distributions(result, system=system), path / "distributions.png")
+    Parameters
+    ----------
+    result : Uncertainty
+        Over any number of parameters; maps are drawn of two, and of slices of three.
+    system : {'si', 'field'}
+        Units of the axes.
+    """
+    from drillctl import plots
+
+    yield "convergence", plots.area_convergence(result)
+    yield "distributions", plots.cell_distributions(result, system=system)
     flat = {"": result} if len(result.axes) == 2 else {}
     flat |= {f"-{k}": one for k, one in enumerate(result.slices().values(), start=1)}
     for ending, one in flat.items():
-        draw(plots.uncertain_regions(one, system=system), path / f"regions{ending}.png")
-        draw(plots.probability_map(one, system=system), path / f"probability{ending}.png")
-        draw(plots.region_error(one, system=system), path / f"sampling-error{ending}.png")
+        yield f"regions{ending}", plots.uncertain_regions(one, system=system)
+        yield f"probability{ending}", plots.probability_map(one, system=system)
+        yield f"sampling-error{ending}", plots.region_error(one, system=system)
     if result.sensitivity is not None:
-        draw(plots.sensitivity_bars(result), path / "sensitivity.png")
-    (path / "interim.png").unlink(missing_ok=True)
+        yield "sensitivity", plots.sensitivity_bars(result)
