@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from typing import NamedTuple
 
 import pytest
 
@@ -22,6 +23,7 @@ GAINS = [
     {"path": "controller.kp", "min": 500.0, "max": 700.0, "points": 5},
     {"path": "controller.ki", "min": 100.0, "max": 150.0, "points": 5},
 ]
+FIVE = {"distribution": "lognormal", "cov": 0.05}
 STRING = "drillstring.sections.pipe.length"
 
 
@@ -30,7 +32,7 @@ def design(*paths):
     values = {"simulation.duration": "20 s", "simulation.accuracy": "fast", "map.audit_cells": 0,
               "map.axes": GAINS}  # fmt: skip
     if paths:
-        values["uncertain"] = dict.fromkeys(paths, {"distribution": "lognormal", "cov": 0.05})
+        values["uncertain"] = dict.fromkeys(paths, FIVE)
     return drillctl.load("monteiro-trindade-140kn", **values)
 
 
@@ -93,7 +95,8 @@ def test_the_command_takes_a_scheduler(client, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
     options = ["--set", "simulation.duration=20 s", "--realizations", "8", "--audit", "0",
-               "--axis", "controller.kp=500:700:3", "--axis", "controller.ki=100:150:2"]  # fmt: skip
+               "--axis", "controller.kp=500:700:3",
+               "--axis", "controller.ki=100:150:2"]  # fmt: skip
     name = "monteiro-trindade-140kn"
     assert run(["uncertainty", name, *options, "--out", "here"]) == 0
     address = ["--scheduler", client.scheduler.address]
@@ -104,8 +107,16 @@ def test_the_command_takes_a_scheduler(client, tmp_path, monkeypatch, capsys):
 # --- without a cluster -------------------------------------------------------------------------
 
 
+class Worker(NamedTuple):
+    """What dask tells of a worker that died."""
+
+    address: str
+
+
 class Pretended:
     """As much of a client as `Cluster` asks for; every block is computed at once."""
+
+    loop = None
 
     def __init__(self, found, errors=()):
         self.found, self.errors = found, list(errors)
@@ -142,6 +153,9 @@ class Future:
 class Completed(list):
     """`as_completed` of those: the last submitted is the first finished."""
 
+    def __init__(self, futures, loop):
+        super().__init__(futures)
+
     def add(self, future):
         self.append(future)
 
@@ -172,7 +186,7 @@ def test_every_block_comes_once_in_whatever_order(job):
 
 
 def test_blocks_of_dead_workers_are_given_out_again(job):
-    dead = distributed.KilledWorker("block", None, 3)
+    dead = distributed.KilledWorker("block", Worker("tcp://there:1"), 3)
     blocks = list(Cluster(Pretended(here(), [dead, dead])).blocks(job, [(0, 2), (2, 2)]))
     assert sorted(block.first for block in blocks) == [0, 2]
     deadly = [dead] * (cluster_module.DEATHS + 1)

@@ -61,7 +61,8 @@ class Cluster:
             return future
 
         threads = sum(self._client.nthreads().values())
-        waiting = as_completed([submit(piece) for piece in islice(left, WAITING * threads)])
+        started = [submit(piece) for piece in islice(left, WAITING * threads)]
+        waiting = as_completed(started, loop=self._client.loop)
         for future in waiting:
             piece = running.pop(future.key)
             error = future.exception()
