@@ -118,11 +118,11 @@ def test_the_quantile_is_a_sharp_ridge(many):
 
 @pytest.mark.slow
 def test_probabilities_of_256_draws(many):
-    found = many.probability(33.0)
-    low, high = found.interval
+    counts = many.probability(33.0).counts
     for kp, ki, expected in ((620, 140, 0.996), (600, 110, 0.75)):
-        place = ((kp - 400) // 10, ki // 5)
-        assert low[place] <= expected <= high[place]
+        theirs, ours = round(256 * expected), int(counts[(kp - 400) // 10, ki // 5])
+        table = [[theirs, 256 - theirs], [ours, 1024 - ours]]
+        assert stats.fisher_exact(table).pvalue > 0.05
 
 
 @pytest.mark.slow

@@ -11,7 +11,8 @@ from drillctl.errors import InputError
 from drillctl.studies.intervals import share_interval, share_intervals
 from drillctl.studies.uncertainty import areas as area_module
 from drillctl.studies.uncertainty.areas import region_areas
-from drillctl.studies.uncertainty.best import best, quantile_interval, values_of
+from drillctl.studies.uncertainty.best import best_cells, quantile_interval
+from drillctl.studies.uncertainty.best import values_of as values_of_all
 from drillctl.studies.uncertainty.convergence import convergence
 from drillctl.studies.uncertainty.objectives import Exceedance, Mean, Quantile, TailMean
 from drillctl.studies.uncertainty.probability import INNER, OUTER, needed, probability_map
@@ -118,7 +119,7 @@ def test_intervals_hold_the_area(probability, count, few_resamples):
     held = 0
     for seed in range(trials):
         j1 = field(count, seed=seed)
-        (found,) = region_areas(j1, [probability_map(j1, level, ALONE)], probability, ALONE, seed)
+        (found,) = region_areas(j1, [(probability_map(j1, level, ALONE), probability)], ALONE, seed)
         low, high = found.interval
         held += low <= area <= high
         assert low <= found.value <= high
@@ -129,8 +130,7 @@ def test_intervals_hold_the_area(probability, count, few_resamples):
 def test_areas_of_cells_that_cannot_change_are_counted(few_resamples):
     j1 = np.tile(np.array([1.0, 1.0, 9.0, 9.0, 9.0]), (500, 1))
     j1[::2, 1] = 9.0
-    maps = [probability_map(j1, 5.0, ALONE)]
-    (found,) = region_areas(j1, maps, INNER, ALONE, 0)
+    (found,) = region_areas(j1, [(probability_map(j1, 5.0, ALONE), INNER)], ALONE, 0)
     assert found.value == 0.2
     assert found.interval == (0.2, 0.2)
 
@@ -139,7 +139,7 @@ def test_areas_of_replicates_by_leaving_one_out():
     j1 = field(160)
     scatter = Scatter(8)
     found = probability_map(j1, 30.0, scatter)
-    (area,) = region_areas(j1, [found], 0.5, scatter, 0)
+    (area,) = region_areas(j1, [(found, 0.5)], scatter, 0)
     without = []
     for k in range(8):
         rows = np.arange(160) % 8 != k
@@ -154,18 +154,18 @@ def test_areas_of_replicates_by_leaving_one_out():
 
 def test_areas_have_the_same_bits_again():
     j1 = field(100)
-    maps = [probability_map(j1, level, ALONE) for level in (20.0, 30.0)]
-    one, again = (region_areas(j1, maps, INNER, ALONE, 3) for _ in range(2))
+    asked = [(probability_map(j1, level, ALONE), INNER) for level in (20.0, 30.0)]
+    one, again = (region_areas(j1, asked, ALONE, 3) for _ in range(2))
     assert one == again
     # And each level the same as by itself.
-    assert region_areas(j1, maps[1:], INNER, ALONE, 3) == one[1:]
+    assert region_areas(j1, asked[1:], ALONE, 3) == one[1:]
 
 
 def test_convergence_ends_at_all_realizations():
     j1 = field(100)
     found = convergence(j1, (20.0, 30.0), ALONE, 1)
     assert found.counts == (16, 32, 64, 100)
-    whole = region_areas(j1, [probability_map(j1, 30.0, ALONE)], INNER, ALONE, 1)[0]
+    whole = region_areas(j1, [(probability_map(j1, 30.0, ALONE), INNER)], ALONE, 1)[0]
     assert found.areas[30.0][-1] == whole
 
 
@@ -209,6 +209,18 @@ def valley(count=400, cells=21, seed=1):
     at = np.arange(cells) - cells // 2
     common = random.gamma(2.0, 1.0, size=(count, 1))
     return 15.0 + 0.3 * at**2 + common * (1.0 + 0.1 * (at - 2.0) ** 2)
+
+
+def values_of(objective, j1, censored):
+    return values_of_all([objective], j1, censored)[objective.name]
+
+
+def best(objective, j1, censored, scatter, seed):
+    found = values_of_all([objective], j1, censored)
+    (one,) = best_cells([objective], found, j1, censored, scatter, seed).values()
+    if isinstance(one, InputError):
+        raise one
+    return one
 
 
 def none(j1):

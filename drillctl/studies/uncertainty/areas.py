@@ -13,6 +13,7 @@ realizations too. What is told is the hull of both.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,8 +51,7 @@ class Area(NamedTuple):
 
 def region_areas(
     j1: Array,
-    maps: list[ProbabilityMap],
-    probability: float,
+    asked: Sequence[tuple[ProbabilityMap, float]],
     scatter: Scatter,
     seed: int,
     confidence: float = CONFIDENCE,
@@ -62,10 +62,8 @@ def region_areas(
     ----------
     j1 : ndarray, shape (realizations, cells)
         J1 (s), as it was counted.
-    maps : list of ProbabilityMap
-        One a level.
-    probability : float
-        Of the region.
+    asked : sequence of tuple of ProbabilityMap and float
+        Level and probability of each region.
     scatter : Scatter
         Which realizations are independent.
     seed : int
@@ -73,15 +71,15 @@ def region_areas(
     confidence : float
         Of each interval.
     """
-    values = [float(one.region(probability).mean()) for one in maps]
     if scatter.independent:
-        intervals = _bootstrap(j1, maps, probability, seed, confidence)
+        intervals = _bootstrap(j1, asked, seed, confidence)
     else:
-        intervals = [_jackknife(one, probability, scatter, confidence) for one in maps]
-    return [
-        Area(value, _hull(value, found, _of_cells(one, probability, confidence)))
-        for value, found, one in zip(values, intervals, maps, strict=True)
-    ]
+        intervals = [_jackknife(one, bound, scatter, confidence) for one, bound in asked]
+    areas = []
+    for (one, bound), found in zip(asked, intervals, strict=True):
+        value = float(one.region(bound).mean())
+        areas.append(Area(value, _hull(value, found, _of_cells(one, bound, confidence))))
+    return areas
 
 
 def _of_cells(found: ProbabilityMap, probability: float, confidence: float) -> Interval:
@@ -94,32 +92,36 @@ def _hull(value: float, *intervals: Interval) -> Interval:
     return min(value, *(low for low, _ in intervals)), max(value, *(high for _, high in intervals))
 
 
+class _Resampled(NamedTuple):
+    """What a resample of a region needs: cells that may change, and how many are sure."""
+
+    least: int
+    sure: int
+    hits: NDArray[np.float32]
+
+
 def _bootstrap(
-    j1: Array, maps: list[ProbabilityMap], probability: float, seed: int, confidence: float
+    j1: Array, asked: Sequence[tuple[ProbabilityMap, float]], seed: int, confidence: float
 ) -> list[Interval]:
-    """Percentile intervals of resampled areas; all levels from the same resamples."""
+    """Percentile intervals of resampled areas, all from the same resamples."""
     total, cells = j1.shape
-    least = needed(probability, total)
-    doubtful = [_may_change(one.counts.ravel(), total, least) for one in maps]
-    hits = [
-        (j1[:, cell] <= one.level).astype(np.float32)
-        for one, cell in zip(maps, doubtful, strict=True)
-    ]
-    sure = [
-        int((one.counts.ravel() >= least)[~cell].sum())
-        for one, cell in zip(maps, doubtful, strict=True)
-    ]
+    regions = []
+    for one, bound in asked:
+        least, counts = needed(bound, total), one.counts.ravel()
+        doubtful = _may_change(counts, total, least)
+        hits = (j1[:, doubtful] <= one.level).astype(np.float32)
+        regions.append(_Resampled(least, int((counts >= least)[~doubtful].sum()), hits))
     random = np.random.Generator(np.random.Philox(seed))
     rows = max(1, AT_A_TIME // total)
-    areas = np.empty((len(maps), RESAMPLES))
+    areas = np.empty((len(regions), RESAMPLES))
     for done in range(0, RESAMPLES, rows):
         size = min(rows, RESAMPLES - done)
         weights = random.multinomial(total, np.full(total, 1.0 / total), size=size)
         weights = weights.astype(np.float32)
-        for k, (certain, hit) in enumerate(zip(sure, hits, strict=True)):
+        for k, region in enumerate(regions):
             # Whole numbers below 2^24: the same in whatever order a product adds them up.
-            counts = weights @ hit
-            areas[k, done : done + size] = (certain + (counts >= least).sum(axis=1)) / cells
+            inside = (weights @ region.hits >= region.least).sum(axis=1)
+            areas[k, done : done + size] = (region.sure + inside) / cells
     tail = 0.5 * (1.0 - confidence)
     ends = np.quantile(areas, [tail, 1.0 - tail], axis=1)
     return [(float(low), float(high)) for low, high in ends.T]

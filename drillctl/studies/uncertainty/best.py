@@ -12,8 +12,9 @@ even by what is known; otherwise the answer is refused.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,39 +92,57 @@ def objectives(levels: tuple[float, ...]) -> tuple[Objective, ...]:
     return (Mean(), Quantile(), TailMean(), *(Exceedance(level) for level in levels))
 
 
-def values_of(objective: Objective, j1: Array, censored: Mask) -> Values:
-    """An objective in every cell.
+def values_of(asked: Iterable[Objective], j1: Array, censored: Mask) -> dict[str, Values]:
+    """Objectives in every cell, by name.
 
     Parameters
     ----------
-    objective : Objective
+    asked : iterable of Objective
         Which.
     j1 : ndarray, shape (realizations, cells)
         J1 (s) of the realizations that a rig can have.
     censored : ndarray of bool, shape (realizations, cells)
         Lanes whose J1 is a lower bound.
     """
-    values = np.empty(j1.shape[1])
-    certain = np.empty(j1.shape[1], dtype=bool)
-    for cells in _slabs(j1.shape[1]):
-        values[cells] = objective.values(np.sort(j1[:, cells], axis=0))
-        bound = np.where(censored[:, cells], j1[:, cells], np.inf).min(axis=0)
-        if isinstance(objective, Exceedance):
-            certain[cells] = bound > objective.level
-        elif isinstance(objective, Quantile):
-            certain[cells] = values[cells] < bound
+    asked, cells = tuple(asked), j1.shape[1]
+    values = {one.name: np.empty(cells) for one in asked}
+    bound = np.full(cells, np.inf)
+    for some in _slabs(cells):
+        ordered = np.sort(j1[:, some], axis=0)
+        for one in asked:
+            values[one.name][some] = one.values(ordered)
+        if censored[:, some].any():
+            bound[some] = np.where(censored[:, some], j1[:, some], np.inf).min(axis=0)
+    failed = np.isnan(j1).any(axis=0)
+    found = {}
+    for one in asked:
+        known = values[one.name]
+        if isinstance(one, Exceedance):
+            certain = bound > one.level
+        elif isinstance(one, Quantile):
+            certain = known < bound
         else:
-            certain[cells] = np.isinf(bound)
-    return Values(np.where(np.isnan(j1).any(axis=0), np.nan, values), certain)
+            certain = np.isinf(bound)
+        found[one.name] = Values(np.where(failed, np.nan, known), certain | failed)
+    return found
 
 
-def best(objective: Objective, j1: Array, censored: Mask, scatter: Scatter, seed: int) -> Best:
-    """The best cell by an objective.
+def best_cells(
+    asked: Iterable[Objective],
+    found: Mapping[str, Values],
+    j1: Array,
+    censored: Mask,
+    scatter: Scatter,
+    seed: int,
+) -> dict[str, Best | InputError]:
+    """The best cell by each objective, or why it is not known.
 
     Parameters
     ----------
-    objective : Objective
+    asked : iterable of Objective
         Smaller is better.
+    found : mapping of Values
+        Their values, from `values_of`.
     j1 : ndarray, shape (realizations, cells)
         J1 (s) of the realizations that a rig can have.
     censored : ndarray of bool, shape (realizations, cells)
@@ -133,26 +152,38 @@ def best(objective: Objective, j1: Array, censored: Mask, scatter: Scatter, seed
     seed : int
         Of resampling.
 
-    Raises
-    ------
-    InputError
-        No cell without failed lanes, or too many lanes were stopped to know.
+    Returns
+    -------
+    dict of Best or InputError
+        The error where every cell has failed lanes, or too many lanes were stopped to know.
     """
-    found = values_of(objective, j1, censored)
+    asked = tuple(asked)
+    cells: dict[str, int | InputError] = {
+        one.name: _cell(one, found[one.name], j1) for one in asked
+    }
+    known = [one for one in asked if isinstance(cells[one.name], int)]
+    alike = _alike(known, found, cells, j1, censored, scatter)
+    best: dict[str, Best | InputError] = {}
+    for one in asked:
+        cell = cells[one.name]
+        if isinstance(cell, InputError):
+            best[one.name] = cell
+            continue
+        low, high = _interval(one, j1[:, cell], censored[:, cell], scatter, seed)
+        value = float(found[one.name].values[cell])
+        if isinstance(one, Exceedance):  # told as the probability of the level being kept
+            value, low, high = 1.0 - value, *_swapped(low, high)
+        best[one.name] = Best(one.name, cell, value, (low, high), alike.get(one.name))
+    return best
+
+
+def _cell(objective: Objective, found: Values, j1: Array) -> int | InputError:
     known = np.where(found.certain, found.values, np.nan)
     if np.isnan(found.values).all():
-        raise InputError("every cell has failed lanes", objective.name)
+        return InputError("every cell has failed lanes", objective.name)
     if np.isnan(known).all() or np.nanmin(known) > np.nanmin(found.values):
-        raise InputError(NEEDS_FULL, objective.name)
-    cell = _chosen(known, j1)
-    alike = None
-    if not censored.any() and objective.enough(len(j1)):
-        alike = _alike(objective, j1, found.values, cell, scatter)
-    low, high = _interval(objective, j1[:, cell], censored[:, cell], scatter, seed)
-    value = float(known[cell])
-    if isinstance(objective, Exceedance):  # told as the probability of the level being kept
-        value, low, high = 1.0 - value, *_swapped(low, high)
-    return Best(objective.name, cell, value, (low, high), alike)
+        return InputError(NEEDS_FULL, objective.name)
+    return _chosen(known, j1)
 
 
 def _swapped(low: float | None, high: float | None) -> tuple[float | None, float | None]:
@@ -167,18 +198,34 @@ def _chosen(known: Array, j1: Array) -> int:
     return int(equal[np.argmin(j1[:, equal].mean(axis=0))])
 
 
-def _alike(objective: Objective, j1: Array, values: Array, cell: int, scatter: Scatter) -> Mask:
-    cells = j1.shape[1]
-    own = j1[:, cell : cell + 1]
-    reference = objective.influence(own, np.sort(own, axis=0))
+def _alike(
+    asked: Iterable[Objective],
+    found: Mapping[str, Values],
+    chosen: Mapping[str, Any],
+    j1: Array,
+    censored: Mask,
+    scatter: Scatter,
+) -> dict[str, Mask]:
+    """Cells that cannot be told apart from the best, for the objectives where that is known."""
+    count, cells = j1.shape
+    asked = [] if censored.any() else [one for one in asked if one.enough(count)]
+    reference = {}
+    for one in asked:
+        own = j1[:, chosen[one.name], None]
+        reference[one.name] = one.influence(own, np.sort(own, axis=0))
     # One side only: nothing is better than the best but by chance.
     quantile = scatter.quantile(1.0 - 2.0 * (1.0 - CONFIDENCE) / max(cells - 1, 1))
-    alike = np.zeros(cells, dtype=bool)
-    for some in _slabs(cells):
-        influence = objective.influence(j1[:, some], np.sort(j1[:, some], axis=0))
-        error = scatter.standard_error(influence - reference)
-        with np.errstate(invalid="ignore"):  # of cells with failed lanes
-            alike[some] = values[some] - values[cell] <= quantile * error
+    alike = {one.name: np.zeros(cells, dtype=bool) for one in asked}
+    for some in _slabs(cells) if asked else ():
+        columns = j1[:, some]
+        ordered = np.sort(columns, axis=0)
+        for one in asked:
+            values = found[one.name].values
+            apart = one.influence(columns, ordered)
+            apart -= reference[one.name]
+            error = scatter.standard_error(apart)
+            with np.errstate(invalid="ignore"):  # of cells with failed lanes
+                alike[one.name][some] = values[some] - values[chosen[one.name]] <= quantile * error
     return alike
 
 

@@ -53,8 +53,8 @@ def convergence(j1: Array, levels: tuple[float, ...], scatter: Scatter, seed: in
     counts.append(len(j1))
     rows = []
     for count in counts:
-        maps = [probability_map(j1[:count], level, scatter) for level in levels]
-        rows.append(region_areas(j1[:count], maps, INNER, scatter, seed))
+        asked = [(probability_map(j1[:count], level, scatter), INNER) for level in levels]
+        rows.append(region_areas(j1[:count], asked, scatter, seed))
     return Convergence(
         tuple(counts),
         {level: tuple(row[k] for row in rows) for k, level in enumerate(levels)},

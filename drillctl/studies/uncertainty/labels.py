@@ -11,7 +11,6 @@ from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.draws import uncertain_parameters
 from drillctl.studies.sweeps import UNITS
-from drillctl.studies.uncertainty.best import values_of
 from drillctl.studies.uncertainty.objectives import Mean, Quantile, TailMean
 from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER
 
@@ -97,14 +96,11 @@ def known(result: Uncertainty) -> dict[str, Array]:
     result : Uncertainty
         To be labelled.
     """
-    flat = (len(result.status), -1)
-    j1 = result.j1.reshape(flat)[result.possible]
-    censored = result.censored.reshape(flat)[result.possible]
     found = {}
-    for objective in (Mean(), Quantile(), TailMean()):
-        one = values_of(objective, j1, censored)
-        known = np.where(one.certain, one.values, np.nan)
-        found[objective.name] = known.reshape(result.nominal.shape)
+    for name in (Mean().name, Quantile().name, TailMean().name):
+        one = result.values[name]
+        certain = np.where(one.certain, one.values, np.nan)
+        found[name] = certain.reshape(result.nominal.shape)
     return found
 
 

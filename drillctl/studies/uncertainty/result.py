@@ -23,7 +23,8 @@ from drillctl.studies.uncertainty.areas import Area, region_areas
 from drillctl.studies.uncertainty.best import (
     NEEDS_FULL,
     Best,
-    best,
+    Values,
+    best_cells,
     objectives,
     values_of,
 )
@@ -161,12 +162,11 @@ class Uncertainty:
     @cached_property
     def areas(self) -> dict[float, dict[float, Area]]:
         """Areas of inner, median and outer region by level, with bootstrap intervals."""
-        flat, maps = self._flat(self.j1), list(self.maps.values())
+        asked = [(one, bound) for one in self.maps.values() for bound in (INNER, MEDIAN, OUTER)]
+        areas = region_areas(self._flat(self.j1), asked, self.scatter, self.seed)
         found: dict[float, dict[float, Area]] = {level: {} for level in self.levels}
-        for probability in (INNER, MEDIAN, OUTER):
-            areas = region_areas(flat, maps, probability, self.scatter, self.seed)
-            for level, area in zip(self.levels, areas, strict=True):
-                found[level][probability] = area
+        for (one, bound), area in zip(asked, areas, strict=True):
+            found[one.level][bound] = area
         return found
 
     @cached_property
@@ -189,9 +189,28 @@ class Uncertainty:
         """
         if name not in self.objectives:
             raise InputError(f"no objective {name!r}; allowed: {', '.join(self.objectives)}")
-        j1, censored = (self._flat(v)[self.possible] for v in (self.j1, self.censored))
+        found = self._best[name]
+        if isinstance(found, InputError):
+            raise found
+        return found
+
+    @cached_property
+    def values(self) -> dict[str, Values]:
+        """Every objective in every cell of the flattened map, by name."""
+        return values_of(self.objectives.values(), *self._lanes)
+
+    @cached_property
+    def _best(self) -> dict[str, Best | InputError]:
         scatter = self.scatter.of(self.possible)
-        return best(self.objectives[name], j1, censored, scatter, self.seed)
+        return best_cells(self.objectives.values(), self.values, *self._lanes, scatter, self.seed)
+
+    @property
+    def _lanes(self) -> tuple[Array, Mask]:
+        """J1 of the possible realizations and which of it are bounds, shape (rows, cells)."""
+        j1, censored = self._flat(self.j1), self._flat(self.censored)
+        if self.possible.all():  # no copies, then
+            return j1, censored
+        return j1[self.possible], censored[self.possible]
 
     def mean(self) -> Array:
         """Mean of J1 over the possible realizations (s), shape of the map; see `over_map`."""
@@ -218,8 +237,9 @@ class Uncertainty:
         InputError
             It is not known in some cell because lanes were stopped there.
         """
-        j1, censored = (self._flat(v)[self.possible] for v in (self.j1, self.censored))
-        found = values_of(objective, j1, censored)
+        found = self.values.get(objective.name)
+        if found is None or self.objectives[objective.name] != objective:
+            found = values_of([objective], *self._lanes)[objective.name]
         if not found.certain.all():
             lacking = int((~found.certain).sum())
             raise InputError(f"unknown in {lacking} cells: {NEEDS_FULL}", objective.name)

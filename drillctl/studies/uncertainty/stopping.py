@@ -110,5 +110,5 @@ def look(
     """
     confidence = 1.0 - (1.0 - CONFIDENCE) / looks
     found = probability_map(j1, level, scatter)
-    (area,) = region_areas(j1, [found], table.probability, scatter, seed, confidence)
+    (area,) = region_areas(j1, [(found, table.probability)], scatter, seed, confidence)
     return Look(len(j1), area.value, area.interval, confidence)
