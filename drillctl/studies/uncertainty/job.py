@@ -28,11 +28,14 @@ Array = NDArray[np.float64]
 FAILED = STATUSES.index("failed")
 
 
+Drawing = Callable[[int, int], dict[str, Array]]
+
+
 class Source(Protocol):
     """Where the values of realizations come from."""
 
-    def values(self, design: Design, count: int, first: int) -> dict[str, Array]:
-        """Of what is uncertain (SI), shape (count,), by path."""
+    def drawing(self, design: Design) -> Drawing:
+        """A function of count and first: values of what is uncertain (SI), (count,), by path."""
         ...
 
 
@@ -48,9 +51,10 @@ class Drawn:
 
     seed: int
 
-    def values(self, design: Design, count: int, first: int) -> dict[str, Array]:
-        """Draws `first` to `first + count - 1`."""
-        return drawing(design, self.seed)(count, first).values
+    def drawing(self, design: Design) -> Drawing:
+        """Draws by their numbers."""
+        drawn = drawing(design, self.seed)
+        return lambda count, first: drawn(count, first).values
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +69,11 @@ class Listed:
 
     columns: dict[str, Array]
 
-    def values(self, design: Design, count: int, first: int) -> dict[str, Array]:
-        """The rows `first` to `first + count - 1`."""
-        return {path: column[first : first + count] for path, column in self.columns.items()}
+    def drawing(self, design: Design) -> Drawing:
+        """Rows by their numbers."""
+        return lambda count, first: {
+            path: column[first : first + count] for path, column in self.columns.items()
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +150,7 @@ class Job:
         Block
             The same bits in whatever blocks, by whatever number of threads.
         """
-        values = self.source.values(self.design, count, first)
+        values = self._drawn(count, first)
         shape = (count, self.cells)
         measures = {name: np.full(shape, np.nan) for name in self.measures}
         status = np.full(shape, FAILED, dtype=np.int8)
@@ -157,8 +163,12 @@ class Job:
         return Block(first, measures, status, provenance())
 
     @cached_property
+    def _drawn(self) -> Drawing:
+        return self.source.drawing(self.design)
+
+    @cached_property
     def _parts(self) -> list[PartOfMap]:
-        paths = tuple(self.source.values(self.design, 1, 0))
+        paths = tuple(self._drawn(1, 0))
         design = beyond_the_table(_rig(self.design), paths)
         found = [PartOfMap(part, paths, Strings()) for part in parts(design, self.axes)]
         for number, prepared in self.strings.items():

@@ -13,8 +13,8 @@ from drillctl.studies.uncertainty.job import Block
 
 Array = NDArray[np.float64]
 
-LANES = 2**16
-"""Lanes of a block: less than a second's work or a little more."""
+LANES = 2**17
+"""Lanes of a block: some seconds' work at most."""
 MOST = 4096
 """Realizations of a block at most."""
 
