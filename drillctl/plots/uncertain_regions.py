@@ -17,7 +17,7 @@ from drillctl import units
 from drillctl.errors import InputError
 from drillctl.plots.map import axis_label
 from drillctl.plots.style import BLACK, BLUE, LINE, SMALL, VERMILLION, dress, grid_or_new
-from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER
+from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER, needed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -103,8 +103,7 @@ def probability_map(
         )  # fmt: skip
         shown = [v for v in (OUTER, MEDIAN, INNER) if probability.min() < v < probability.max()]
         if shown:
-            # Between two counts: a contour through a count itself would be a matter of rounding.
-            at = [v - 0.5 / result.realizations for v in shown]
+            at = [border(v, result.realizations) for v in shown]
             lines = panel.contour(x, y, probability.T, levels=at, colors="white", linewidths=1.0)
             names = dict(zip(at, shown, strict=True))
             panel.clabel(lines, fmt=lambda v, names=names: f"{names[v]:.0%}", fontsize=SMALL)
@@ -186,6 +185,21 @@ def _panels(
     return figure, panels[:count], x, y
 
 
+def border(probability: float, total: int) -> float:
+    """Share of the draws between the largest out of a region and the smallest in it.
+
+    A contour through a share that draws can have would be a matter of rounding.
+
+    Parameters
+    ----------
+    probability : float
+        Of the region.
+    total : int
+        Draws.
+    """
+    return (needed(probability, total) - 0.5) / total
+
+
 def _bands(
     panel: Axes,
     x: NDArray[np.float64],
@@ -194,7 +208,7 @@ def _bands(
     total: int,
 ) -> None:
     for bound, colour in SHADES.items():
-        at = bound - 0.5 / total  # between two counts
+        at = border(bound, total)
         if probability.max() > at:
             panel.contourf(x, y, probability.T, levels=[at, 2.0], colors=[colour])
 

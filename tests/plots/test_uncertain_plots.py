@@ -10,6 +10,7 @@ from matplotlib.text import Text
 import drillctl
 from drillctl import plots
 from drillctl.errors import InputError
+from drillctl.plots.uncertain_regions import border
 from drillctl.studies.uncertainty import uncertainty
 
 GAINS = [
@@ -81,6 +82,16 @@ def test_few_draws_are_shown_one_by_one(result):
     assert lines(few) > lines(result)
     assert any("each draw" in text for text in texts(plots.uncertain_regions(few)))
     assert not any("each draw" in text for text in texts(plots.uncertain_regions(result)))
+
+
+@pytest.mark.parametrize("total", [1, 9, 10, 20, 40, 10_000])
+@pytest.mark.parametrize("probability", [0.05, 0.5, 0.95])
+def test_a_band_ends_between_two_counts(total, probability):
+    shares = np.arange(total + 1) / total
+    at = border(probability, total)
+    assert not np.isclose(shares, at, rtol=0.0, atol=0.4 / total).any()
+    assert ((shares > at) == (shares >= probability - 1e-12)).all()
+    assert at > 0.0  # what is in no draw is in no region
 
 
 def test_cells_that_are_known_and_those_that_are_not(result):
