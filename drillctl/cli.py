@@ -160,7 +160,7 @@ def validate(
     from drillctl.studies.delayed_lanes import following_design
     from drillctl.studies.draws import uncertain_parameters
     from drillctl.studies.grid import axes_of
-    from drillctl.studies.uncertainty.study import refuse_impossible
+    from drillctl.studies.uncertainty.study import map_axes, refuse_impossible
 
     found = _load(design, sets)
     if "axes" in found.tree.get("map", {}):  # the default ones need not fit every law
@@ -168,7 +168,7 @@ def validate(
     if found.tables.uncertain:
         uncertain_parameters(found)
     if "uncertainty" in found.tree:
-        refuse_impossible(found, axes_of(found, found.tables.map.axes))
+        refuse_impossible(found, map_axes(found))
     if found.tables.compare.cases:
         refuse_unequal(case_designs(found))
     if "weight_delay" in found.tree:

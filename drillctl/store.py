@@ -16,6 +16,7 @@ import hashlib
 import itertools
 import os
 import shutil
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,12 +39,13 @@ from drillctl.store_realizations import FolderShelf, write_uncertainty
 from drillctl.studies.audit import choose_cells
 from drillctl.studies.cases import case_designs
 from drillctl.studies.comparison import Comparison
-from drillctl.studies.grid import axes_of
+from drillctl.studies.grid import Axis, axes_of
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.regularisation import WIDTHS, Regularisation
 from drillctl.studies.sweeps import Sweep
 from drillctl.studies.three_regions import PAPER_LEVEL, ThreeRegions
 from drillctl.studies.uncertainty import Uncertainty
+from drillctl.studies.uncertainty.study import map_axes
 
 RUNS = Path("runs")
 """Where runs go that were given no folder."""
@@ -359,7 +361,7 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["audited"] = result.audit.cells.tolist()
     elif isinstance(result, Uncertainty):
         axes = [[a.path, a.values.tolist()] for a in result.axes]
-        if axes != _own_axes(design):
+        if axes != _own_axes(design, map_axes):
             settings["axes"] = axes
         if len(result.audit.cells) != tables.map.audit_cells:
             settings["audited"] = result.audit.cells.tolist()
@@ -398,9 +400,11 @@ def _own_cases(design: Design) -> list[Any] | None:
         return None
 
 
-def _own_axes(design: Design) -> list[Any] | None:
+def _own_axes(
+    design: Design, axes: Callable[[Design], tuple[Axis, ...]] | None = None
+) -> list[Any] | None:
     try:
-        own = axes_of(design, design.tables.map.axes)
+        own = axes_of(design, design.tables.map.axes) if axes is None else axes(design)
     except InputError:  # the default ones do not fit every law
         return None
     return [[a.path, a.values.tolist()] for a in own]

@@ -269,8 +269,6 @@ def uncertainty(design: Design, how: How, options: Options) -> None:
     studies.write_uncertainty_tables(result, folder.path)
     for name, figure in uncertain_runs.pictures(result, options.units):
         _draw(figure, folder.path / f"{name}.png")
-    for reason in {one["reason"] for one in summary["best"].values() if "reason" in one}:
-        console.note(f"note: best gains: {reason}")
     if result.audit.verdict == "look":
         console.note("audit: look: the engines differ by more than 1 % in J1 in some lane")
     if not options.json:

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import field_validator, model_validator
 
 from drillctl.design import quantities as q
+from drillctl.design.axis_table import AxisTable
 from drillctl.design.base import Table, number_or_quantity
 from drillctl.errors import InputError
 
@@ -154,7 +155,8 @@ class UncertaintyTable(Table):
     turns. `latin-hypercube` draws are of a fixed number. `correlations`: of any two parameters,
     by a Gaussian copula; those left out are independent. `full`: lanes run to their end, else
     they may stop when J1 has passed the highest level. `keep`: measures kept of every lane
-    beside J1. `contours`: outlines of every realization as a table.
+    beside J1. `contours`: outlines of every realization as a table. `axes`: more parameters that
+    the map runs over under uncertainty, those of `[map]` first.
     """
 
     realizations: q.Count = 200
@@ -165,6 +167,7 @@ class UncertaintyTable(Table):
     full: bool = False
     keep: tuple[str, ...] = ()
     contours: bool = False
+    axes: tuple[AxisTable, ...] = ()
     until: UntilTable | None = None
     sensitivity: SensitivityTable | None = None
 

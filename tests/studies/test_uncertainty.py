@@ -231,6 +231,7 @@ def test_draws_impossible_at_some_cells_fail_there_alone():
     ("design", "message"),
     [
         (lambda: small(uncertain={"controller.kp": FIVE}), "is an axis of the map"),
+        (lambda: small(**{"uncertainty.axes": GAINS[:1]}), "two axes run over 'controller.kp'"),
         (lambda: small(uncertain={"bit_rock.a1_factr": FIVE}), "did you mean 'bit_rock.a1_factor'"),
         (lambda: small(**{"uncertainty.keep": ["peak_speed"]}), "no measure 'peak_speed'"),
         (lambda: small(**{"uncertainty.until.level": 5}), "5 is no level of the map"),
@@ -295,8 +296,8 @@ def test_a_run_stops_when_the_area_is_known():
 
 
 def test_slices_of_a_third_axis():
-    axes = [*GAINS, {"path": WEIGHT, "min": "120 kN", "max": "140 kN", "points": 2}]
-    result = uncertainty(small(**{"map.axes": axes}), realizations=4)
+    axis = {"path": WEIGHT, "min": "120 kN", "max": "140 kN", "points": 2}
+    result = uncertainty(small(**{"uncertainty.axes": [axis]}), realizations=4)
     slices = result.slices()
     assert list(slices) == [120e3, 140e3]
     assert slices[140e3].j1.tobytes() == np.ascontiguousarray(result.j1[..., 1]).tobytes()

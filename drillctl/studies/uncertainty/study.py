@@ -111,9 +111,30 @@ def uncertainty(
     given = {"uncertainty.realizations": realizations, "uncertainty.seed": seed}
     asked = {path: value for path, value in given.items() if value is not None}
     design = design.replace(asked) if asked else design
-    axes = axes_of(design, design.tables.map.axes) if axes is None else axes
+    axes = map_axes(design) if axes is None else axes
     study = _Study(design, axes, progress, shelf or NoShelf(), workers or _workers(client), interim)
     return study.result(begin, audit_cells)
+
+
+def map_axes(design: Design) -> tuple[Axis, ...]:
+    """Axes of the map under uncertainty: those of `[map]`, then those of `[uncertainty]`.
+
+    Parameters
+    ----------
+    design : Design
+        With both tables.
+
+    Raises
+    ------
+    InputError
+        An axis that does not fit the design, or two over one parameter.
+    """
+    tables = (*design.tables.map.axes, *design.tables.uncertainty.axes)
+    paths = [table.path for table in tables]
+    for path in paths:
+        if paths.count(path) > 1:
+            raise InputError(f"two axes run over {path!r}", "uncertainty.axes")
+    return axes_of(design, tables)
 
 
 def _workers(client: Client | None) -> Workers:
