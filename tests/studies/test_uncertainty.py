@@ -12,10 +12,12 @@ from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.measures import STATUSES
+from drillctl.studies import grid as grid_module
 from drillctl.studies import sweeps as sweeps_module
 from drillctl.studies.grid import axes_of, cell_design
 from drillctl.studies.uncertainty import job as job_module
 from drillctl.studies.uncertainty import keeping as keeping_module
+from drillctl.studies.uncertainty import realizations as realizations_module
 from drillctl.studies.uncertainty import uncertainty
 from drillctl.studies.uncertainty.job import Drawn, Job
 from drillctl.studies.uncertainty.keeping import InMemory, pieces
@@ -106,6 +108,35 @@ def test_a_steep_draw_has_a_step_of_its_own():
     result = uncertainty(design, realizations=6)
     assert len(set(result.drawn["bit_rock.beta_factor"])) == 2
     check_lanes(design, result)
+
+
+def test_the_steepest_cell_bounds_the_step_of_a_realization():
+    """Gains alone leave the friction as it is; any other axis may make it steeper."""
+    axes = [GAINS[0], {"path": "bit_rock.beta_factor", "min": 1.0, "max": 30.0, "points": 2}]
+    design = small(A1, **{"map.axes": axes})
+    result = uncertainty(design, realizations=3)
+    for row in range(3):
+        drawn = {A1: result.drawn[A1][row]}
+        for cell in (1, 3, 5):  # beta_factor 30
+            assert result.j1[row].ravel()[cell] == lane(design, result.axes, cell, drawn)
+
+
+def test_what_the_first_cell_does_not_tell_is_found_at_the_last(monkeypatch):
+    """Numbers that a draw changes at high gains only: no law here has such, another might."""
+    whole = realizations_module.lane_numbers
+
+    def coupled(design):
+        numbers = whole(design)
+        extra = (design.tables.controller.kp - 500.0) * (design.tables.bit_rock.a1_factor - 1.0)
+        return numbers | {"turning_speed": numbers["turning_speed"] + 0.01 * extra}
+
+    design = small(A1)
+    plain = uncertainty(design, realizations=2)
+    monkeypatch.setattr(realizations_module, "lane_numbers", coupled)
+    monkeypatch.setattr(grid_module, "lane_numbers", coupled)
+    result = uncertainty(design, realizations=2)
+    assert (result.j1[:, 0] == plain.j1[:, 0]).all()  # kp 500
+    assert not (result.j1[:, 1:] == plain.j1[:, 1:]).any()
 
 
 def test_nominal_map_is_that_of_the_design():
