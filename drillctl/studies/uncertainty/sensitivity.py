@@ -180,9 +180,10 @@ def indices(of: str, unit: str, values: Array, parameters: tuple[str, ...], seed
     nothing = np.full(len(parameters), np.nan)
     if np.ptp(values) == 0.0:
         return Indices(of, unit, nothing, nothing, nothing, nothing, 0.0)
+    # SALib takes a seed of 0 for none.
     found = sobol.analyze(
         _problem(parameters), values, calc_second_order=False, num_resamples=RESAMPLES,
-        conf_level=CONFIDENCE, seed=seed,
+        conf_level=CONFIDENCE, seed=seed + 1,
     )  # fmt: skip
     names = {"first": "S1", "total": "ST", "first_error": "S1_conf", "total_error": "ST_conf"}
     columns = {key: np.asarray(found[name], dtype=float) for key, name in names.items()}
