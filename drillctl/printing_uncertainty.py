@@ -106,4 +106,6 @@ def _indices(result: Uncertainty) -> None:
 
 
 def _index(value: float, error: float) -> str:
-    return "-" if value != value else f"{value:.3f} +- {error:.3f}"
+    if value != value:
+        return "-"
+    return f"{value:.3f} (error not known)" if error != error else f"{value:.3f} +- {error:.3f}"

@@ -42,7 +42,7 @@ class Indices:
     first, total : ndarray, shape (parameters,)
         Indices; NaN where the figure does not vary.
     first_error, total_error : ndarray, shape (parameters,)
-        Half-widths of 95 % bootstrap intervals.
+        Half-widths of 95 % bootstrap intervals; NaN where points are too few to tell.
     variance : float
         Of the figure, in its unit squared.
     """
@@ -180,11 +180,12 @@ def indices(of: str, unit: str, values: Array, parameters: tuple[str, ...], seed
     nothing = np.full(len(parameters), np.nan)
     if np.ptp(values) == 0.0:
         return Indices(of, unit, nothing, nothing, nothing, nothing, 0.0)
-    # SALib takes a seed of 0 for none.
-    found = sobol.analyze(
-        _problem(parameters), values, calc_second_order=False, num_resamples=RESAMPLES,
-        conf_level=CONFIDENCE, seed=seed + 1,
-    )  # fmt: skip
+    # SALib takes a seed of 0 for none. A resample may be of equal values: its error is not known.
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = sobol.analyze(
+            _problem(parameters), values, calc_second_order=False, num_resamples=RESAMPLES,
+            conf_level=CONFIDENCE, seed=seed + 1,
+        )  # fmt: skip
     names = {"first": "S1", "total": "ST", "first_error": "S1_conf", "total_error": "ST_conf"}
     columns = {key: np.asarray(found[name], dtype=float) for key, name in names.items()}
     return Indices(of=of, unit=unit, variance=float(values.var()), **columns)
