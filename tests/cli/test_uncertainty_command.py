@@ -160,6 +160,14 @@ def test_tables_for_people(call):
     assert "Traceback" not in err
 
 
+def test_an_index_whose_error_is_not_known_says_so():
+    from drillctl.printing_uncertainty import _index
+
+    assert _index(0.5, 0.1) == "0.500 +- 0.100"
+    assert _index(0.5, float("nan")) == "0.500 (error not known)"
+    assert _index(float("nan"), float("nan")) == "-"
+
+
 def test_maps_over_one_parameter_and_over_three(call):
     one = [*FEW[4:], "--axis", "controller.kp=500:700:3"]
     assert call("uncertainty", PAPER, *one, "--out", "one")[0] == 0

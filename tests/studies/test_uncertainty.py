@@ -403,12 +403,6 @@ def test_sobol_indices_of_a_known_function():
     assert found.first == pytest.approx([0.3139, 0.4424, 0.0], abs=0.03)
     assert found.total == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.03)
     assert (found.total_error < 0.1).all()
-    # Points that hardly vary: some resamples do not at all.
-    few = np.zeros(20)
-    few[3] = 1.0
-    rare = indices("", "", few, tuple(columns), 7)
-    assert np.isnan(rare.first_error).all()
-    assert rare.variance > 0.0
     one, again = (indices("", "", x + y, tuple(columns), 0).first_error for _ in range(2))
     assert (one == again).all()  # seed 0 is a seed
 

@@ -8,6 +8,7 @@ variance that it explains alone, the total index the share that is left when all
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -181,7 +182,8 @@ def indices(of: str, unit: str, values: Array, parameters: tuple[str, ...], seed
     if np.ptp(values) == 0.0:
         return Indices(of, unit, nothing, nothing, nothing, nothing, 0.0)
     # SALib takes a seed of 0 for none. A resample may be of equal values: its error is not known.
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
         found = sobol.analyze(
             _problem(parameters), values, calc_second_order=False, num_resamples=RESAMPLES,
             conf_level=CONFIDENCE, seed=seed + 1,
