@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from drillctl.studies import compare as compare
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
+    from drillctl.studies.uncertainty import uncertainty as uncertainty
 
 _HOME = {
     "Design": "drillctl.design",
@@ -55,6 +56,7 @@ _HOME = {
     "adaptive_map": "drillctl.studies",
     "compare": "drillctl.studies",
     "stability_map": "drillctl.studies",
+    "uncertainty": "drillctl.studies.uncertainty",
     "open": "drillctl.store",
     "plots": "drillctl",
 }

@@ -36,6 +36,9 @@ from drillctl.studies.nominal import Nominal, map_dimension, nominal_design
 from drillctl.studies.regularisation import Regularisation
 from drillctl.studies.sweeps import Sweep
 from drillctl.studies.three_regions import FIELDS, MASKS, ThreeRegions
+from drillctl.studies.uncertainty import Uncertainty
+from drillctl.studies.uncertainty.sensitivity import read_sensitivity
+from drillctl.studies.uncertainty.stopping import Look
 from drillctl.studies.weight_delay import WeightDelay
 
 if TYPE_CHECKING:
@@ -348,6 +351,31 @@ def _resolved(text: str, like: Design) -> Design:
     return Design(like.name, validated(tree, like.origin), tree, like.origin)
 
 
+def read_uncertainty(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Uncertainty:
+    """An `Uncertainty` as it was saved."""
+    lanes = data["audited_lane"].values.astype(np.int64)
+    keep = design.tables.uncertainty.keep
+    measures = {name: data[name].values for name in dict.fromkeys(("j1", *keep))}
+    told = summary.get("sensitivity")
+    return Uncertainty(
+        design=design,
+        axes=tuple(_axis(path, data[stored_name(path)]) for path in summary["axes"]),
+        levels=design.tables.map.levels,
+        drawn={path: data[stored_name(path)].values for path in summary["uncertain"]},
+        measures=measures,
+        status=data["status"].values.astype(np.int8),
+        nominal=data["nominal_j1"].values,
+        audit=Audit(lanes, measures["j1"].ravel()[lanes], data["audited_j1"].values),
+        failures=tuple(Failures(**failure) for failure in summary["failures"]),
+        looks=tuple(
+            Look(**{**one, "interval": tuple(one["interval"])}) for one in summary["looks"]
+        ),
+        sensitivity=None if told is None else read_sensitivity(told),
+        **{name: summary[name] for name in ("seconds", "total_seconds")},
+        provenance={key: str(value) for key, value in data.attrs.items()},
+    )
+
+
 READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "map": read_sweep,
     "adaptive-map": read_adaptive_map,
@@ -360,4 +388,5 @@ READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "regions": read_three_regions,
     "regularisation": read_regularisation,
     "delay": read_weight_delay,
+    "uncertainty": read_uncertainty,
 }

@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from drillctl.progress import Progress
     from drillctl.store import RunFolder
     from drillctl.studies import LoopMap
+    from drillctl.uncertain_runs import How
 
 DPI = 150
-RESUMED = ("map", "adaptive-map")
+RESUMED = ("map", "adaptive-map", "uncertainty")
 """Runs that go on from what was finished; the others have no finished parts to go on from."""
 
 
@@ -248,6 +249,33 @@ def compare(design: Design, options: Options) -> None:
     if not options.json:
         printing.comparison(result, options.units)
     _conclude(folder, result.summary(), options)
+
+
+def uncertainty(design: Design, how: How, options: Options) -> None:
+    """Regions of a map under uncertainty, with pictures and tables."""
+    from drillctl import printing_uncertainty as printing
+    from drillctl import store, studies, uncertain_runs
+
+    if how.resume:
+        uncertain_runs.refuse_nothing_to_resume(options.out)
+    growing = store.growing_realizations(design)
+    folder = store.claim("uncertainty", design, options.out, growing, how.allow_mixed)
+    if _shown_again(
+        folder, options, lambda: printing.uncertainty(store.open(folder.path), options.units)
+    ):
+        return
+    with _running(folder), console.progress() as bar:
+        result = uncertain_runs.computed(design, how, folder, bar, options.units)
+    summary = result.summary()
+    store.write_data(result, folder.path)
+    studies.write_uncertainty_tables(result, folder.path)
+    for name, figure in uncertain_runs.pictures(result, options.units):
+        _draw(figure, folder.path / f"{name}.png")
+    if result.audit.verdict == "look":
+        console.note("audit: look: the engines differ by more than 1 % in J1 in some lane")
+    if not options.json:
+        printing.uncertainty(result, options.units)
+    _conclude(folder, summary, options)
 
 
 def simulate(design: Design, options: Options) -> None:

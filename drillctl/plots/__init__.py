@@ -15,6 +15,8 @@
 - `three_regions.py`: `three_regions` over the same two parameters.
 - `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
 - `weight_delay.py`: `weight_delay`, a weight that follows the bit speed against its delay.
+- `uncertain_regions.py`: `uncertain_regions`, `probability_map` and `region_error` of draws.
+- `uncertain_curves.py`: `area_convergence`, `cell_distributions`, `sensitivity_bars`.
 - `time_response.py`: `time_response`, speeds against time with sticks shaded.
 - `style.py`: colours, sizes and the making of figures, shared by all.
 
@@ -39,11 +41,19 @@ from drillctl.plots.regularisation import regularisation
 from drillctl.plots.root_locus import root_locus
 from drillctl.plots.three_regions import three_regions
 from drillctl.plots.time_response import time_response
+from drillctl.plots.uncertain_curves import (
+    area_convergence,
+    cell_distributions,
+    sensitivity_bars,
+)
+from drillctl.plots.uncertain_regions import probability_map, region_error, uncertain_regions
 from drillctl.plots.weight_delay import weight_delay
 
 __all__ = [
     "adaptive_map",
+    "area_convergence",
     "bode",
+    "cell_distributions",
     "compared_regions",
     "compared_responses",
     "drive_impedance",
@@ -58,12 +68,16 @@ __all__ = [
     "nichols",
     "nyquist",
     "paired_differences",
+    "probability_map",
+    "region_error",
     "regularisation",
     "root_locus",
     "sensitivity",
+    "sensitivity_bars",
     "stability_map",
     "sweep_line",
     "three_regions",
     "time_response",
+    "uncertain_regions",
     "weight_delay",
 ]

@@ -10,7 +10,9 @@
 - `three_regions.py`: locally stable, J1 under a level, attracted: three regions of one map.
 - `attraction.py`: long runs of its cells; `steady.py`: operating points of the cells of a grid.
 - `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
-- `draws.py`: uncertain parameters and draws from them; `drawn_lanes.py`: the lanes of draws.
+- `draws.py`: uncertain parameters and draws from them; `sampling.py`: the points behind them;
+  `drawn_lanes.py`: the lanes of draws.
+- `uncertainty/`: a map at thousands of draws, `uncertainty_tables.py` its CSV.
 - `comparison.py`: cases at the same draws; `cases.py`: what makes them comparable.
 - `weight_delay.py`: a weight on bit that follows the bit speed, against the delay of its path;
   `delayed_lanes.py`: its lanes; `delay_limits.py`: where a benefit ends.
@@ -39,6 +41,8 @@ from drillctl.studies.tables import (
     write_weight_delay,
 )
 from drillctl.studies.three_regions import ThreeRegions, three_regions
+from drillctl.studies.uncertainty import Uncertainty, uncertainty
+from drillctl.studies.uncertainty_tables import write_uncertainty_tables
 from drillctl.studies.weight_delay import WeightDelay, weight_delay
 
 __all__ = [
@@ -51,6 +55,7 @@ __all__ = [
     "Regularisation",
     "Sweep",
     "ThreeRegions",
+    "Uncertainty",
     "WeightDelay",
     "adaptive_map",
     "compare",
@@ -63,10 +68,12 @@ __all__ = [
     "sweep",
     "three_regions",
     "uncertain_parameters",
+    "uncertainty",
     "weight_delay",
     "write_adaptive_tables",
     "write_comparison",
     "write_loop_table",
     "write_tables",
+    "write_uncertainty_tables",
     "write_weight_delay",
 ]

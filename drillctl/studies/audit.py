@@ -128,16 +128,25 @@ def audit(
     """
     cells = choose_cells(values.reshape(shape_of(axes)), levels, count)
     designs = [cell_design(design, axes, int(cell)) for cell in cells]
-    reference = np.array(_all(designs, progress))
+    reference = references(designs, progress)
     return Audit(cells, values.ravel()[cells], reference)
 
 
-def _all(designs: list[Design], progress: Progress) -> list[float]:
+def references(designs: list[Design], progress: Progress = SILENT) -> Array:
+    """J1 of designs by the reference solver (s), on all cores; NaN for those that fail.
+
+    Parameters
+    ----------
+    designs : list of Design
+        One a run.
+    progress : Progress
+        Told of each.
+    """
     import joblib
     import numba
 
     if not designs:
-        return []
+        return np.empty(0)
     progress.begin("auditing cells", len(designs))
     found = []
     # As many as the lanes may use, which is what `--threads` sets.
@@ -148,7 +157,7 @@ def _all(designs: list[Design], progress: Progress) -> list[float]:
     for value in runs:
         found.append(value)
         progress.advance(1)
-    return found
+    return np.array(found)
 
 
 def reference_j1(design: Design) -> float:

@@ -53,6 +53,30 @@ class Axis:
 
 
 @dataclass(frozen=True, eq=False)
+class Part:
+    """The cells of a grid that share a string and the types of their laws.
+
+    Attributes
+    ----------
+    design : Design
+        With the values of the axes that all of the cells share.
+    axes : tuple of Axis
+        The other axes, over which the cells run.
+    cells : ndarray of int, shape (cells,)
+        Index of each cell in the flattened grid.
+    """
+
+    design: Design
+    axes: tuple[Axis, ...]
+    cells: NDArray[np.int64]
+
+    def at(self, corner: int) -> Design:
+        """The design of the first cell (0) or of the last (-1)."""
+        values = {a.path: a.values[corner] for a in self.axes}
+        return replaced(self.design, values) if values else self.design
+
+
+@dataclass(frozen=True, eq=False)
 class Group:
     """The cells of a grid that share a string and the types of their laws.
 
@@ -111,6 +135,23 @@ def shape_of(axes: tuple[Axis, ...]) -> tuple[int, ...]:
     return tuple(len(a) for a in axes)
 
 
+def parts(design: Design, axes: tuple[Axis, ...]) -> Iterator[Part]:
+    """The cells of a grid, string by string and kind by kind.
+
+    Raises
+    ------
+    InputError
+        A value on the grid is impossible; the message says which.
+    """
+    cells = np.arange(np.prod(shape_of(axes), dtype=int)).reshape(shape_of(axes))
+    slices = [_singly(a) if a.shared else _by_kind(design, axes, a) for a in axes]
+    for chosen in itertools.product(*slices):
+        pairs = list(zip(axes, chosen, strict=True))
+        variant = replaced(design, {a.path: a.values[p.start] for a, p in pairs if a.shared})
+        own = tuple(Axis(a.path, a.unit, a.values[p]) for a, p in pairs if not a.shared)
+        yield Part(variant, own, cells[chosen].ravel())
+
+
 def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
     """The cells of a grid, group by group; the string is assembled once a group.
 
@@ -119,21 +160,9 @@ def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
     InputError
         A value on the grid is impossible; the message says which.
     """
-    cells = np.arange(np.prod(shape_of(axes), dtype=int)).reshape(shape_of(axes))
-    parts = [_singly(a) if a.shared else _by_kind(design, axes, a) for a in axes]
-    for chosen in itertools.product(*parts):
-        variant = _replaced(
-            design,
-            {a.path: a.values[p.start] for a, p in zip(axes, chosen, strict=True) if a.shared},
-        )
-        own = tuple(
-            Axis(a.path, a.unit, a.values[p])
-            for a, p in zip(axes, chosen, strict=True)
-            if not a.shared
-        )
-        like = _replaced(variant, {a.path: a.values[0] for a in own}) if own else variant
-        lanes = lanes_of(like, _numbers(variant, own))
-        yield Group(like, lanes, cells[chosen].ravel())
+    for part in parts(design, axes):
+        like = part.at(0)
+        yield Group(like, lanes_of(like, cell_numbers(part.design, part.axes)), part.cells)
 
 
 def _singly(a: Axis) -> list[slice]:
@@ -148,7 +177,7 @@ def _by_kind(design: Design, axes: tuple[Axis, ...], a: Axis) -> list[slice]:
     if not a.path.startswith(("controller.drive.", "weight_on_bit.path.", "scenario.")):
         return [slice(0, len(a))]
     low = {other.path: other.values[0] for other in axes}
-    kind = [kinds(_replaced(design, low | {a.path: value})) for value in a.values]
+    kind = [kinds(replaced(design, low | {a.path: value})) for value in a.values]
     starts = [0, *(k for k in range(1, len(a)) if kind[k] != kind[k - 1])]
     return [slice(i, j) for i, j in itertools.pairwise([*starts, len(a)])]
 
@@ -156,11 +185,19 @@ def _by_kind(design: Design, axes: tuple[Axis, ...], a: Axis) -> list[slice]:
 def cell_design(design: Design, axes: tuple[Axis, ...], cell: int) -> Design:
     """The design of one cell of the flattened grid."""
     where = np.unravel_index(cell, shape_of(axes))
-    return _replaced(design, {a.path: a.values[k] for a, k in zip(axes, where, strict=True)})
+    return replaced(design, {a.path: a.values[k] for a, k in zip(axes, where, strict=True)})
 
 
-def _replaced(design: Design, values: dict[str, float]) -> Design:
-    """The design with SI values put in; an impossible one is told with its path and value."""
+def replaced(design: Design, values: dict[str, float]) -> Design:
+    """The design with SI values put in; an impossible one is told with its path and value.
+
+    Parameters
+    ----------
+    design : Design
+        To be changed.
+    values : dict
+        Dotted path to value (SI).
+    """
     try:
         return design.replace({path: units.SI(value) for path, value in values.items()})
     except InputError as error:
@@ -168,8 +205,16 @@ def _replaced(design: Design, values: dict[str, float]) -> Design:
         raise InputError(f"at {at}: {error}", "map.axes") from None
 
 
-def _numbers(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array]:
-    """Lane numbers of every cell, flattened."""
+def cell_numbers(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array]:
+    """Lane numbers of every cell, flattened.
+
+    Parameters
+    ----------
+    design : Design
+        With whatever the axes do not say.
+    axes : tuple of Axis
+        Over which the cells run.
+    """
     grid = _outer_product(design, axes)
     if grid is None:
         cells = [
@@ -187,11 +232,11 @@ def _outer_product(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array] |
     impossible together with values of this axis, or the reason why it changes nothing.
     """
     low = {a.path: a.values[0] for a in axes}
-    base = lane_numbers(_replaced(design, low) if axes else design)
+    base = lane_numbers(replaced(design, low) if axes else design)
     grid = {key: np.full(shape_of(axes), value) for key, value in base.items()}
     taken: set[str] = set()
     for dimension, a in enumerate(axes):
-        column = [lane_numbers(_replaced(design, low | {a.path: v})) for v in a.values]
+        column = [lane_numbers(replaced(design, low | {a.path: v})) for v in a.values]
         touched = {key for key in base if any(n[key] != base[key] for n in column)}
         if touched & taken:
             return None
@@ -206,7 +251,7 @@ def _right_at_corners(design: Design, axes: tuple[Axis, ...], grid: dict[str, Ar
     """Whether every corner, resolved as a whole, is possible and what the grid says it is."""
     for corner in itertools.product((0, -1), repeat=len(axes)):
         values = {a.path: a.values[k] for a, k in zip(axes, corner, strict=True)}
-        numbers = lane_numbers(_replaced(design, values) if axes else design)
+        numbers = lane_numbers(replaced(design, values) if axes else design)
         if any(grid[key][corner] != value for key, value in numbers.items()):
             return False
     return True

@@ -27,11 +27,28 @@ def refuse_too_large(points: Sequence[int], where: str = "map.axes") -> None:
         Key that asks for them.
     """
     cells = math.prod(points)
-    needed, usable = cells * BYTES_PER_CELL, MEMORY_SHARE * _free_memory()
+    refuse_more_bytes(cells * BYTES_PER_CELL, f"{cells:,} cells", where, "fewer points")
+
+
+def refuse_more_bytes(needed: float, what: str, where: str, instead: str = "fewer of them") -> None:
+    """Refuse (`InputError`) what needs more memory than may be used.
+
+    Parameters
+    ----------
+    needed : float
+        Memory (bytes).
+    what : str
+        What needs it.
+    where : str
+        Key that asks for it.
+    instead : str
+        What would help.
+    """
+    usable = MEMORY_SHARE * _free_memory()
     if needed > usable:
         raise InputError(
-            f"{cells:,} cells need about {needed / 2**30:,.1f} GiB; "
-            f"{usable / 2**30:.1f} GiB may be used: fewer points",
+            f"{what} need about {needed / 2**30:,.1f} GiB; "
+            f"{usable / 2**30:.1f} GiB may be used: {instead}",
             where,
         )
 
