@@ -35,7 +35,8 @@ FAILED = STATUSES.index("failed")
 def small(*paths, **values):
     """Six cells of the paper's map, runs of 20 s."""
     given = {"simulation.duration": "20 s", "simulation.accuracy": "fast", "map.audit_cells": 0,
-             "map.axes": GAINS, "map.levels": [12.0, 15.0, 18.0]}  # fmt: skip
+             "map.axes": GAINS, "map.levels": [12.0, 15.0, 18.0],
+             "uncertainty.full": True}  # fmt: skip
     if paths:
         given["uncertain"] = dict.fromkeys(paths, FIVE)
     return drillctl.load("monteiro-trindade-140kn", **(given | values))
@@ -356,22 +357,10 @@ def test_labels(whole):
     assert data.attrs["processor"]
 
 
-def test_stopped_lanes_are_refused_by_name(monkeypatch):
-    """As an engine does that stops lanes: a lower bound, and the status that says so."""
-    from drillctl.simulation.batch import Batch
-
-    def stopping(lanes, prepared, censor):
-        batch = run_batch(lanes, prepared)
-        late = batch.measures["j1"] > censor
-        measures = {k: np.where(late, np.nan, v) for k, v in batch.measures.items()}
-        measures["j1"] = np.where(late, censor * 1.001, batch.measures["j1"])
-        status = np.where(late, np.int8(STATUSES.index("censored")), batch.status)
-        return Batch(measures, status.astype(np.int8))
-
-    design = small(**{"map.levels": [12.0, 14.0]})
-    full = uncertainty(design, realizations=12)
-    monkeypatch.setattr(job_module, "simulate", stopping)
-    short = uncertainty(design, realizations=12)
+def test_stopped_lanes_are_refused_by_name():
+    values = {"map.levels": [12.0, 14.0]}
+    full = uncertainty(small(**values), realizations=12)
+    short = uncertainty(small(**values, **{"uncertainty.full": False}), realizations=12)
     assert short.censored.any()
     for level in short.levels:
         assert (short.maps[level].counts == full.maps[level].counts).all()
