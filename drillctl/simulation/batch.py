@@ -7,6 +7,7 @@ what they measured into arrays by name.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -251,8 +252,24 @@ def _in_threads(advance: Callable[[int, int], Any], blocks: int) -> None:
     if threads == 1:
         advance(0, blocks)
         return
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda share: advance(*share), _shares(blocks, threads)))
+    shares = deque(_shares(blocks, threads))
+
+    def work() -> None:
+        while shares:
+            try:
+                share = shares.popleft()
+            except IndexError:  # another thread took the last one
+                return
+            advance(*share)
+
+    with ThreadPoolExecutor(threads - 1) as pool:
+        others = [pool.submit(work) for _ in range(threads - 1)]
+        try:
+            work()
+        finally:
+            shares.clear()  # interrupted: the others end what they have begun
+        for other in others:
+            other.result()
 
 
 def _shares(blocks: int, threads: int) -> Iterator[tuple[int, int]]:
