@@ -481,6 +481,13 @@ def test_bad_input_is_told_in_one_message(call, arguments, messages, monkeypatch
     assert not Path("run/data.zarr").exists()
 
 
+def test_a_cluster_needs_its_extra(call, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    code, out, err = call("uncertainty", PAPER, *FEW, "--scheduler", "tcp://node1:8786")
+    assert (code, out) == (2, "")
+    assert '--scheduler: needs dask.distributed: pip install "drillctl[distributed]"' in err
+
+
 def test_validate_tells_what_uncertainty_would(call):
     correlations = ("uncertainty.correlations=[{between = ['bit_rock.a1_factor', "
                     "'bit_rock.a3_factor'], value = 0.5}]")  # fmt: skip
