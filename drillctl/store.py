@@ -33,7 +33,12 @@ from drillctl.provenance import provenance
 from drillctl.simulation.limit_cycle import LimitCycle
 from drillctl.simulation.trajectory import Simulation
 from drillctl.store_blocks import FolderBlocks
-from drillctl.store_differences import difference
+from drillctl.store_differences import (
+    Growing,
+    difference,
+    growing_realizations,
+    refuse_other_machine,
+)
 from drillctl.store_reading import READERS, stored_name
 from drillctl.store_realizations import FolderShelf, write_uncertainty
 from drillctl.studies.adaptive import AdaptiveMap
@@ -113,38 +118,6 @@ class RunFolder:
     def shelf(self) -> FolderShelf:
         """Realizations kept in this folder."""
         return FolderShelf(self.path)
-
-
-@dataclass(frozen=True)
-class Growing:
-    """A count of a design that a finished run may be taken on to.
-
-    Attributes
-    ----------
-    count : int
-        How many are asked for.
-    like : Design
-        The design with another count in its place, the same for all: it identifies the run.
-    """
-
-    count: int
-    like: Design
-
-
-def growing_realizations(design: Design) -> Growing | None:
-    """What lets a run under uncertainty grow; None for draws of a fixed number.
-
-    Parameters
-    ----------
-    design : Design
-        Of the run.
-    """
-    table = design.tables.uncertainty
-    if table.sampling == "latin-hypercube":
-        return None
-    return Growing(
-        table.realizations, design.replace({"uncertainty.realizations": table.replicates})
-    )
 
 
 def claim(
@@ -256,22 +229,8 @@ def _same_run(path: Path, about: dict[str, Any], same: Design, allow_mixed: bool
         return RunFolder(path, about["verb"], finished=True)
     if not os.access(path, os.W_OK):
         raise InputError("cannot be written: permission denied", where)
-    _refuse_other_machine(held["provenance"], where, allow_mixed)
+    refuse_other_machine(held["provenance"], where, allow_mixed)
     return RunFolder(path, about["verb"], finished=False)
-
-
-def _refuse_other_machine(held: dict[str, str], where: str, allow_mixed: bool) -> None:
-    here = provenance()
-    other = [key for key in here if held.get(key) != here[key]]
-    if allow_mixed and other == ["processor"]:
-        return
-    if other:
-        told = ", ".join(f"{key} {held.get(key)}, here {here[key]}" for key in other)
-        raise InputError(
-            "holds a run begun with other packages or on another processor; the rest would differ "
-            f"in the last bits: give another folder ({told})",
-            where,
-        )
 
 
 def _about(path: Path) -> dict[str, Any]:

@@ -1,14 +1,16 @@
-"""What tells a design from the one that a folder was made for."""
+"""What tells a run from the one that a folder was made for, and what may differ."""
 
 from __future__ import annotations
 
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from drillctl.design import Design
 from drillctl.design.writing import to_tree
-from drillctl.errors import shown
+from drillctl.errors import InputError, shown
+from drillctl.provenance import provenance
 
 MOST = 3
 """Keys that are named at most."""
@@ -73,3 +75,60 @@ def _leaves(tree: Any, prefix: str = "") -> dict[str, Any]:
         else:
             found[path] = value
     return found
+
+
+@dataclass(frozen=True)
+class Growing:
+    """A count of a design that a finished run may be taken on to.
+
+    Attributes
+    ----------
+    count : int
+        How many are asked for.
+    like : Design
+        The design with another count in its place, the same for all: it identifies the run.
+    """
+
+    count: int
+    like: Design
+
+
+def growing_realizations(design: Design) -> Growing | None:
+    """What lets a run under uncertainty grow; None for draws of a fixed number.
+
+    Parameters
+    ----------
+    design : Design
+        Of the run.
+    """
+    table = design.tables.uncertainty
+    if table.sampling == "latin-hypercube":
+        return None
+    return Growing(
+        table.realizations, design.replace({"uncertainty.realizations": table.replicates})
+    )
+
+
+def refuse_other_machine(held: dict[str, str], where: str, allow_mixed: bool) -> None:
+    """Refuse (`InputError`) to go on with a run of other packages or another processor.
+
+    Parameters
+    ----------
+    held : dict of str
+        Provenance of what was run so far.
+    where : str
+        Option that names its folder.
+    allow_mixed : bool
+        Whether the processor may be of another type.
+    """
+    here = provenance()
+    other = [key for key in here if held.get(key) != here[key]]
+    if allow_mixed and other == ["processor"]:
+        return
+    if other:
+        told = ", ".join(f"{key} {held.get(key)}, here {here[key]}" for key in other)
+        raise InputError(
+            "holds a run begun with other packages or on another processor; the rest would differ "
+            f"in the last bits: give another folder ({told})",
+            where,
+        )

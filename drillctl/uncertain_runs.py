@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from drillctl.errors import InputError
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from drillctl.progress import Progress
     from drillctl.store import RunFolder
     from drillctl.studies import Uncertainty
-    from drillctl.studies.uncertainty.running import Workers
 
 
 @dataclass(frozen=True)
@@ -81,13 +80,18 @@ def computed(
 
     shelf = folder.shelf()
     interim = None if how.interim is None else _Interim(how.interim, folder.path, system)
+    given: dict[str, Any] = {"progress": bar, "shelf": shelf, "interim": interim}
     if how.scheduler is None:
-        return studies.uncertainty(design, progress=bar, shelf=shelf, interim=interim)
-    with connect(how.scheduler) as client:
-        workers: Workers = Cluster(client, how.allow_mixed)
-        return studies.uncertainty(
-            design, progress=bar, shelf=shelf, workers=workers, interim=interim
-        )
+        result = studies.uncertainty(design, **given)
+    else:
+        with connect(how.scheduler) as client:
+            workers = Cluster(client, how.allow_mixed)
+            result = studies.uncertainty(design, workers=workers, **given)
+    (folder.path / INTERIM).unlink(missing_ok=True)
+    return result
+
+
+INTERIM = "interim.png"
 
 
 class _Interim:
@@ -97,16 +101,16 @@ class _Interim:
         self._every, self._folder, self._system = every, folder, system
         self._next = time.monotonic() + every
 
-    def __call__(self, so_far: Callable[[], Uncertainty]) -> None:
+    def __call__(self, so_far: Callable[[], Uncertainty | None]) -> None:
         if time.monotonic() < self._next:
             return
         from drillctl import plots
 
         result = so_far()
-        if len(result.axes) == 2:
+        if result is not None and len(result.axes) == 2:
             part = self._folder / "interim.part.png"
             plots.probability_map(result, system=self._system).savefig(part)
-            part.replace(self._folder / "interim.png")
+            part.replace(self._folder / INTERIM)
         self._next = time.monotonic() + self._every
 
 

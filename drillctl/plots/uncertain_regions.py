@@ -53,7 +53,8 @@ def uncertain_regions(
         The result has another number of parameters than two.
     """
     figure, panels, x, y = _panels(result, ax, system)
-    few = result.realizations <= FEW
+    # Between a cell that is known and one that was stopped an outline is not.
+    few = result.realizations <= FEW and not result.censored.any()
     for panel, level in zip(panels, result.levels, strict=True):
         probability = result.maps[level].probability
         _bands(panel, x, y, probability, result.realizations)

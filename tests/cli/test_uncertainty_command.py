@@ -268,6 +268,24 @@ def same(one, other):
     assert left == right
 
 
+def test_interim_pictures_show_what_is_finished(call, monkeypatch):
+    from drillctl import plots
+
+    draws, picture = [], plots.probability_map
+
+    def noted(result, **options):
+        draws.append(result.realizations)
+        return picture(result, **options)
+
+    monkeypatch.setattr(plots, "probability_map", noted)
+    begun(call, monkeypatch, "--interim", "0")
+    assert draws == [4]
+    assert Path("run/interim.png").stat().st_size > 3000
+    assert call("uncertainty", PAPER, *FEW, "--interim", "0", "--out", "run")[0] == 0
+    assert draws == [4, 8, 12, 12]
+    assert not Path("run/interim.png").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -282,7 +300,7 @@ def test_there_must_be_something_to_go_on_with(call, arguments, message):
     assert not Path("nothing").exists()
 
 
-def begun(call, monkeypatch):
+def begun(call, monkeypatch, *options):
     """A folder with one finished block of three."""
     from drillctl.store_realizations import StoredRealizations
 
@@ -296,7 +314,7 @@ def begun(call, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(StoredRealizations, "keep", first_only)
-        assert call("uncertainty", PAPER, *FEW, "--out", "run")[0] == 130
+        assert call("uncertainty", PAPER, *FEW, *options, "--out", "run")[0] == 130
 
 
 def test_another_design_or_version_is_refused_with_the_difference(call, monkeypatch):
@@ -461,6 +479,13 @@ def test_bad_input_is_told_in_one_message(call, arguments, messages, monkeypatch
         assert message in err
     assert "Traceback" not in err
     assert not Path("run/data.zarr").exists()
+
+
+def test_a_cluster_needs_its_extra(call, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    code, out, err = call("uncertainty", PAPER, *FEW, "--scheduler", "tcp://node1:8786")
+    assert (code, out) == (2, "")
+    assert '--scheduler: needs dask.distributed: pip install "drillctl[distributed]"' in err
 
 
 def test_validate_tells_what_uncertainty_would(call):

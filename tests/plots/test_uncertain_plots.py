@@ -11,6 +11,7 @@ import drillctl
 from drillctl import plots
 from drillctl.errors import InputError
 from drillctl.plots.uncertain_regions import border
+from drillctl.simulation.measures import STATUSES
 from drillctl.studies.uncertainty import uncertainty
 
 GAINS = [
@@ -82,6 +83,10 @@ def test_few_draws_are_shown_one_by_one(result):
     assert lines(few) > lines(result)
     assert any("each draw" in text for text in texts(plots.uncertain_regions(few)))
     assert not any("each draw" in text for text in texts(plots.uncertain_regions(result)))
+    status = few.status.copy()
+    status[0, 0, 0] = STATUSES.index("censored")
+    stopped = dataclasses.replace(few, status=status)
+    assert not any("each draw" in text for text in texts(plots.uncertain_regions(stopped)))
 
 
 @pytest.mark.parametrize("total", [1, 9, 10, 20, 40, 10_000])

@@ -89,6 +89,7 @@ def test_axes_that_change_the_string():
     check_lanes(design, uncertainty(design, realizations=2))
 
 
+@pytest.mark.slow  # a kernel of its own
 def test_draws_that_make_other_laws_run_by_themselves():
     """A delay of zero is no delay: half of these draws take another kernel."""
     law = {"distribution": "samples", "samples": ["0 s", "0.5 s"]}

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+SoFar = Callable[[], Uncertainty | None]
+
 AUDITED = 64
 """Realizations that audited lanes are chosen from: the first ones are as good as any."""
 COPIES = 4
@@ -69,7 +71,7 @@ def uncertainty(
     progress: Progress = SILENT,
     shelf: Shelf | None = None,
     workers: Workers | None = None,
-    interim: Callable[[Callable[[], Uncertainty]], None] | None = None,
+    interim: Callable[[SoFar], None] | None = None,
 ) -> Uncertainty:
     """Simulate a map at every realization of what is uncertain in a design.
 
@@ -94,7 +96,7 @@ def uncertainty(
         Who computes blocks, instead of `client` or this process.
     interim : callable, optional
         Called after every block with a function that gives the result of all realizations
-        that are finished up to the first that is not.
+        that are finished up to the first that is not; None if that is the very first.
 
     Returns
     -------
@@ -155,7 +157,7 @@ class _Study:
         progress: Progress,
         shelf: Shelf,
         workers: Workers,
-        interim: Callable[[Callable[[], Uncertainty]], None] | None,
+        interim: Callable[[SoFar], None] | None,
     ) -> None:
         self.design, self.axes, self.progress = design, axes, progress
         self.shelf, self.workers, self.interim = shelf, workers, interim
@@ -221,12 +223,14 @@ class _Study:
         """Realizations that were run, what was seen at each look, and the time (s)."""
         most, until = self.table.realizations, self.table.until
 
+        def so_far(asked: int) -> Uncertainty | None:
+            left = kept.missing(asked)
+            done = left[0][0] if left else asked
+            return self._made(kept, done, nominal) if done else None
+
         def after(asked: int) -> None:
             if self.interim is not None:
-                left = kept.missing(asked)
-                done = left[0][0] if left else asked
-                if done:
-                    self.interim(lambda: self._made(kept, done, nominal))
+                self.interim(partial(so_far, asked))
 
         if until is None:
             seconds = run(job, most, kept, self.workers, self.progress, lambda: after(most))
