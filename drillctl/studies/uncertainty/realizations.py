@@ -145,11 +145,10 @@ class PartOfMap:
     def _by_string(self, group: list[_Resolved]) -> Iterator[Run]:
         """Lanes of realizations whose laws are of the same types, scheme by scheme."""
         like = group[0].design  # without strings of their own they need none assembled
-        cells = len(self.part.cells[self._telling])
         telling = lanes_of(like, self._columns(group, self._telling))
         together: dict[int, tuple[Prepared, list[_Resolved]]] = {}
         for place, one in enumerate(group):
-            lanes = telling[place * cells : (place + 1) * cells]
+            lanes = telling[place :: len(group)]
             key = self.string_key(one.design, one.numbers)
             ready = self.strings.prepared(key, lanes, _simulation(like))
             together.setdefault(id(ready), (ready, []))[1].append(one)
@@ -245,18 +244,22 @@ class PartOfMap:
         return (kinds(design), tuple(numbers.get(key, 0.0) for key in TIMED))
 
     def _run(self, group: list[_Resolved], lanes: Lanes, ready: Prepared) -> Run:
-        rows = np.repeat([one.row for one in group], len(self.part.cells))
-        return Run(lanes, ready, rows, np.tile(self.part.cells, len(group)))
+        rows = np.tile([one.row for one in group], len(self.part.cells))
+        return Run(lanes, ready, rows, np.repeat(self.part.cells, len(group)))
 
     def _columns(self, group: list[_Resolved], chosen: slice) -> dict[str, Array]:
-        """Numbers of the lanes of some realizations at chosen cells, by name."""
+        """Numbers of the lanes of some realizations at chosen cells, by name.
+
+        Cell after cell: realizations of one cell pass the highest level at about the same time,
+        so that blocks of lanes that are given up end together.
+        """
         cells = len(self.part.cells[chosen])
         columns = {}
         for key in group[0].numbers:
             if key in self.moved:
-                columns[key] = np.tile(self.moved[key][chosen], len(group))
+                columns[key] = np.repeat(self.moved[key][chosen], len(group))
             else:
-                columns[key] = np.repeat([one.numbers[key] for one in group], cells)
+                columns[key] = np.tile([one.numbers[key] for one in group], cells)
         return columns
 
 
