@@ -10,13 +10,15 @@ from pathlib import Path
 from drillctl.errors import InputError
 from drillctl.simulation.batch import FLOATS
 
-BYTES_PER_CELL = 8 * (2 * len(FLOATS) + 20)
-"""Memory that a cell takes while a sweep runs."""
+BYTES_PER_CELL, BYTES_PER_MEASURE = 160, 16
+"""Memory that a cell takes while a sweep runs, and each measure that is kept of it."""
 MEMORY_SHARE = 0.5
 """Largest share of the free memory that a sweep may ask for."""
 
 
-def refuse_too_large(points: Sequence[int], where: str = "map.axes") -> None:
+def refuse_too_large(
+    points: Sequence[int], where: str = "map.axes", kept: int = len(FLOATS)
+) -> None:
     """Refuse (`InputError`) a grid of so many points along its axes, if memory falls short.
 
     Parameters
@@ -25,9 +27,12 @@ def refuse_too_large(points: Sequence[int], where: str = "map.axes") -> None:
         Along each axis.
     where : str
         Key that asks for them.
+    kept : int
+        How many measures are kept of a cell.
     """
     cells = math.prod(points)
-    needed, usable = cells * BYTES_PER_CELL, MEMORY_SHARE * _free_memory()
+    needed = cells * (BYTES_PER_CELL + kept * BYTES_PER_MEASURE)
+    usable = MEMORY_SHARE * _free_memory()
     if needed > usable:
         raise InputError(
             f"{cells:,} cells need about {needed / 2**30:,.1f} GiB; "

@@ -237,7 +237,7 @@ class _Collected:
         number = done = 0
         warm: set[type] = set()
         for index, group in enumerate(groups(design, self.axes)):
-            table, lanes = group.design.tables.simulation, group.lanes
+            table, lanes = group.design.tables.simulation, group.telling
             prepared = blocks.prepared(index, partial(prepare, lanes, table))
             self.schemes.add((prepared.scheme.step, prepared.scheme.modes))
             kind = type(prepared.stepper.string)
@@ -247,15 +247,16 @@ class _Collected:
                 warm_up(lanes, prepared)
                 progress.begin("simulating lanes", len(self.status))
                 progress.advance(done)
-            for first in range(0, len(lanes), CHUNK):
-                part = slice(first, first + CHUNK)
+            for first in range(0, len(group), CHUNK):
+                part = np.arange(first, min(first + CHUNK, len(group)))
                 batch = blocks.find(number)
                 if batch is None:
+                    lanes = group.some(part)
                     begin = time.perf_counter()
-                    batch = run_batch(lanes[part], prepared)
+                    batch = run_batch(lanes, prepared)
                     self.seconds += time.perf_counter() - begin
                     blocks.keep(number, batch)
-                self._put(group.cells[part], batch)
+                self._put(group.cells_of(part), batch)
                 progress.advance(len(batch.status))
                 done += len(batch.status)
                 number += 1
