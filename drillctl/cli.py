@@ -373,6 +373,10 @@ def map_(
     full_audit: Annotated[
         bool, typer.Option("--full-audit", help="Set an adaptive map beside the full grid.")
     ] = False,
+    measure: Annotated[
+        list[str] | None,
+        typer.Option("--measure", metavar="NAME", help="Keep this one and J1 alone; repeatable."),
+    ] = None,
     out: Out = None,
     json: Json = False,
     threads: Threads = None,
@@ -388,12 +392,14 @@ def map_(
     if audit is not None:
         found = found.replace({"map.audit_cells": audit})
     options = Options(out, json, units, verbose)
+    if adaptive and measure:
+        raise InputError("goes with the full grid, not with --adaptive", "--measure")
     if adaptive:
         verbs.adaptive_map(found, full_audit, options)
     elif full_audit:
         raise InputError("goes with --adaptive: any other map is the full grid", "--full-audit")
     else:
-        verbs.stability_map(found, options)
+        verbs.stability_map(found, measure or None, options)
 
 
 def _with_axes(design: Design, axes: list[str] | None) -> Design:

@@ -29,6 +29,7 @@ from drillctl.errors import InputError
 from drillctl.json_files import read_json, write_json, write_text
 from drillctl.linear.modal import Modes
 from drillctl.provenance import provenance
+from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.limit_cycle import LimitCycle
 from drillctl.simulation.trajectory import Simulation
 from drillctl.store_blocks import FolderBlocks
@@ -278,6 +279,7 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["axes"] = axes
         if not np.array_equal(cells, result.audit.cells):
             settings["audited"] = result.audit.cells.tolist()
+        settings |= asked_measures(tuple(result.measures))
     elif isinstance(result, AdaptiveMap):
         settings = _asked_of_adaptive(result)
     elif isinstance(result, LoopMap):
@@ -306,6 +308,11 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
     elif isinstance(result, Modes):
         settings["count"] = max(len(result.free_free), len(result.fixed_top))
     return design, settings
+
+
+def asked_measures(kept: tuple[str, ...]) -> dict[str, Any]:
+    """What a map that keeps some measures alone was asked for, for `claim`."""
+    return {} if kept == FLOATS else {"measures": list(kept)}
 
 
 def _asked_of_adaptive(result: AdaptiveMap) -> dict[str, Any]:

@@ -60,7 +60,7 @@ def read_sweep(design: Design, data: xarray.Dataset, summary: dict[str, Any]) ->
         design=design,
         axes=axes,
         levels=design.tables.map.levels,
-        measures={name: data[name].values for name in FLOATS},
+        measures={name: data[name].values for name in FLOATS if name in data},
         status=data["status"].values.astype(np.int8),
         audit=Audit(cells, j1.ravel()[cells], data["audited_j1"].values),
         step=summary["step"],

@@ -274,17 +274,22 @@ def simulate(design: Design, options: Options) -> None:
     _conclude(folder, summary, options)
 
 
-def stability_map(design: Design, options: Options) -> None:
+def stability_map(design: Design, measures: list[str] | None, options: Options) -> None:
     """A sweep with its map, regions, audit and responses."""
     from drillctl import plots, printing, store, studies
+    from drillctl.studies.sweeps import kept_measures
 
-    folder = store.claim("map", design, options.out)
+    try:
+        kept = kept_measures(measures)
+    except InputError as error:
+        raise InputError(error.problem, "--measure") from None
+    folder = store.claim("map", design, options.out, **store.asked_measures(kept))
     if _shown_again(
         folder, options, lambda: printing.sweep(store.open(folder.path), options.units)
     ):
         return
     with _running(folder), console.progress() as bar:
-        result = studies.sweep(design, progress=bar, blocks=folder.blocks())
+        result = studies.sweep(design, progress=bar, blocks=folder.blocks(), measures=kept)
     if result.minimum is None:
         console.note("warning: no cell gives a finite answer; see the statuses")
     store.write_data(result, folder.path)

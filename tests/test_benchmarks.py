@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from functools import cache
 
 import numpy as np
@@ -169,3 +171,15 @@ def test_a_whole_run_is_printed_written_and_drawn(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "Gflop/s" in printed
     assert "not measured" in printed  # CVODE was left out
+
+
+@pytest.mark.slow
+def test_ten_million_lanes_stay_under_a_gibibyte():
+    """In a process of its own: its peak counts whatever it has ever held."""
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.memory"], capture_output=True, text=True, check=True
+    )
+    found = json.loads(done.stdout)
+    assert found["lanes"] >= 10_000_000
+    assert 0.0 < found["shares"]["0.874876"] < 1.0
+    assert found["before_bytes"] < found["peak_bytes"] < 2**30

@@ -90,14 +90,14 @@ def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> NDArra
     random = np.random.default_rng(SEED)
     edges = [-np.inf, *levels, 2.0 * levels[-1]]
     bands = [
-        list(random.permutation(np.flatnonzero((flat > low) & (flat <= high))))
+        random.permutation(np.flatnonzero((flat > low) & (flat <= high)))
         for low, high in pairwise(edges)
     ]
-    chosen: list[int] = []
-    while len(chosen) < count and any(bands):
-        for band in bands:
-            if band and len(chosen) < count:
-                chosen.append(int(band.pop()))
+    # A band gives its last cells first; of a large map they stay in arrays.
+    turns = sorted(
+        (turn, band) for band, cells in enumerate(bands) for turn in range(min(len(cells), count))
+    )
+    chosen = [int(bands[band][-1 - turn]) for turn, band in turns[:count]]
     return np.array(sorted(chosen), dtype=np.int64)
 
 

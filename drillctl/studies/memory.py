@@ -10,8 +10,8 @@ from pathlib import Path
 from drillctl.errors import InputError
 from drillctl.simulation.batch import FLOATS
 
-BYTES_PER_CELL, BYTES_PER_MEASURE = 160, 16
-"""Memory that a cell takes while a sweep runs, and each measure that is kept of it."""
+BYTES_PER_CELL, BYTES_PER_MEASURE = 80, 10
+"""Memory that a cell takes in a sweep, its regions and its file, and each measure kept of it."""
 MEMORY_SHARE = 0.5
 """Largest share of the free memory that a sweep may ask for."""
 
