@@ -10,11 +10,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks import machine, roofline, run
+from benchmarks import run
 from benchmarks.exact import exact_j1
 from benchmarks.job import CELLS, Job, load_job
 from benchmarks.peers import MODULES, all_peers
 from benchmarks.timing import in_turn, interleave, row_of
+from drillctl import machine
+from drillctl.simulation.cost import count
 from drillctl.simulation.propagator import string_step
 from drillctl.simulation.start import Start
 
@@ -117,7 +119,7 @@ def test_operations_of_the_modal_pass_are_counted_right(modes):
     state = stepper.state(start, np.zeros(1))[:, 0]
     Counted.operations = 0
     moved, sums = step_by_hand(string, np.vectorize(Counted)(state), Counted(0.0), Counted(0.0))
-    counted = roofline.count(string)
+    counted = count(string)
     assert Counted.operations == modes * counted.flops
     assert counted.bytes == 8 * (len(state) + len(moved)) / modes
     # It is the step of a string: untwisted and free it turns on, -1 rad/s for 20 ms.
