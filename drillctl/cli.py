@@ -402,6 +402,28 @@ def map_(
         verbs.stability_map(found, measure or None, options)
 
 
+@app.command()
+def doctor(
+    design: DesignName,
+    sets: Sets = None,
+    axis: Axes = None,
+    audit: Annotated[
+        int, typer.Option("--audit", min=0, help="Lanes to audit with the reference solver.")
+    ] = 4,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """Step and modes of the batch engine and why; its estimated and audited error; its speed."""
+    from drillctl import verbs
+
+    _use(threads)
+    found = _with_axes(_load(design, sets), axis)
+    verbs.doctor(found, audit, Options(out, json, "si", verbose))
+
+
 def _with_axes(design: Design, axes: list[str] | None) -> Design:
     from drillctl.design.reading import parse_axis
 

@@ -40,6 +40,7 @@ from drillctl.studies.audit import choose_cells
 from drillctl.studies.cases import case_designs
 from drillctl.studies.comparison import Comparison
 from drillctl.studies.contour_search import INTERVALS
+from drillctl.studies.diagnosis import Doctor
 from drillctl.studies.grid import axes_of
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.regularisation import WIDTHS, Regularisation
@@ -217,6 +218,7 @@ def write_data(result: Any, folder: Path) -> None:
 
 VERBS = {
     "AdaptiveMap": "adaptive-map",
+    "Doctor": "doctor",
     "Sweep": "map",
     "Simulation": "simulate",
     "Modes": "modes",
@@ -282,6 +284,8 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
         settings |= asked_measures(tuple(result.measures))
     elif isinstance(result, AdaptiveMap):
         settings = _asked_of_adaptive(result)
+    elif isinstance(result, Doctor):
+        settings["audited"] = result.asked
     elif isinstance(result, LoopMap):
         axes = [[a.path, a.values.tolist()] for a in result.axes]
         settings = {"quantities": list(result.values)} | (

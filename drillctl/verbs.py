@@ -339,3 +339,21 @@ def adaptive_map(design: Design, full_grid: bool, options: Options) -> None:
         if check is not None and check.verdict == "look":
             console.note(f"{name}: look: {reason}")
     _conclude(folder, result.summary(), options)
+
+
+def doctor(design: Design, audit_cells: int, options: Options) -> None:
+    """What the batch engine does with a design: scheme, errors, speed, with a figure."""
+    import drillctl
+    from drillctl import plots, printing_doctor, store
+
+    folder = store.claim("doctor", design, options.out, audited=audit_cells)
+    if _shown_again(folder, options, lambda: printing_doctor.doctor(store.open(folder.path))):
+        return
+    with _running(folder), console.progress() as bar:
+        result = drillctl.doctor(design, audit_cells, progress=bar)
+    store.write_data(result, folder.path)
+    if len(result.cells):
+        _draw(plots.error_estimate(result), folder.path / "errors.png")
+    if not options.json:
+        printing_doctor.doctor(result)
+    _conclude(folder, result.summary(), options)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -128,26 +130,42 @@ def audit(
     """
     cells = choose_cells(values.reshape(shape_of(axes)), levels, count)
     designs = [cell_design(design, axes, int(cell)) for cell in cells]
-    reference = np.array(_all(designs, progress))
+    reference = np.array(references(designs, progress))
     return Audit(cells, values.ravel()[cells], reference)
 
 
-def _all(designs: list[Design], progress: Progress) -> list[float]:
+def references(
+    designs: list[Design], progress: Progress = SILENT, seconds: float = math.inf
+) -> list[float]:
+    """J1 of designs by the reference solver, on all cores.
+
+    Parameters
+    ----------
+    designs : list of Design
+        To be simulated.
+    progress : Progress
+        Told of each.
+    seconds : float
+        After so long (s) no further design is begun: there are then fewer values than designs.
+    """
     import joblib
     import numba
 
     if not designs:
         return []
     progress.begin("auditing cells", len(designs))
-    found = []
+    begin, found = time.perf_counter(), list[float]()
     # As many as the lanes may use, which is what `--threads` sets.
     workers = min(len(designs), numba.get_num_threads())
-    runs = joblib.Parallel(n_jobs=workers, return_as="generator")(
-        joblib.delayed(reference_j1)(d) for d in designs
-    )
-    for value in runs:
-        found.append(value)
-        progress.advance(1)
+    at_a_time = len(designs) if math.isinf(seconds) else workers
+    with joblib.Parallel(n_jobs=workers, return_as="generator") as parallel:
+        for first in range(0, len(designs), at_a_time):
+            if time.perf_counter() - begin > seconds:
+                break
+            part = designs[first : first + at_a_time]
+            for value in parallel(joblib.delayed(reference_j1)(d) for d in part):
+                found.append(value)
+                progress.advance(1)
     return found
 
 

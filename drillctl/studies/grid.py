@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design, parameter
+from drillctl.design.drive import tracking
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
 from drillctl.simulation.batch import FLOATS
@@ -59,6 +60,8 @@ OF_THE_ROCK = ("friction.", "before.", "weight.", "weight_program.", "set_speed"
 """Names of numbers on which the steepest falling slope of the rock depends."""
 OF_THE_PROGRAM = ("speed_program.", "weight_program.", "rock_until")
 """Names of numbers that say when something jumps or turns."""
+TRACKING, TRACKED_BY = "drive.tracking", "controller.drive.tracking_time"
+"""The one number that two usual axes have in common: it follows from both gains, unless given."""
 SEARCHED = 4096
 """Lanes in which the steepest rock is looked for at a time."""
 
@@ -99,6 +102,16 @@ class Group:
         inside = np.unravel_index(chosen, self.shape)
         at = tuple(begin + i for begin, i in zip(self.begins, inside, strict=True))
         return np.ravel_multi_index(at, self.whole)
+
+    def lanes_at(self, cells: Index) -> Index:
+        """Lane of each cell of the flattened grid; -1 for cells of other groups."""
+        if not self.whole:
+            return cells
+        at = np.array(np.unravel_index(cells, self.whole))
+        inside = at - np.array(self.begins)[:, None]
+        ends = np.array(self.shape)[:, None]
+        mine = ((inside >= 0) & (inside < ends)).all(axis=0)
+        return np.where(mine, np.ravel_multi_index(tuple(inside % ends), self.shape), -1)
 
     @cached_property
     def lanes(self) -> Lanes:
@@ -254,15 +267,19 @@ def _outer_product(design: Design, axes: tuple[Axis, ...]) -> NumberGrid | None:
     base = lane_numbers(_replaced(design, low) if axes else design)
     found = {key: np.full((1,) * len(axes), value) for key, value in base.items()}
     taken: set[str] = set()
+    tracked = {TRACKING} & set(base) if TRACKED_BY not in low else set()
     for dimension, a in enumerate(axes):
         column = [lane_numbers(_replaced(design, low | {a.path: v})) for v in a.values]
         touched = {key for key in base if any(n[key] != base[key] for n in column)}
-        if touched & taken:
+        if (touched & taken) - tracked:
             return None
         taken |= touched
         along = [-1 if d == dimension else 1 for d in range(len(axes))]
         for key in touched:
             found[key] = np.array([n[key] for n in column]).reshape(along)
+    if tracked and found["drive.kp"].size > 1 and found["drive.ki"].size > 1:
+        drive = design.tables.controller.drive
+        found[TRACKING] = tracking(found["drive.kp"], found["drive.ki"], drive)
     grid = NumberGrid(shape_of(axes), found)
     return grid if _right_at_corners(design, axes, grid) else None
 

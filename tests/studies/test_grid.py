@@ -204,6 +204,35 @@ def test_large_grids_are_not_resolved_cell_by_cell(paper, monkeypatch):
     assert len(resolved) < 130
 
 
+LIMITED = {"controller.drive.torque_limit": "20 kN*m", "controller.drive.lag": "10 ms"}
+
+
+@pytest.mark.parametrize("windup", ["back-calculation", "none", "1 s"])
+def test_gains_of_a_limited_drive_are_not_resolved_cell_by_cell(paper, windup, monkeypatch):
+    """The rate of the anti-windup is ki / kp, but for gains of zero; 1/s at opposite corners."""
+    key = "tracking_time" if windup == "1 s" else "anti_windup"
+    design = paper.replace(LIMITED | {f"controller.drive.{key}": windup})
+    axes = grid(design, ("controller.kp", 0, 1000, 7), ("controller.ki", 0, 1000, 6))
+    check_every_cell(design, axes)
+    resolved = []
+    real = drillctl.Design.replace
+    monkeypatch.setattr(drillctl.Design, "replace", lambda *a: resolved.append(1) or real(*a))
+    list(groups(design, axes))
+    assert len(resolved) < 25
+
+
+def test_a_limited_drive_with_its_tracking_on_an_axis(paper):
+    """Then the rate follows from three axes: cell by cell."""
+    design = paper.replace(LIMITED | {"controller.drive.tracking_time": "1 s"})
+    check_every_cell(
+        design,
+        grid(
+            design, ("controller.kp", 0, 1000, 2), ("controller.ki", 0, 500, 2),
+            ("controller.drive.tracking_time", "1 s", "3 s", 3),
+        ),
+    )  # fmt: skip
+
+
 SHARED = {
     "length": [("drillstring.sections.pipe.length", "1000 m", "3000 m", 3)],
     "elements": [("drillstring.sections.pipe.elements", 10, 30, 3)],
