@@ -85,9 +85,11 @@ def engine_speed(lanes: Lanes, prepared: Prepared) -> Speed:
         Their scheme.
     """
     warm_up(lanes, prepared)
-    once, _ = _best(lanes, prepared, 2)
-    wanted = min(MOST_LANES, len(lanes) * max(1, round(1.2 * SECONDS / once)))
-    many = lanes[np.arange(wanted) % len(lanes)]
+    many = lanes
+    while (seconds := _best(many, prepared, 1)[0]) < SECONDS and len(many) < MOST_LANES:
+        # The first runs are slow for other reasons than their lanes: not too much at once.
+        wanted = len(many) * min(10.0, max(1.5, 1.3 * SECONDS / seconds))
+        many = lanes[np.arange(min(MOST_LANES, int(wanted) + 1)) % len(lanes)]
     seconds, used = _best(many, prepared, REPEATS)
     lane_step = used / (len(many) * prepared.scheme.steps)
     mode = _cost_of_a_mode(many, prepared, lane_step)
