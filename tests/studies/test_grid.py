@@ -8,7 +8,7 @@ import pytest
 import drillctl
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
-from drillctl.simulation.batch import prepare
+from drillctl.simulation.batch import _turns, prepare
 from drillctl.simulation.lanes import lane_numbers
 from drillctl.studies import sweep
 from drillctl.studies.grid import axes_of, axis, cell_design, groups, shape_of
@@ -325,6 +325,7 @@ def test_a_few_lanes_ask_for_the_scheme_of_all(paper, case, monkeypatch):
         table = group.design.tables.simulation
         assert prepare(group.telling, table).scheme == prepare(group.lanes, table).scheme
         assert group.telling.steepest_fall == group.lanes.steepest_fall
+        np.testing.assert_array_equal(_turns(group.telling), _turns(group.lanes))
 
 
 def test_a_grid_of_ten_million_cells_is_two_columns(paper):
