@@ -435,6 +435,10 @@ def map_(
     full_audit: Annotated[
         bool, typer.Option("--full-audit", help="Set an adaptive map beside the full grid.")
     ] = False,
+    measure: Annotated[
+        list[str] | None,
+        typer.Option("--measure", metavar="NAME", help="Keep this one and J1 alone; repeatable."),
+    ] = None,
     out: Out = None,
     json: Json = False,
     threads: Threads = None,
@@ -450,12 +454,36 @@ def map_(
     if audit is not None:
         found = found.replace({"map.audit_cells": audit})
     options = Options(out, json, units, verbose)
+    if adaptive and measure:
+        raise InputError("goes with the full grid, not with --adaptive", "--measure")
     if adaptive:
         verbs.adaptive_map(found, full_audit, options)
     elif full_audit:
         raise InputError("goes with --adaptive: any other map is the full grid", "--full-audit")
     else:
-        verbs.stability_map(found, options)
+        verbs.stability_map(found, measure or None, options)
+
+
+@app.command()
+def doctor(
+    design: DesignName,
+    sets: Sets = None,
+    axis: Axes = None,
+    audit: Annotated[
+        int, typer.Option("--audit", min=0, help="Lanes to audit with the reference solver.")
+    ] = 4,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """Step and modes of the batch engine and why; its estimated and audited error; its speed."""
+    from drillctl import verbs
+
+    _use(threads)
+    found = _with_axes(_load(design, sets), axis)
+    verbs.doctor(found, audit, Options(out, json, "si", verbose))
 
 
 def _with_axes(design: Design, axes: list[str] | None) -> Design:

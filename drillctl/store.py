@@ -30,6 +30,7 @@ from drillctl.errors import InputError
 from drillctl.json_files import read_json, write_json, write_text
 from drillctl.linear.modal import Modes
 from drillctl.provenance import provenance
+from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.limit_cycle import LimitCycle
 from drillctl.simulation.trajectory import Simulation
 from drillctl.store_blocks import FolderBlocks
@@ -47,6 +48,7 @@ from drillctl.studies.audit import choose_cells
 from drillctl.studies.cases import case_designs
 from drillctl.studies.comparison import Comparison
 from drillctl.studies.contour_search import INTERVALS
+from drillctl.studies.diagnosis import Doctor
 from drillctl.studies.grid import Axis, axes_of
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.regularisation import WIDTHS, Regularisation
@@ -258,6 +260,7 @@ def write_data(result: Any, folder: Path) -> None:
 
 VERBS = {
     "AdaptiveMap": "adaptive-map",
+    "Doctor": "doctor",
     "Sweep": "map",
     "Simulation": "simulate",
     "Modes": "modes",
@@ -322,6 +325,7 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["axes"] = axes
         if not np.array_equal(cells, result.audit.cells):
             settings["audited"] = result.audit.cells.tolist()
+        settings |= asked_measures(tuple(result.measures))
     elif isinstance(result, AdaptiveMap):
         settings = _asked_of_adaptive(result)
     elif isinstance(result, Uncertainty):
@@ -330,6 +334,8 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["axes"] = axes
         if len(result.audit.cells) != tables.map.audit_cells:
             settings["audited"] = result.audit.cells.tolist()
+    elif isinstance(result, Doctor):
+        settings["audited"] = result.asked
     elif isinstance(result, LoopMap):
         axes = [[a.path, a.values.tolist()] for a in result.axes]
         settings = {"quantities": list(result.values)} | (
@@ -356,6 +362,11 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
     elif isinstance(result, Modes):
         settings["count"] = max(len(result.free_free), len(result.fixed_top))
     return design, settings
+
+
+def asked_measures(kept: tuple[str, ...]) -> dict[str, Any]:
+    """What a map that keeps some measures alone was asked for, for `claim`."""
+    return {} if kept == FLOATS else {"measures": list(kept)}
 
 
 def _asked_of_adaptive(result: AdaptiveMap) -> dict[str, Any]:

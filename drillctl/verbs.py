@@ -302,17 +302,22 @@ def simulate(design: Design, options: Options) -> None:
     _conclude(folder, summary, options)
 
 
-def stability_map(design: Design, options: Options) -> None:
+def stability_map(design: Design, measures: list[str] | None, options: Options) -> None:
     """A sweep with its map, regions, audit and responses."""
     from drillctl import plots, printing, store, studies
+    from drillctl.studies.sweeps import kept_measures
 
-    folder = store.claim("map", design, options.out)
+    try:
+        kept = kept_measures(measures)
+    except InputError as error:
+        raise InputError(error.problem, "--measure") from None
+    folder = store.claim("map", design, options.out, **store.asked_measures(kept))
     if _shown_again(
         folder, options, lambda: printing.sweep(store.open(folder.path), options.units)
     ):
         return
     with _running(folder), console.progress() as bar:
-        result = studies.sweep(design, progress=bar, blocks=folder.blocks())
+        result = studies.sweep(design, progress=bar, blocks=folder.blocks(), measures=kept)
     if result.minimum is None:
         console.note("warning: no cell gives a finite answer; see the statuses")
     store.write_data(result, folder.path)
@@ -361,4 +366,22 @@ def adaptive_map(design: Design, full_grid: bool, options: Options) -> None:
     ):
         if check is not None and check.verdict == "look":
             console.note(f"{name}: look: {reason}")
+    _conclude(folder, result.summary(), options)
+
+
+def doctor(design: Design, audit_cells: int, options: Options) -> None:
+    """What the batch engine does with a design: scheme, errors, speed, with a figure."""
+    import drillctl
+    from drillctl import plots, printing_doctor, store
+
+    folder = store.claim("doctor", design, options.out, audited=audit_cells)
+    if _shown_again(folder, options, lambda: printing_doctor.doctor(store.open(folder.path))):
+        return
+    with _running(folder), console.progress() as bar:
+        result = drillctl.doctor(design, audit_cells, progress=bar)
+    store.write_data(result, folder.path)
+    if len(result.cells):
+        _draw(plots.error_estimate(result), folder.path / "errors.png")
+    if not options.json:
+        printing_doctor.doctor(result)
     _conclude(folder, result.summary(), options)

@@ -27,6 +27,7 @@ the rig floor: rpm, kN, kN m, m.
 
 from drillctl.plots.adaptive_map import adaptive_map
 from drillctl.plots.comparison import j1_against_weight, j1_distributions, paired_differences
+from drillctl.plots.errors import error_estimate
 from drillctl.plots.frequency import bode
 from drillctl.plots.friction import friction_curves
 from drillctl.plots.impedance import drive_impedance
@@ -57,6 +58,7 @@ __all__ = [
     "compared_regions",
     "compared_responses",
     "drive_impedance",
+    "error_estimate",
     "friction_curves",
     "gain_boundary",
     "j1_against_weight",

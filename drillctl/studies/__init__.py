@@ -18,6 +18,9 @@
   `delayed_lanes.py`: its lanes; `delay_limits.py`: where a benefit ends.
 - `nominal.py`: their maps and motions at their own values.
 - `drawn_runs.py`: runs of draws, equal mean weights; `intervals.py`: shares and means.
+- `lane_grid.py`: lane numbers over a grid, held along the axes they vary over.
+- `examination.py`: what the batch engine does with a design, `diagnosis.py` what is found;
+  `error_estimate.py`, `engine_speed.py`: its errors from itself, and its speed.
 - `audit.py`: cells of a map simulated again with the reference solver.
 - `responses.py`, `tables.py`: time responses at cells of a map; maps as CSV.
 - `blocks.py`: finished blocks of a long run.
@@ -26,7 +29,9 @@
 
 from drillctl.studies.adaptive import AdaptiveMap, adaptive_map
 from drillctl.studies.comparison import Comparison, compare
+from drillctl.studies.diagnosis import Doctor
 from drillctl.studies.draws import Draws, draw, uncertain_parameters
+from drillctl.studies.examination import doctor
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import LoopMap, loop_map
 from drillctl.studies.regions import Region, region
@@ -49,6 +54,7 @@ __all__ = [
     "AdaptiveMap",
     "Axis",
     "Comparison",
+    "Doctor",
     "Draws",
     "LoopMap",
     "Region",
@@ -59,6 +65,7 @@ __all__ = [
     "WeightDelay",
     "adaptive_map",
     "compare",
+    "doctor",
     "draw",
     "loop_map",
     "region",

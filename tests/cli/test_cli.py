@@ -699,6 +699,24 @@ def test_impossible_run_leaves_the_folder_for_the_next(call):
     assert call("map", DESIGN, *SMALL, "--out", "kept")[0] == 0
 
 
+def test_a_map_of_chosen_measures(call):
+    code, out, err = call("map", DESIGN, *SMALL, "--measure", "sticks", "--out", "some", "--json")
+    assert code == 0, err
+    assert parsed(out)["regions"]
+    head = Path("some/map.csv").read_text().splitlines()[0].split(",")
+    assert head[2:] == ["j1", "sticks", "status"]
+    assert list(drillctl.open("some").measures) == ["j1", "sticks"]
+    # The same again is shown; another choice is another run.
+    assert call("map", DESIGN, *SMALL, "--measure", "sticks", "--out", "some")[0] == 0
+    assert call("map", DESIGN, *SMALL, "--out", "some")[0] == 2
+    code, _, err = call("map", DESIGN, *SMALL, "--measure", "stick", "--out", "none")
+    assert code == 2
+    assert "--measure" in err
+    assert "did you mean 'sticks'" in err
+    assert not Path("none").exists()
+    assert call("map", DESIGN, *SMALL, "--measure", "sticks", "--adaptive")[0] == 2
+
+
 # --- interruption ----------------------------------------------------------------------------
 
 
