@@ -53,17 +53,28 @@ def begin_drive(drive: Any, string: Any, work: Any, rate: float) -> None:
 @by_type(begin_drive)
 def _begin_drive(drive, string, work, rate):
     if drive.instance_class is RealStep:
-        return lambda drive, string, work, rate: _begin_real(drive, work)
+        return lambda drive, string, work, rate: _begin_real(drive, string, work, rate)
     if drive.instance_class is SampledStep:
         return lambda drive, string, work, rate: _begin(work)
     return lambda drive, string, work, rate: _begin_ideal(drive, string, work, rate)
 
 
-@inlined
-def _begin_real(drive: Any, work: Any) -> None:
-    """A motor without lag gives its torque from the first moment on."""
+@compiled
+def _begin_real(drive: Any, string: Any, work: Any, rate: float) -> None:
+    """Memory, and what the drive's slopes make of a step in which nothing limits it.
+
+    A motor without lag gives its torque from the first moment on.
+    """
     _begin(work)
     law = law_at(drive, work, r.DRIVE)
+    slope, by_speed = law.of_error * rate, -law.of_error * law.by_speed
+    shrink = 1.0 / (1.0 + slope * string.angle_by_top + by_speed * string.top_speed_by_top)
+    share = (slope * string.angle_by_bit + by_speed * string.top_speed_by_bit) * shrink
+    gain = string.speed_by_bit - string.speed_by_top * share
+    put(work, r.SHRINK, shrink)
+    put(work, r.SHARE, share)
+    put(work, r.GAIN, gain)
+    put(work, r.PER_GAIN, 1.0 / gain)
     low, high = _limits(law, at(work, r.TOP_SPEED) + at(work, r.SET_SPEED))
     error = law.kp * (at(work, r.LEAD) - at(work, r.TOP_SPEED))
     wanted = (law.feedforward + error) / (1.0 + law.kp * law.by_torque)
@@ -146,17 +157,12 @@ def _by_ideal_drive(string: Any, swing: Any, work: Any, angle: Any, free_angle: 
 
 
 @inlined
-def _reduce(string: Any, swing: Any, work: Any, offset: Any, slope: Any, by_speed: Any) -> Any:
-    """Eliminate a mean torque offset - slope angle - by_speed speed at the end of the step."""
-    drag = at(work, r.DRAG)
-    shrink = 1.0 / (1.0 + slope * string.angle_by_top + by_speed * string.top_speed_by_top)
-    angle = swing.top_angle - string.angle_by_top * drag
-    speed = swing.top_speed - string.top_speed_by_top * drag
-    alone = (offset - slope * angle - by_speed * speed) * shrink
-    share = (slope * string.angle_by_bit + by_speed * string.top_speed_by_bit) * shrink
-    free = at(work, r.SET_SPEED) + swing.bit_speed + string.speed_by_top * (alone - drag)
-    gain = string.speed_by_bit - string.speed_by_top * share
-    return Reduced(alone, share, free, gain, 1.0 / gain)
+def _by_number(string: Any, swing: Any, work: Any, torque: Any) -> Any:
+    """A mean torque that is known beforehand."""
+    free = at(work, r.SET_SPEED) + swing.bit_speed
+    free += string.speed_by_top * (torque - at(work, r.DRAG))
+    gain = string.speed_by_bit
+    return Reduced(torque, each(0.0), free, each(gain), each(1.0 / gain))
 
 
 @inlined
@@ -188,13 +194,17 @@ def _by_real_drive(drive: Any, string: Any, swing: Any, work: Any, rate: float) 
     put(work, r.MOVED, pick(at_rate, moved, 0.0))
     # At its limit of rate the torque is straight over the step.
     number = pick(at_rate, motor + 0.5 * moved, given + law.mean * (motor - given))
-    return _reduce(
-        string,
-        swing,
-        work,
-        pick(limited, number, offset),
-        pick(limited, 0.0, slope),
-        pick(limited, 0.0, -speed_slope),
+    angle = swing.top_angle - string.angle_by_top * drag
+    top_speed = swing.top_speed - string.top_speed_by_top * drag
+    alone = (offset - slope * angle + speed_slope * top_speed) * at(work, r.SHRINK)
+    limits = _by_number(string, swing, work, number)
+    free = at(work, r.SET_SPEED) + swing.bit_speed + string.speed_by_top * (alone - drag)
+    return Reduced(
+        pick(limited, number, alone),
+        pick(limited, 0.0, at(work, r.SHARE)),
+        pick(limited, limits.free, free),
+        pick(limited, limits.gain, at(work, r.GAIN)),
+        pick(limited, limits.per_gain, at(work, r.PER_GAIN)),
     )
 
 
@@ -207,7 +217,7 @@ def _by_held_torque(drive: Any, string: Any, swing: Any, work: Any) -> Any:
     put(work, r.MOVED, pick(moved != wanted, moved, 0.0))
     mean = command + law.mean * (motor - command)
     torque = pick(moved != wanted, motor + 0.5 * moved, mean)
-    return _reduce(string, swing, work, torque, each(0.0), each(0.0))
+    return _by_number(string, swing, work, torque)
 
 
 def sample_drive(drive: Any, work: Any, due: bool) -> None:

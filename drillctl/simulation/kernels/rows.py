@@ -39,10 +39,11 @@ PIPE_OFFSET = _next()  # pipe torque that this drag causes, N m
 TABLE_LOW = _next()  # range of the friction table, N
 TABLE_HIGH = _next()
 
-# An ideal drive with its string: torque of a step = LEVEL + BACK angle + FORTH free angle.
+# A drive with its string. Ideal: torque of a step = LEVEL + BACK angle + FORTH free angle.
 LINE_LEVEL = _next()  # N m
 LINE_BACK = _next()  # N m/rad
 LINE_FORTH = _next()  # N m/rad
+SHRINK = _next()  # of a real drive that nothing limits: what its own slopes leave of its torque
 SHARE = _next()  # top torque per bit torque
 GAIN = _next()  # fall of the bit speed per bit torque, rad/s per N m
 PER_GAIN = _next()  # 1 / GAIN
