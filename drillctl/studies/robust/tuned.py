@@ -175,8 +175,8 @@ def drive_numbers(
     Returns
     -------
     dict
-        Of the fields `kp`, `ki`, `mobility` and `corner`, or `level` and `feedforward`, those
-        that the law's tables set.
+        Of the fields `kp`, `ki`, `mobility`, `corner` and `tracking`, or `level` and
+        `feedforward`, those that the law's tables set.
 
     Raises
     ------
@@ -191,13 +191,16 @@ def drive_numbers(
         own = getattr(table, key, None)
         return given.get(key, other if own is None else own)
 
-    if table.law == "pi":
-        return {"kp": number("kp"), "ki": number("ki")}
     if table.law == "constant-torque":
         return {"level": number("torque"), "feedforward": number("torque")}
-    if table.law == "soft-torque":
-        return {"kp": string.pipe / number("share"), "ki": string.spring}
-    numbers = {"kp": number("stiffness") * string.pipe, "ki": number("rate") * string.inertia}
+    if table.law == "pi":
+        numbers = {"kp": number("kp"), "ki": number("ki")}
+    elif table.law == "soft-torque":
+        numbers = {"kp": string.pipe / number("share"), "ki": string.spring}
+    else:
+        numbers = {"kp": number("stiffness") * string.pipe, "ki": number("rate") * string.inertia}
+    if table.drive.anti_windup != "none" and table.drive.tracking_time is None:
+        numbers["tracking"] = numbers["ki"] / numbers["kp"]
     if table.law in ("z-torque", "torsional-rectification"):
         numbers["mobility"] = number("absorption", 1.0) / string.pipe
         numbers["corner"] = 2.0 * math.pi / number("high_pass")
