@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from drillctl.bit_rock.contact import contact
 from drillctl.simulation.kernels.lane_step import NEWTON_STEP
 
-NEWTON = 5
+NEWTON = 4
 """Newton steps that are written out. Each squares the error of the one before; the first guess is
 right to the curvature of the law over a step, and a lane that breaks loose needs the most."""
 

@@ -1,4 +1,4 @@
-"""String as data, pairs of symbols, numbers of drives, crossings: each against what it stands for."""
+"""String as data, pairs of symbols, numbers of drives, crossings, each by its definition."""
 
 import casadi as ca
 import numpy as np
