@@ -38,7 +38,8 @@ class Point:
     value : float
         Objective (s).
     merit : float
-        With what requirements are missed by (s).
+        What a search compares (s): the objective, a quantile smoothed, with what requirements are
+        missed by.
     share : float
         Share of realizations with J1 at or under the level.
     """
@@ -150,7 +151,7 @@ class Judge:
             values,
             measures,
             float(self.objective.value(measures)),
-            float(self.objective.merit(measures)) + PRICE * sum(linear.values()),
+            float(self.objective.merit(measures, smooth=True)) + PRICE * sum(linear.values()),
             float(self.objective.share(measures)),
         )
 

@@ -2,12 +2,15 @@ r"""What a search lowers: a statistic of J1 over the realizations, and what is a
 
 Every statistic here is a weighted sum of the sorted values, weights :math:`w_i \ge 0` that sum to
 one: mean 1/n each; the worst alone; CVaR the mean of the largest share 1 - q; a quantile the
-values next to it. Its derivative is that sum of derivatives, in the same order. For the model of
-a trust region the quantile is taken over more of its neighbours, by a kernel on their ranks
-(after Sheather & Marron, J. Am. Stat. Assoc. 85 (1990) 410-416), which is smooth where the plain
-one turns from realization to realization. The kernel ends well before the largest values: runs
-that stick to the end are several times the quantile, and no smoothing may let them in. What is
-reported is always the plain statistic.
+values next to it. Its derivative is that sum of derivatives, in the same order.
+
+What a search compares is a smooth quantile, over more of its neighbours by a kernel on their
+ranks (after Sheather & Marron, J. Am. Stat. Assoc. 85 (1990) 410-416). The plain one turns from
+realization to realization; its least value, besides, lies where just under a share 1 - q of the
+realizations has begun to stick, next to a cliff that other realizations put elsewhere. The kernel
+feels the cliff from two hundredths away. It ends well before the largest values: runs that stick
+to the end are several times the quantile, and no smoothing may let them in. What is reported is
+always the plain statistic.
 """
 
 from __future__ import annotations

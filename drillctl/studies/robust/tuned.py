@@ -200,7 +200,7 @@ def drive_numbers(
     else:
         numbers = {"kp": number("stiffness") * string.pipe, "ki": number("rate") * string.inertia}
     if table.drive.anti_windup != "none" and table.drive.tracking_time is None:
-        numbers["tracking"] = numbers["ki"] / numbers["kp"]
+        numbers["tracking"] = _tracking(numbers["kp"], numbers["ki"])
     if table.law in ("z-torque", "torsional-rectification"):
         numbers["mobility"] = number("absorption", 1.0) / string.pipe
         numbers["corner"] = 2.0 * math.pi / number("high_pass")
@@ -209,6 +209,13 @@ def drive_numbers(
         numbers["mobility"] = 1.0 / damper
         numbers["corner"] = number("spring", string.spring) / damper
     return numbers
+
+
+def _tracking(kp: Any, ki: Any) -> Any:
+    """Rate of the anti-windup (1/s), as `design/drive.py` chooses it."""
+    if isinstance(kp, float) and not kp > 0.0:
+        return 1.0
+    return ki / kp
 
 
 def refuse_other_paths(law: str, values: Mapping[str, Any]) -> None:
