@@ -208,7 +208,9 @@ class _Step:
         top_speed = shapes.turn[0] * speed
         memory = self.drive.begin(drive, top_speed, omega)
         bit = Bit(bit_speed, direction, direction * torque, slope, -1.0)
-        return ca.vertcat(z, 0.0, top_speed, 0.0, *bit, *memory, 0.0, 0.0, 0.0, 0.0, 0.0)
+        steady = contact(friction, weight, omega, ca.exp)[0] + stepper.string.drag * omega
+        sums = (steady, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return ca.vertcat(z, 0.0, top_speed, 0.0, *bit, *memory, *sums)
 
     def advance(self, x: Any, p: Any, r: Any) -> Any:
         """State after one step."""
@@ -224,7 +226,10 @@ class _Step:
             angle,
             top_speed,
             ca.dot(ca.DM(m.top_angle), swing) - fixed.angle_by_top * drag,
-            ca.dot(ca.DM(m.top_speed), swing) - fixed.top_speed_by_top * drag,
+            # An ideal drive acts on the angle alone.
+            ca.dot(ca.DM(m.top_speed), swing) - fixed.top_speed_by_top * drag
+            if self.drive.size
+            else 0.0,
             omega,
             torque,
         )
@@ -244,21 +249,22 @@ class _Step:
         z = swing + ca.mtimes(ca.DM(m.push), ca.vertcat(given - drag, met.torque))
         after = (
             top.free_angle + fixed.angle_by_top * given - fixed.angle_by_bit * met.torque,
-            top.free_speed + fixed.top_speed_by_top * given - fixed.top_speed_by_bit * met.torque,
+            top.free_speed + fixed.top_speed_by_top * given - fixed.top_speed_by_bit * met.torque
+            if self.drive.size
+            else 0.0,
         )
         moved = self.drive.follow(drive, memory, kept, top, after, given)
         sums = x[n + 8 + self.drive.size :]
-        measured = self._measure(sums, bit, met.bit, given, friction, weight, omega, drag)
+        measured = self._measure(sums, bit, met.bit, given, weight, omega)
         return ca.vertcat(z, *after, met.torque, *met.bit, *moved, measured)
 
     def _measure(
-        self, sums: Any, before: Bit, after: Bit, top: Any, friction: Any, weight: Any,
-        omega: Any, drag: Any,
-    ) -> Any:  # fmt: skip
-        """Measures with one step added; the last of them counts the steps."""
+        self, sums: Any, before: Bit, after: Bit, top: Any, weight: Any, omega: Any
+    ) -> Any:
+        """Measures with one step added, after the steady torque; the last counts the steps."""
         import casadi as ca
 
-        step, begin = self.prepared.scheme.step, sums[4] * self.prepared.scheme.step
+        step, begin = self.prepared.scheme.step, sums[5] * self.prepared.scheme.step
         late = (begin + step - self.prepared.j1_from) / step
         within = ca.fmin(1.0, ca.fmax(0.0, late)) if self.prepared.j1_from > 0.0 else 1.0
         error, error_after = before.speed - omega, after.speed - omega
@@ -267,13 +273,13 @@ class _Step:
         crossing = ca.if_else(error * error_after < 0.0, size * size_after / both, 0.0)
         j1 = step * within * (0.5 * (size + size_after) - crossing) / omega
         loads = weight.weight(ca.fabs(before.speed)) + weight.weight(ca.fabs(after.speed))
-        steady = contact(friction, weight, omega, ca.exp)[0] + drag
         return ca.vertcat(
-            sums[0] + j1,
-            ca.fmax(sums[1], ca.fabs(top)),
-            sums[2] + 0.5 * step * loads / self.prepared.duration,
-            sums[3] + step * (top - steady) ** 2 / self.prepared.duration,
-            sums[4] + 1.0,
+            sums[0],
+            sums[1] + j1,
+            ca.fmax(sums[2], ca.fabs(top)),
+            sums[3] + 0.5 * step * loads / self.prepared.duration,
+            sums[4] + step * (top - sums[0]) ** 2 / self.prepared.duration,
+            sums[5] + 1.0,
         )
 
     def folded(self, slopes: bool) -> Any:
