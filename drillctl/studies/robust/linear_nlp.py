@@ -169,6 +169,7 @@ class LinearProgram:
             "print_time": False, "error_on_fail": False, "ipopt.max_iter": 150,
             "ipopt.tol": 1e-9, "ipopt.acceptable_tol": 1e-6, "ipopt.sb": "yes",
             "ipopt.print_level": 5 if self.verbose else 0, "ipopt.mu_init": 1e-3,
+            "show_eval_warnings": self.verbose,
         }  # fmt: skip
         zero, kept = ca.vertcat(*equal), ca.vertcat(*more)
         solver = ca.nlpsol(

@@ -147,7 +147,9 @@ class _Log:
         })  # fmt: skip
 
 
-def search(design: Design, progress: Progress = SILENT, derivatives: bool = True) -> Tuning:
+def search(
+    design: Design, progress: Progress = SILENT, derivatives: bool = True, verbose: bool = False
+) -> Tuning:
     """Search the gains of the least objective.
 
     Parameters
@@ -159,6 +161,8 @@ def search(design: Design, progress: Progress = SILENT, derivatives: bool = True
         Told of finished stages.
     derivatives : bool
         Whether to take trust-region steps by derivatives, where the laws allow it.
+    verbose : bool
+        Let IPOPT print.
 
     Returns
     -------
@@ -175,7 +179,7 @@ def search(design: Design, progress: Progress = SILENT, derivatives: bool = True
     judge = Judge(_fast(design), tuned)
     log = _Log(judge, progress)
     progress.begin("tuning", 5)
-    field_ = _race(judge, _first_look(judge, design, log), log)
+    field_ = _race(judge, _first_look(judge, design, verbose), log)
     made = Derivatives.of(judge) if derivatives else "not asked for"
     if isinstance(made, Derivatives):
         ends = [descended(judge, made, start) for start in field_]
@@ -201,17 +205,17 @@ def _merit(point: Point) -> float:
     return point.merit
 
 
-def _first_look(judge: Judge, design: Design, log: _Log) -> Array:
+def _first_look(judge: Judge, design: Design, verbose: bool) -> Array:
     """Gains of the first look, shape (points, parameters)."""
     points = spread(judge.tuned, FIRST[min(len(judge.tuned), 3)])
-    more = [judge.own(design), _linear(design, judge.tuned)]
+    more = [judge.own(design), _linear(design, verbose)]
     return np.vstack([points, *(point for point in more if point is not None)])
 
 
-def _linear(design: Design, tuned: tuple[Tuned, ...]) -> Array | None:
+def _linear(design: Design, verbose: bool) -> Array | None:
     """Gains of the linear design, where it knows what is tuned."""
     try:
-        return linear_design(design).values
+        return linear_design(design, verbose=verbose).values
     except InputError:
         return None
 

@@ -103,6 +103,27 @@ def test_derivatives_lead_down_and_never_up():
     assert descended(judge, made, end).merit <= end.merit
 
 
+def test_strings_that_differ_have_derivatives_too():
+    uncertain = {
+        "drillstring.sections.pipe.length": {
+            "distribution": "uniform", "min": "2900 m", "max": "3100 m",
+        },
+        "bit_rock.a1_factor": {"distribution": "lognormal", "cov": 0.05},
+    }  # fmt: skip
+    design = tuning(WINDOW, {"uncertain": uncertain}, realizations=3, objective="mean")
+    judge = Judge(design, tuned_parameters(design))
+    assert len(judge.runs.groups) == 3
+    made = Derivatives.of(judge)
+    gains = np.array([630.0, 140.0])
+    (point,) = judge.points(gains[None, :], 3)
+    slopes = made.at(point).slopes["j1"]
+    step = np.array([0.0, 1e-4])
+    above, below = judge.points(np.stack([gains + step, gains - step]), 3)
+    difference = (above.measures["j1"] - below.measures["j1"]) / 2e-4
+    np.testing.assert_allclose(slopes[:, 1], difference, rtol=1e-3, atol=1e-5)
+    assert np.ptp(slopes[:, 1]) > 1e-4
+
+
 @pytest.mark.parametrize("objective", ["mean", "cvar", "worst"])
 def test_every_objective_is_lowered(objective):
     design = tuning(objective=objective, realizations=40, starts=1)
