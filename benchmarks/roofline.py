@@ -8,56 +8,19 @@ place, in the very kernel that makes maps. Nothing of the engine's inside is cal
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from benchmarks.job import Job
-from benchmarks.machine import Machine
 from benchmarks.peers.engine import map_lanes, on_cores
 from benchmarks.timing import in_turn
+from drillctl.machine import Machine
 from drillctl.simulation.batch import run_batch, warm_up
+from drillctl.simulation.cost import Count, count
 
 MODES = (4, 8, 12, 16, 20, 24, 28)
 STEP, DURATION = 0.02, 10.0
-DOUBLE = 8
-
-
-@dataclass(frozen=True)
-class Count:
-    """What a step asks of the modal pass, per lane and mode.
-
-    Attributes
-    ----------
-    flops : float
-        Double-precision operations; a multiply-add is two.
-    bytes : float
-        Of the modal state, read and written; what is shared by lanes is not counted, nor the
-        sums, which fit in registers.
-    """
-
-    flops: float
-    bytes: float
-
-    @property
-    def intensity(self) -> float:
-        """Operations per byte."""
-        return self.flops / self.bytes
-
-
-def count(string: Any) -> Count:
-    """Operations and bytes of an `UndampedString` a mode, as `simulation/undamped_step.py` has it.
-
-    The force on the mode is a multiply-add, its two entries in `push` one each; its part of the
-    pipe torque is one; so is its turn by `kappa`, followed by an addition. One addition sums up the
-    top angle, two multiply-adds the bit speed.
-    """
-    modes = len(string.kappa)
-    fused = string.ratio.size + string.push.size + string.pipe.size + string.kappa.size
-    fused += string.bit_speed.size
-    additions = 2 * modes
-    return Count((2 * fused + additions) / modes, 2 * DOUBLE * 2 * modes / modes)
 
 
 def measure(job: Job, machine: Machine, rounds: int) -> dict[str, Any]:

@@ -40,8 +40,10 @@ if TYPE_CHECKING:
     from drillctl.store import open as open
     from drillctl.studies import adaptive_map as adaptive_map
     from drillctl.studies import compare as compare
+    from drillctl.studies import doctor as doctor
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
+    from drillctl.studies.uncertainty import uncertainty as uncertainty
 
 _HOME = {
     "Design": "drillctl.design",
@@ -54,7 +56,9 @@ _HOME = {
     "sweep": "drillctl.studies",
     "adaptive_map": "drillctl.studies",
     "compare": "drillctl.studies",
+    "doctor": "drillctl.studies",
     "stability_map": "drillctl.studies",
+    "uncertainty": "drillctl.studies.uncertainty",
     "open": "drillctl.store",
     "plots": "drillctl",
 }

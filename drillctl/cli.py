@@ -160,12 +160,15 @@ def validate(
     from drillctl.studies.delayed_lanes import following_design
     from drillctl.studies.draws import uncertain_parameters
     from drillctl.studies.grid import axes_of
+    from drillctl.studies.uncertainty.study import map_axes, refuse_impossible
 
     found = _load(design, sets)
     if "axes" in found.tree.get("map", {}):  # the default ones need not fit every law
         axes_of(found, found.tables.map.axes)
     if found.tables.uncertain:
         uncertain_parameters(found)
+    if "uncertainty" in found.tree:
+        refuse_impossible(found, map_axes(found))
     if found.tables.compare.cases:
         refuse_unequal(case_designs(found))
     if "weight_delay" in found.tree:
@@ -337,6 +340,65 @@ def compare(
 
 
 @app.command()
+def uncertainty(
+    design: DesignName,
+    sets: Sets = None,
+    axis: Axes = None,
+    realizations: Annotated[
+        int | None, typer.Option("--realizations", help="Draws; more than before adds to a run.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the draws.")] = None,
+    sampling: Annotated[
+        Literal["monte-carlo", "sobol", "latin-hypercube"] | None,
+        typer.Option("--sampling", help="How they are drawn."),
+    ] = None,
+    full: Annotated[
+        bool | None, typer.Option("--full", help="Run every lane to its end, for moments.")
+    ] = None,
+    sensitivity: Annotated[
+        int | None, typer.Option("--sensitivity", help="Sobol indices from so many points.")
+    ] = None,
+    audit: Annotated[
+        int | None, typer.Option("--audit", help="Lanes to audit with the reference solver.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the run in --out, or else fail.")
+    ] = False,
+    allow_mixed: Annotated[
+        bool, typer.Option("--allow-mixed", help="Go on on another type of processor.")
+    ] = False,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", help="Address of a dask.distributed scheduler.")
+    ] = None,
+    interim: Annotated[
+        float | None, typer.Option("--interim", min=0.0, help="Seconds between interim pictures.")
+    ] = None,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """A map at thousands of draws: regions by probability, intervals, best cells, indices."""
+    from drillctl import verbs
+    from drillctl.uncertain_runs import How
+
+    _use(threads)
+    found = _with_axes(_load(design, sets), axis)
+    given = {
+        "uncertainty.realizations": realizations, "uncertainty.seed": seed,
+        "uncertainty.sampling": sampling, "uncertainty.full": full,
+        "uncertainty.sensitivity.samples": sensitivity, "map.audit_cells": audit,
+    }  # fmt: skip
+    asked = {path: value for path, value in given.items() if value is not None}
+    how = How(resume, allow_mixed, scheduler, interim)
+    verbs.uncertainty(
+        found.replace(asked) if asked else found, how, Options(out, json, units, verbose)
+    )
+
+
+@app.command()
 def simulate(
     design: DesignName,
     sets: Sets = None,
@@ -373,6 +435,10 @@ def map_(
     full_audit: Annotated[
         bool, typer.Option("--full-audit", help="Set an adaptive map beside the full grid.")
     ] = False,
+    measure: Annotated[
+        list[str] | None,
+        typer.Option("--measure", metavar="NAME", help="Keep this one and J1 alone; repeatable."),
+    ] = None,
     out: Out = None,
     json: Json = False,
     threads: Threads = None,
@@ -388,12 +454,36 @@ def map_(
     if audit is not None:
         found = found.replace({"map.audit_cells": audit})
     options = Options(out, json, units, verbose)
+    if adaptive and measure:
+        raise InputError("goes with the full grid, not with --adaptive", "--measure")
     if adaptive:
         verbs.adaptive_map(found, full_audit, options)
     elif full_audit:
         raise InputError("goes with --adaptive: any other map is the full grid", "--full-audit")
     else:
-        verbs.stability_map(found, options)
+        verbs.stability_map(found, measure or None, options)
+
+
+@app.command()
+def doctor(
+    design: DesignName,
+    sets: Sets = None,
+    axis: Axes = None,
+    audit: Annotated[
+        int, typer.Option("--audit", min=0, help="Lanes to audit with the reference solver.")
+    ] = 4,
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> None:
+    """Step and modes of the batch engine and why; its estimated and audited error; its speed."""
+    from drillctl import verbs
+
+    _use(threads)
+    found = _with_axes(_load(design, sets), axis)
+    verbs.doctor(found, audit, Options(out, json, "si", verbose))
 
 
 def _with_axes(design: Design, axes: list[str] | None) -> Design:

@@ -2,6 +2,7 @@
 
 - `InputError`: something the user wrote cannot be used; exit code 2.
 - `SimulationError`: a computation could not be carried out; exit code 1.
+- `StoreError`: results could not be written or read; exit code 1.
 """
 
 from __future__ import annotations
@@ -37,6 +38,10 @@ class InputError(DrillctlError, ValueError):
 
 class SimulationError(DrillctlError, RuntimeError):
     """A solver could not finish what was asked of it."""
+
+
+class StoreError(DrillctlError, OSError):
+    """A disk that takes no more, or a folder that cannot be read or written."""
 
 
 def shown(value: object) -> str:

@@ -2,8 +2,8 @@
 
     run.json       verb, version, identity, provenance; whether the run is finished
     design.toml    the resolved design
-    blocks/        finished blocks of a run that is not, written atomically
-    data.zarr      the dataset, labelled by parameter path
+    blocks/        finished blocks of a map that is not, written atomically
+    data.zarr      the dataset, labelled by parameter path; under uncertainty it grows by blocks
     summary.json   what the command printed
     *.png, *.csv   figures and tables
 
@@ -16,6 +16,7 @@ import hashlib
 import itertools
 import os
 import shutil
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,21 +30,32 @@ from drillctl.errors import InputError
 from drillctl.json_files import read_json, write_json, write_text
 from drillctl.linear.modal import Modes
 from drillctl.provenance import provenance
+from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.limit_cycle import LimitCycle
 from drillctl.simulation.trajectory import Simulation
 from drillctl.store_blocks import FolderBlocks
+from drillctl.store_differences import (
+    Growing,
+    difference,
+    growing_realizations,
+    refuse_other_machine,
+)
 from drillctl.store_reading import READERS, stored_name
+from drillctl.store_realizations import FolderShelf, write_uncertainty
 from drillctl.studies.adaptive import AdaptiveMap
 from drillctl.studies.adaptive_checks import CHECK_CELLS
 from drillctl.studies.audit import choose_cells
 from drillctl.studies.cases import case_designs
 from drillctl.studies.comparison import Comparison
 from drillctl.studies.contour_search import INTERVALS
-from drillctl.studies.grid import axes_of
+from drillctl.studies.diagnosis import Doctor
+from drillctl.studies.grid import Axis, axes_of
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.regularisation import WIDTHS, Regularisation
 from drillctl.studies.sweeps import Sweep
 from drillctl.studies.three_regions import PAPER_LEVEL, ThreeRegions
+from drillctl.studies.uncertainty import Uncertainty
+from drillctl.studies.uncertainty.study import map_axes
 
 RUNS = Path("runs")
 """Where runs go that were given no folder."""
@@ -90,7 +102,7 @@ class RunFolder:
 
     def discard(self) -> None:
         """Take back what `claim` wrote, for a run that turned out to be impossible."""
-        if any((self.path / "blocks").glob("[0-9]*.npz")):
+        if any((self.path / "blocks").glob("[0-9]*.npz")) or (self.path / "data.zarr").exists():
             return  # hours of work, perhaps
         shutil.rmtree(self.path / "blocks", ignore_errors=True)
         for name in ("design.toml", "run.json"):
@@ -105,8 +117,19 @@ class RunFolder:
         folder.mkdir(exist_ok=True)
         return FolderBlocks(folder)
 
+    def shelf(self) -> FolderShelf:
+        """Realizations kept in this folder."""
+        return FolderShelf(self.path)
 
-def claim(verb: str, design: Design, folder: str | Path | None, **settings: Any) -> RunFolder:
+
+def claim(
+    verb: str,
+    design: Design,
+    folder: str | Path | None,
+    growing: Growing | None = None,
+    allow_mixed: bool = False,
+    **settings: Any,
+) -> RunFolder:
     """Make the folder of a run, or take up one that holds the very same run.
 
     Parameters
@@ -117,6 +140,10 @@ def claim(verb: str, design: Design, folder: str | Path | None, **settings: Any)
         Resolved design; with verb and version it identifies the run.
     folder : str or Path, optional
         Where to; by default a new folder under `runs`.
+    growing : Growing, optional
+        A count that a finished run may be taken on to.
+    allow_mixed : bool
+        Whether an unfinished run may go on on another type of processor.
     **settings
         Whatever else the result depends on.
 
@@ -130,7 +157,12 @@ def claim(verb: str, design: Design, folder: str | Path | None, **settings: Any)
     InputError
         The folder holds something else, or cannot be written.
     """
-    about = {"verb": verb, "identity": identity(verb, design, **settings), "design": design.name}
+    same = design if growing is None else growing.like
+    about: dict[str, Any] = {
+        "verb": verb, "identity": identity(verb, same, **settings), "design": design.name
+    }  # fmt: skip
+    if growing is not None:
+        about["count"] = growing.count
     path = RUNS / f"{design.name}-{verb}-*" if folder is None else Path(folder)
     try:
         if folder is None:
@@ -139,12 +171,16 @@ def claim(verb: str, design: Design, folder: str | Path | None, **settings: Any)
         elif path.exists() and not path.is_dir():
             raise InputError("is a file, not a folder", f"--out {path}")
         elif path.is_dir() and not _empty(path):
-            run = _same_run(path, about)
+            run = _same_run(path, about, same, allow_mixed)
         else:
             run = RunFolder(path, verb, finished=False, made=not path.exists())
             path.mkdir(parents=True, exist_ok=True)
-        if not (path / "run.json").exists():
+        begun = (path / "run.json").exists()
+        if not begun:
             write_json(path / "run.json", about | {"finished": False, "provenance": provenance()})
+        elif not run.finished:
+            held = _about(path)
+            write_json(path / "run.json", held | about | {"finished": False})
         if not run.finished:
             write_text(path / "design.toml", to_toml(design))
     except OSError as error:
@@ -168,7 +204,7 @@ def _empty(path: Path) -> bool:
     return all(item.name == "run.part" for item in path.iterdir())
 
 
-def _same_run(path: Path, about: dict[str, str]) -> RunFolder:
+def _same_run(path: Path, about: dict[str, Any], same: Design, allow_mixed: bool) -> RunFolder:
     where = f"--out {path}"
     if not (path / "run.json").is_file():
         raise InputError("holds something that is not a run; give an empty or new folder", where)
@@ -180,17 +216,22 @@ def _same_run(path: Path, about: dict[str, str]) -> RunFolder:
         reason = "another design or other settings"
         if came_from != drillctl.__version__:
             reason = f"version {came_from}, this is {drillctl.__version__}"
+        else:
+            grown = ("uncertainty.realizations",) if "count" in about else ()
+            reason += difference(path / "design.toml", same, grown)
         raise InputError(f"holds a run of {reason}; give another folder", where)
-    if held.get("finished"):
+    more = about.get("count", 0) - held.get("count", 0)
+    if held.get("finished") and more < 0:
+        raise InputError(
+            f"holds a run of {held['count']} realizations, {about['count']} are asked for: ask for "
+            "as many or more, or give another folder",
+            where,
+        )
+    if held.get("finished") and more == 0:
         return RunFolder(path, about["verb"], finished=True)
     if not os.access(path, os.W_OK):
         raise InputError("cannot be written: permission denied", where)
-    if held["provenance"] != provenance():
-        raise InputError(
-            "holds an unfinished run begun with other packages or on another processor; the "
-            "rest would differ in the last bits: give another folder",
-            where,
-        )
+    refuse_other_machine(held["provenance"], where, allow_mixed)
     return RunFolder(path, about["verb"], finished=False)
 
 
@@ -204,6 +245,9 @@ def _about(path: Path) -> dict[str, Any]:
 
 def write_data(result: Any, folder: Path) -> None:
     """Write a result's dataset as `data.zarr`, with its provenance, whole or not at all."""
+    if isinstance(result, Uncertainty):
+        write_uncertainty(result, folder)
+        return
     part, target = folder / "data.part", folder / "data.zarr"
     shutil.rmtree(part, ignore_errors=True)
     data = result.data
@@ -216,6 +260,7 @@ def write_data(result: Any, folder: Path) -> None:
 
 VERBS = {
     "AdaptiveMap": "adaptive-map",
+    "Doctor": "doctor",
     "Sweep": "map",
     "Simulation": "simulate",
     "Modes": "modes",
@@ -226,6 +271,7 @@ VERBS = {
     "Regularisation": "regularisation",
     "ThreeRegions": "regions",
     "WeightDelay": "delay",
+    "Uncertainty": "uncertainty",
 }
 
 
@@ -253,7 +299,8 @@ def save(result: Any, folder: str | Path) -> Path:
     if result.design is None:
         raise InputError("modes of a bare string have no design to be saved with", "save")
     design, settings = _asked(result)
-    run = claim(VERBS[type(result).__name__], design, folder, **settings)
+    growing = growing_realizations(design) if isinstance(result, Uncertainty) else None
+    run = claim(VERBS[type(result).__name__], design, folder, growing, **settings)
     write_data(result, run.path)
     run.finish(result.summary())
     return run.path
@@ -278,8 +325,17 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
             settings["axes"] = axes
         if not np.array_equal(cells, result.audit.cells):
             settings["audited"] = result.audit.cells.tolist()
+        settings |= asked_measures(tuple(result.measures))
     elif isinstance(result, AdaptiveMap):
         settings = _asked_of_adaptive(result)
+    elif isinstance(result, Uncertainty):
+        axes = [[a.path, a.values.tolist()] for a in result.axes]
+        if axes != _own_axes(design, map_axes):
+            settings["axes"] = axes
+        if len(result.audit.cells) != tables.map.audit_cells:
+            settings["audited"] = result.audit.cells.tolist()
+    elif isinstance(result, Doctor):
+        settings["audited"] = result.asked
     elif isinstance(result, LoopMap):
         axes = [[a.path, a.values.tolist()] for a in result.axes]
         settings = {"quantities": list(result.values)} | (
@@ -308,6 +364,11 @@ def _asked(result: Any) -> tuple[Design, dict[str, Any]]:
     return design, settings
 
 
+def asked_measures(kept: tuple[str, ...]) -> dict[str, Any]:
+    """What a map that keeps some measures alone was asked for, for `claim`."""
+    return {} if kept == FLOATS else {"measures": list(kept)}
+
+
 def _asked_of_adaptive(result: AdaptiveMap) -> dict[str, Any]:
     """What the command says of an adaptive map, and what only Python can ask for."""
     settings: dict[str, Any] = {"full_grid": result.full_audit is not None}
@@ -334,9 +395,11 @@ def _own_cases(design: Design) -> list[Any] | None:
         return None
 
 
-def _own_axes(design: Design) -> list[Any] | None:
+def _own_axes(
+    design: Design, axes: Callable[[Design], tuple[Axis, ...]] | None = None
+) -> list[Any] | None:
     try:
-        own = axes_of(design, design.tables.map.axes)
+        own = axes_of(design, design.tables.map.axes) if axes is None else axes(design)
     except InputError:  # the default ones do not fit every law
         return None
     return [[a.path, a.values.tolist()] for a in own]

@@ -29,13 +29,18 @@ from drillctl.studies.audit import Audit
 from drillctl.studies.comparison import MEASURES, ComparedCase, Comparison
 from drillctl.studies.delayed_lanes import MEASURES as DELAY_MEASURES
 from drillctl.studies.delayed_lanes import Runs
+from drillctl.studies.diagnosis import Doctor
 from drillctl.studies.drawn_lanes import Failures
+from drillctl.studies.error_estimate import ErrorEstimate
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
 from drillctl.studies.nominal import Nominal, map_dimension, nominal_design
 from drillctl.studies.regularisation import Regularisation
 from drillctl.studies.sweeps import Sweep
 from drillctl.studies.three_regions import FIELDS, MASKS, ThreeRegions
+from drillctl.studies.uncertainty import Uncertainty
+from drillctl.studies.uncertainty.sensitivity import read_sensitivity
+from drillctl.studies.uncertainty.stopping import Look
 from drillctl.studies.weight_delay import WeightDelay
 
 if TYPE_CHECKING:
@@ -60,7 +65,7 @@ def read_sweep(design: Design, data: xarray.Dataset, summary: dict[str, Any]) ->
         design=design,
         axes=axes,
         levels=design.tables.map.levels,
-        measures={name: data[name].values for name in FLOATS},
+        measures={name: data[name].values for name in FLOATS if name in data},
         status=data["status"].values.astype(np.int8),
         audit=Audit(cells, j1.ravel()[cells], data["audited_j1"].values),
         step=summary["step"],
@@ -102,6 +107,31 @@ def read_adaptive_map(design: Design, data: xarray.Dataset, summary: dict[str, A
         self_check=check,
         full_audit=full,
         **{n: summary[n] for n in ("intervals", "step", "modes", "seconds", "total_seconds")},
+        provenance={key: str(value) for key, value in data.attrs.items()},
+    )
+
+
+def read_doctor(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Doctor:
+    """A `Doctor` as it was saved."""
+    cells, audited = data["cell"].values, data["audited_cell"].values
+    estimate = ErrorEstimate(data["j1"].values)
+    batch = estimate.j1[0][np.searchsorted(cells, audited)]
+    told = ("speed", "refused", "advice", "total_seconds")
+    scheme = summary["scheme"]
+    return Doctor(
+        design=design,
+        axes=tuple(
+            Axis(path, data[stored_name(path)].attrs["units"], np.linspace(*ends.values()))
+            for path, ends in summary["axes"].items()
+        ),
+        cells=cells.astype(np.int64),
+        estimate=estimate,
+        status=data["status"].values.astype(np.int8),
+        scheme=scheme and {key: value for key, value in scheme.items() if key != "strings"},
+        strings=scheme["strings"] if scheme else 0,
+        audit=Audit(audited.astype(np.int64), batch, data["audited_j1"].values),
+        asked=summary["audit"]["asked"],
+        **{name: summary[name] for name in told},
         provenance={key: str(value) for key, value in data.attrs.items()},
     )
 
@@ -348,6 +378,31 @@ def _resolved(text: str, like: Design) -> Design:
     return Design(like.name, validated(tree, like.origin), tree, like.origin)
 
 
+def read_uncertainty(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Uncertainty:
+    """An `Uncertainty` as it was saved."""
+    lanes = data["audited_lane"].values.astype(np.int64)
+    keep = design.tables.uncertainty.keep
+    measures = {name: data[name].values for name in dict.fromkeys(("j1", *keep))}
+    told = summary.get("sensitivity")
+    return Uncertainty(
+        design=design,
+        axes=tuple(_axis(path, data[stored_name(path)]) for path in summary["axes"]),
+        levels=design.tables.map.levels,
+        drawn={path: data[stored_name(path)].values for path in summary["uncertain"]},
+        measures=measures,
+        status=data["status"].values.astype(np.int8),
+        nominal=data["nominal_j1"].values,
+        audit=Audit(lanes, measures["j1"].ravel()[lanes], data["audited_j1"].values),
+        failures=tuple(Failures(**failure) for failure in summary["failures"]),
+        looks=tuple(
+            Look(**{**one, "interval": tuple(one["interval"])}) for one in summary["looks"]
+        ),
+        sensitivity=None if told is None else read_sensitivity(told),
+        **{name: summary[name] for name in ("seconds", "total_seconds")},
+        provenance={key: str(value) for key, value in data.attrs.items()},
+    )
+
+
 READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "map": read_sweep,
     "adaptive-map": read_adaptive_map,
@@ -360,4 +415,6 @@ READERS: dict[str, Callable[[Design, xarray.Dataset, dict[str, Any]], Any]] = {
     "regions": read_three_regions,
     "regularisation": read_regularisation,
     "delay": read_weight_delay,
+    "uncertainty": read_uncertainty,
+    "doctor": read_doctor,
 }

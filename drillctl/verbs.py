@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from drillctl.progress import Progress
     from drillctl.store import RunFolder
     from drillctl.studies import LoopMap
+    from drillctl.uncertain_runs import How
 
 DPI = 150
-RESUMED = ("map", "adaptive-map")
+RESUMED = ("map", "adaptive-map", "uncertainty")
 """Runs that go on from what was finished; the others have no finished parts to go on from."""
 
 
@@ -250,6 +251,33 @@ def compare(design: Design, options: Options) -> None:
     _conclude(folder, result.summary(), options)
 
 
+def uncertainty(design: Design, how: How, options: Options) -> None:
+    """Regions of a map under uncertainty, with pictures and tables."""
+    from drillctl import printing_uncertainty as printing
+    from drillctl import store, studies, uncertain_runs
+
+    if how.resume:
+        uncertain_runs.refuse_nothing_to_resume(options.out)
+    growing = store.growing_realizations(design)
+    folder = store.claim("uncertainty", design, options.out, growing, how.allow_mixed)
+    if _shown_again(
+        folder, options, lambda: printing.uncertainty(store.open(folder.path), options.units)
+    ):
+        return
+    with _running(folder), console.progress() as bar:
+        result = uncertain_runs.computed(design, how, folder, bar, options.units)
+    summary = result.summary()
+    store.write_data(result, folder.path)
+    studies.write_uncertainty_tables(result, folder.path)
+    for name, figure in uncertain_runs.pictures(result, options.units):
+        _draw(figure, folder.path / f"{name}.png")
+    if result.audit.verdict == "look":
+        console.note("audit: look: the engines differ by more than 1 % in J1 in some lane")
+    if not options.json:
+        printing.uncertainty(result, options.units)
+    _conclude(folder, summary, options)
+
+
 def simulate(design: Design, options: Options) -> None:
     """One run with its figure, signals and measures."""
     import drillctl
@@ -274,17 +302,22 @@ def simulate(design: Design, options: Options) -> None:
     _conclude(folder, summary, options)
 
 
-def stability_map(design: Design, options: Options) -> None:
+def stability_map(design: Design, measures: list[str] | None, options: Options) -> None:
     """A sweep with its map, regions, audit and responses."""
     from drillctl import plots, printing, store, studies
+    from drillctl.studies.sweeps import kept_measures
 
-    folder = store.claim("map", design, options.out)
+    try:
+        kept = kept_measures(measures)
+    except InputError as error:
+        raise InputError(error.problem, "--measure") from None
+    folder = store.claim("map", design, options.out, **store.asked_measures(kept))
     if _shown_again(
         folder, options, lambda: printing.sweep(store.open(folder.path), options.units)
     ):
         return
     with _running(folder), console.progress() as bar:
-        result = studies.sweep(design, progress=bar, blocks=folder.blocks())
+        result = studies.sweep(design, progress=bar, blocks=folder.blocks(), measures=kept)
     if result.minimum is None:
         console.note("warning: no cell gives a finite answer; see the statuses")
     store.write_data(result, folder.path)
@@ -333,4 +366,22 @@ def adaptive_map(design: Design, full_grid: bool, options: Options) -> None:
     ):
         if check is not None and check.verdict == "look":
             console.note(f"{name}: look: {reason}")
+    _conclude(folder, result.summary(), options)
+
+
+def doctor(design: Design, audit_cells: int, options: Options) -> None:
+    """What the batch engine does with a design: scheme, errors, speed, with a figure."""
+    import drillctl
+    from drillctl import plots, printing_doctor, store
+
+    folder = store.claim("doctor", design, options.out, audited=audit_cells)
+    if _shown_again(folder, options, lambda: printing_doctor.doctor(store.open(folder.path))):
+        return
+    with _running(folder), console.progress() as bar:
+        result = drillctl.doctor(design, audit_cells, progress=bar)
+    store.write_data(result, folder.path)
+    if len(result.cells):
+        _draw(plots.error_estimate(result), folder.path / "errors.png")
+    if not options.json:
+        printing_doctor.doctor(result)
     _conclude(folder, result.summary(), options)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from functools import cache
 
 import numpy as np
 import pytest
 
-from benchmarks import machine, roofline, run
+from benchmarks import run
 from benchmarks.exact import exact_j1
 from benchmarks.job import CELLS, Job, load_job
 from benchmarks.peers import MODULES, all_peers
 from benchmarks.timing import in_turn, interleave, row_of
+from drillctl import machine
+from drillctl.simulation.cost import count
 from drillctl.simulation.propagator import string_step
 from drillctl.simulation.start import Start
 
@@ -115,7 +119,7 @@ def test_operations_of_the_modal_pass_are_counted_right(modes):
     state = stepper.state(start, np.zeros(1))[:, 0]
     Counted.operations = 0
     moved, sums = step_by_hand(string, np.vectorize(Counted)(state), Counted(0.0), Counted(0.0))
-    counted = roofline.count(string)
+    counted = count(string)
     assert Counted.operations == modes * counted.flops
     assert counted.bytes == 8 * (len(state) + len(moved)) / modes
     # It is the step of a string: untwisted and free it turns on, -1 rad/s for 20 ms.
@@ -169,3 +173,15 @@ def test_a_whole_run_is_printed_written_and_drawn(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "Gflop/s" in printed
     assert "not measured" in printed  # CVODE was left out
+
+
+@pytest.mark.slow
+def test_ten_million_lanes_stay_under_a_gibibyte():
+    """In a process of its own: its peak counts whatever it has ever held."""
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.memory"], capture_output=True, text=True, check=True
+    )
+    found = json.loads(done.stdout)
+    assert found["lanes"] >= 10_000_000
+    assert 0.0 < found["shares"]["0.874876"] < 1.0
+    assert found["before_bytes"] < found["peak_bytes"] < 2**30

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from drillctl.design.controller_tables import (
     ActiveDampingTable,
@@ -129,7 +132,7 @@ def _real(controller: Controller, drive: DriveTable) -> RealDrive | SampledDrive
         "most": most,
         "power": math.inf if drive.power_limit is None else drive.power_limit,
         "rate": rate,
-        "tracking": _tracking(controller, drive),
+        "tracking": float(tracking(controller.kp, controller.ki, drive)),
     }
     if drive.sampling_period == 0.0:
         return RealDrive(**numbers)
@@ -144,13 +147,23 @@ def limits(drive: DriveTable) -> tuple[float, float]:
     return (unlimited if drive.minimum_torque is None else drive.minimum_torque), most
 
 
-def _tracking(controller: Controller, drive: DriveTable) -> float:
-    """Rate (1/s) at which a limited integral gives in."""
-    if drive.anti_windup == "none" or controller.ki == 0.0:
-        return 0.0
+def tracking(kp: Any, ki: Any, drive: DriveTable) -> Any:
+    """Rate (1/s) at which a limited integral gives in, for gains that may be arrays.
+
+    Parameters
+    ----------
+    kp, ki : float or ndarray
+        Gains (N m s/rad, N m/rad).
+    drive : DriveTable
+        Says whether there is anti-windup, and how fast if that is given.
+    """
+    if drive.anti_windup == "none":
+        return np.zeros(np.broadcast_shapes(np.shape(kp), np.shape(ki)))
     if drive.tracking_time is not None:
-        return 1.0 / drive.tracking_time
-    return controller.ki / controller.kp if controller.kp > 0.0 else 1.0
+        rate: Any = 1.0 / drive.tracking_time
+    else:
+        rate = np.where(np.greater(kp, 0.0), ki / np.where(np.greater(kp, 0.0), kp, 1.0), 1.0)
+    return np.where(np.equal(ki, 0.0), 0.0, rate)
 
 
 def refuse_weak_drive(tables: DesignTables, string: Drillstring, torque: float) -> None:

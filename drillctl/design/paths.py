@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, get_args
 
+from pydantic import BeforeValidator
+
 from drillctl import units
 from drillctl.design.design import Design
 from drillctl.design.quantities import number
@@ -33,17 +35,33 @@ class Parameter:
         In SI; None where the design leaves it out.
     whole : bool
         Whether it is a count and takes whole numbers only.
+    check : BeforeValidator or None
+        What its table checks a value with.
     """
 
     path: str
     kind: Kind | None
     value: float | None
     whole: bool = False
+    check: BeforeValidator | None = None
 
     @property
     def si_unit(self) -> str:
         """Unit of SI values, empty for factors and counts."""
         return self.kind.si if self.kind else ""
+
+    def refusal(self, value: float) -> str | None:
+        """Why its table allows no such value (SI), or None if it does.
+
+        What other keys have to say to it is not asked.
+        """
+        if self.check is None:
+            return None
+        try:
+            self.check.func(units.SI(value) if self.kind else value)  # type: ignore[call-arg]
+        except InputError as error:
+            return error.problem
+        return None
 
     def parse(self, value: object) -> float:
         """Read a value as it would stand in the file, into SI.
@@ -107,7 +125,7 @@ def _collect(table: Table, prefix: str, found: list[Parameter]) -> None:
                 _collect(section, f"{path}.{section.name}.", found)
         elif _is_number(info.annotation):
             whole = _is_number(info.annotation, int) and not _is_number(info.annotation, float)
-            found.append(Parameter(path, kind_of(info), value, whole))
+            found.append(Parameter(path, kind_of(info), value, whole, _check_of(info)))
 
 
 def _is_number(annotation: Any, *types: type) -> bool:
@@ -115,6 +133,21 @@ def _is_number(annotation: Any, *types: type) -> bool:
     if annotation in (types or (int, float)):
         return True
     return any(_is_number(a, *types) for a in get_args(annotation) if a is not annotation)
+
+
+def _check_of(info: Any) -> BeforeValidator | None:
+    """The check in a field's annotation, wherever in it that stands."""
+    for note in (*info.metadata, *_notes_inside(info.annotation)):
+        if isinstance(note, BeforeValidator):
+            return note
+    return None
+
+
+def _notes_inside(annotation: Any) -> list[Any]:
+    found: list[Any] = list(getattr(annotation, "__metadata__", ()))
+    for argument in get_args(annotation):
+        found += _notes_inside(argument)
+    return found
 
 
 def kind_of(info: Any) -> Kind | None:

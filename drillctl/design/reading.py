@@ -10,6 +10,7 @@ from typing import Any
 from drillctl import catalog
 from drillctl.design.design import Design
 from drillctl.design.merging import Tree, overlay, with_values
+from drillctl.design.sample_files import with_samples
 from drillctl.design.validation import validated
 from drillctl.errors import InputError, shown
 
@@ -37,7 +38,7 @@ def load(name_or_path: str | Path, **values: Any) -> Design:
     path = catalog.find(str(name_or_path))
     tree = _merged(path, seen=())
     try:
-        tree = with_values(tree, values)
+        tree = with_samples(with_values(tree, values), Path())
     except InputError as error:
         raise error.within(str(path)) from None
     return Design(path.stem, validated(tree, str(path)), tree, str(path))
@@ -45,7 +46,10 @@ def load(name_or_path: str | Path, **values: Any) -> Design:
 
 def _merged(path: Path, seen: tuple[Path, ...]) -> Tree:
     """Contents of a file laid over those of the model it names."""
-    tree = _read(path)
+    try:
+        tree = with_samples(_read(path), path.parent)
+    except InputError as error:
+        raise (error if error.where.startswith(str(path)) else error.within(str(path))) from None
     model = tree.pop("model", None)
     if model is None:
         return tree

@@ -12,8 +12,8 @@ from pydantic import Field, field_validator, model_validator
 
 from drillctl import units
 from drillctl.design import quantities as q
+from drillctl.design.axis_table import AxisTable as AxisTable
 from drillctl.design.base import Table as Table
-from drillctl.design.base import number_or_quantity
 from drillctl.design.bit_rock_tables import BitRockTable
 from drillctl.design.compare_tables import CompareTable
 from drillctl.design.controller_tables import ControllerTable, PITable
@@ -199,27 +199,6 @@ class SimulationTable(Table):
         if self.step is not None and self.step > self.duration:
             raise InputError(f"step {self.step:g} s must not exceed duration {self.duration:g} s")
         return self
-
-
-class AxisTable(Table):
-    """One axis of a map; `min` and `max` as they would be written at `path`."""
-
-    path: str
-    min: float | str
-    max: float | str
-    points: q.Count
-
-    @field_validator("min", "max", mode="before")
-    @classmethod
-    def _number_or_quantity(cls, value: object) -> object:
-        return number_or_quantity(value)
-
-    @field_validator("points")
-    @classmethod
-    def _two_or_more(cls, value: int) -> int:
-        if value < 2:
-            raise InputError(f"an axis needs 2 points or more, got {value}")
-        return value
 
 
 PAPER_AXES = (

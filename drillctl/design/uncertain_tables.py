@@ -8,54 +8,90 @@ from typing import Any, Literal
 from pydantic import field_validator, model_validator
 
 from drillctl.design import quantities as q
+from drillctl.design.axis_table import AxisTable
 from drillctl.design.base import Table, number_or_quantity
 from drillctl.errors import InputError
 
 _KEYS = {
     "lognormal": ("mean", "cov"),
-    "normal": ("mean", "cov"),
-    "uniform": ("min", "max"),
-    "triangular": ("min", "max", "mode"),
+    "normal": ("mean", "cov", "min", "max"),
+    "uniform": ("mean", "cov", "min", "max"),
+    "beta": ("mean", "cov", "min", "max"),
+    "triangular": ("mean", "cov", "min", "max", "mode"),
+    "samples": ("samples", "file", "column", "unit"),
 }
 """Keys that go with each distribution."""
-_NEEDED = {
-    "lognormal": ("cov",),
-    "normal": ("cov",),
-    "uniform": ("min", "max"),
-    "triangular": ("min", "max"),
+_NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
+    "lognormal": (("cov",),),
+    "normal": (("cov",),),
+    "uniform": (("min", "max"), ("cov",)),
+    "beta": (("cov", "min", "max"),),
+    "triangular": (("min", "max"), ("cov",)),
+    "samples": (("samples",),),
 }
-"""Those of them that have no default."""
+"""Those of them that have no default: one of these ways."""
+FEWEST_REPLICATES = 8
+"""Of randomised quasi-Monte Carlo: fewer make intervals from their scatter mean little."""
 
 
 class DistributionTable(Table):
     """How an uncertain parameter is distributed; its values as they are written at its path.
 
     `lognormal` and `normal`: `cov`, the standard deviation over the mean, and `mean`, by default
-    the design's own value. `uniform` and `triangular`: `min` and `max`; `mode` of the latter,
-    by default halfway.
+    the design's own value. A normal distribution is truncated at `min` and `max`, by default at
+    what its key allows (a weight is not negative); mean and deviation are those before.
+    `uniform` and `triangular`: `min` and `max`, with `mode` of the latter, by default halfway; or
+    `cov` and `mean`, symmetric about it. `beta`: `cov` and `mean` between `min` and `max`.
+    `samples`: values as they were measured, each as likely; a list, or a `file` of text with one
+    a line, or with columns and their names in the first line (`column`), in a `unit`.
     """
 
-    distribution: Literal["lognormal", "normal", "uniform", "triangular"]
+    distribution: Literal["lognormal", "normal", "uniform", "beta", "triangular", "samples"]
     mean: float | str | None = None
     cov: q.PositiveNumber | None = None
     min: float | str | None = None
     max: float | str | None = None
     mode: float | str | None = None
+    samples: tuple[float | str, ...] | None = None
+    file: str | None = None
+    column: str | None = None
+    unit: str | None = None
 
     @field_validator("mean", "min", "max", "mode", mode="before")
     @classmethod
     def _number_or_quantity(cls, value: object) -> object:
         return None if value is None else number_or_quantity(value)
 
+    @field_validator("samples", mode="before")
+    @classmethod
+    def _numbers_or_quantities(cls, values: object) -> object:
+        if not isinstance(values, (list, tuple)):
+            return values
+        return tuple(number_or_quantity(value) for value in values)
+
     @model_validator(mode="after")
     def _its_own_keys(self) -> DistributionTable:
         keys = _KEYS[self.distribution]
-        for key in ("mean", "cov", "min", "max", "mode"):
-            if getattr(self, key) is not None and key not in keys:
+        given = [
+            key for key in type(self).model_fields
+            if key != "distribution" and getattr(self, key) is not None
+        ]  # fmt: skip
+        for key in given:
+            if key not in keys:
                 raise InputError(f"{key} does not go with {self.distribution}, {_list(keys)} do")
-        for key in _NEEDED[self.distribution]:
-            if getattr(self, key) is None:
-                raise InputError(f"{key} is missing, {self.distribution} takes {_list(keys)}")
+        if self.file is not None:
+            raise InputError("file is read when a design is loaded; give samples here")
+        ways = _NEEDED[self.distribution]
+        if not any(all(key in given for key in way) for way in ways):
+            nearest_way = min(ways, key=lambda way: sum(key not in given for key in way))
+            missing = next(key for key in nearest_way if key not in given)
+            raise InputError(f"{missing} is missing, {self.distribution} takes {_list(keys)}")
+        if self.distribution in ("uniform", "triangular") and self.cov is not None:
+            for key in ("min", "max", "mode"):
+                if key in given:
+                    raise InputError(f"{key} does not go with cov: give limits, or mean and cov")
+        if self.distribution in ("uniform", "triangular") and self.cov is None and "mean" in given:
+            raise InputError("mean does not go with min and max: give limits, or mean and cov")
         return self
 
 
@@ -63,15 +99,101 @@ def _list(keys: tuple[str, ...]) -> str:
     return f"{', '.join(keys[:-1])} and {keys[-1]}"
 
 
+class CorrelationTable(Table):
+    """Correlation of two uncertain parameters, of the normal scores of a Gaussian copula."""
+
+    between: tuple[str, str]
+    value: q.Number
+
+    @model_validator(mode="after")
+    def _two_of_them(self) -> CorrelationTable:
+        first, second = self.between
+        if first == second:
+            raise InputError(f"{first!r} twice: a correlation is between two parameters")
+        if not -1.0 < self.value < 1.0:
+            raise InputError(f"value {self.value:g} must lie between -1 and 1")
+        return self
+
+
+class UntilTable(Table):
+    """When to stop before all realizations are run.
+
+    As soon as the share of the map where J1 <= `level` with at least `probability` is known to
+    within `half_width`, of the whole map, on either side. Looked for at `first_look` realizations
+    and at every doubling; the intervals are corrected for the number of looks.
+    """
+
+    level: q.PositiveNumber | None = None
+    probability: q.Share = 0.95
+    half_width: q.PositiveNumber = 0.01
+    first_look: q.Count = 256
+
+
+class SensitivityTable(Table):
+    """Sobol indices of J1 at cells of the map, and of the areas of the regions.
+
+    `samples` points of Saltelli's design, each of two realizations more than there are
+    parameters; the cells nearest to `cells`, by default the design's own values.
+    """
+
+    samples: q.Count = 256
+    cells: tuple[dict[str, float | str], ...] = ()
+
+    @field_validator("samples")
+    @classmethod
+    def _power_of_two(cls, samples: int) -> int:
+        if samples & (samples - 1):
+            raise InputError(f"{samples} is not a power of two, as Sobol points need")
+        return samples
+
+
 class UncertaintyTable(Table):
     """How many draws of the uncertain parameters, and which.
 
-    A draw is a function of seed and number alone: more realizations begin with the same ones.
+    `monte-carlo`: a draw is a function of seed and number alone, so that more realizations begin
+    with the same ones. So is one of `sobol`, scrambled in `replicates` independent ways that take
+    turns. `latin-hypercube` draws are of a fixed number. `correlations`: of any two parameters,
+    by a Gaussian copula; those left out are independent. `full`: lanes run to their end, else
+    they may stop when J1 has passed the highest level. `keep`: measures kept of every lane
+    beside J1. `contours`: outlines of every realization as a table. `axes`: more parameters that
+    the map runs over under uncertainty, those of `[map]` first.
     """
 
     realizations: q.Count = 200
     seed: q.CountOrZero = 2012
-    sampling: Literal["monte-carlo"] = "monte-carlo"
+    sampling: Literal["monte-carlo", "sobol", "latin-hypercube"] = "monte-carlo"
+    replicates: q.Count = FEWEST_REPLICATES
+    correlations: tuple[CorrelationTable, ...] = ()
+    full: bool = False
+    keep: tuple[str, ...] = ()
+    contours: bool = False
+    axes: tuple[AxisTable, ...] = ()
+    until: UntilTable | None = None
+    sensitivity: SensitivityTable | None = None
+
+    @field_validator("replicates")
+    @classmethod
+    def _enough(cls, replicates: int) -> int:
+        if replicates < FEWEST_REPLICATES:
+            raise InputError(f"{replicates} is not allowed: at least {FEWEST_REPLICATES}")
+        return replicates
+
+    @model_validator(mode="after")
+    def _whole_replicates(self) -> UncertaintyTable:
+        if self.sampling != "monte-carlo" and self.realizations % self.replicates:
+            more = -(-self.realizations // self.replicates) * self.replicates
+            raise InputError(
+                f"realizations {self.realizations} must be a multiple of the {self.replicates} "
+                f"replicates of {self.sampling}, for instance {more}"
+            )
+        if self.until is not None and self.sampling == "latin-hypercube":
+            raise InputError("until does not go with latin-hypercube, whose number is fixed")
+        first = 0 if self.until is None else self.until.first_look
+        if self.sampling == "sobol" and first % self.replicates:
+            raise InputError(
+                f"until.first_look {first} must be a multiple of the {self.replicates} replicates"
+            )
+        return self
 
 
 def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -15,6 +15,8 @@
 - `three_regions.py`: `three_regions` over the same two parameters.
 - `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
 - `weight_delay.py`: `weight_delay`, a weight that follows the bit speed against its delay.
+- `uncertain_regions.py`: `uncertain_regions`, `probability_map` and `region_error` of draws.
+- `uncertain_curves.py`: `area_convergence`, `cell_distributions`, `sensitivity_bars`.
 - `time_response.py`: `time_response`, speeds against time with sticks shaded.
 - `style.py`: colours, sizes and the making of figures, shared by all.
 
@@ -25,6 +27,7 @@ the rig floor: rpm, kN, kN m, m.
 
 from drillctl.plots.adaptive_map import adaptive_map
 from drillctl.plots.comparison import j1_against_weight, j1_distributions, paired_differences
+from drillctl.plots.errors import error_estimate
 from drillctl.plots.frequency import bode
 from drillctl.plots.friction import friction_curves
 from drillctl.plots.impedance import drive_impedance
@@ -39,14 +42,23 @@ from drillctl.plots.regularisation import regularisation
 from drillctl.plots.root_locus import root_locus
 from drillctl.plots.three_regions import three_regions
 from drillctl.plots.time_response import time_response
+from drillctl.plots.uncertain_curves import (
+    area_convergence,
+    cell_distributions,
+    sensitivity_bars,
+)
+from drillctl.plots.uncertain_regions import probability_map, region_error, uncertain_regions
 from drillctl.plots.weight_delay import weight_delay
 
 __all__ = [
     "adaptive_map",
+    "area_convergence",
     "bode",
+    "cell_distributions",
     "compared_regions",
     "compared_responses",
     "drive_impedance",
+    "error_estimate",
     "friction_curves",
     "gain_boundary",
     "j1_against_weight",
@@ -58,12 +70,16 @@ __all__ = [
     "nichols",
     "nyquist",
     "paired_differences",
+    "probability_map",
+    "region_error",
     "regularisation",
     "root_locus",
     "sensitivity",
+    "sensitivity_bars",
     "stability_map",
     "sweep_line",
     "three_regions",
     "time_response",
+    "uncertain_regions",
     "weight_delay",
 ]

@@ -26,6 +26,10 @@ NAMES = {
 """What the usual parameters are called on an axis; others keep their path."""
 
 
+MOST_COLOURED = 2000
+"""Cells along an axis that are coloured: more than a picture has points along it."""
+
+
 def axis_label(axis: Axis, system: units.System) -> tuple[np.ndarray, str]:
     """Values of an axis in the units people read, and its label."""
     values, unit = units.displayed(axis.values, axis.unit, system)
@@ -61,9 +65,11 @@ def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = 
     x, x_label = axis_label(result.axes[0], system)
     y, y_label = axis_label(result.axes[1], system)
     top = 2.0 * result.levels[-1]
+    i, j = (slice(None, None, -(-len(a) // MOST_COLOURED)) for a in result.axes)
     mesh = ax.pcolormesh(
-        x, y, result.j1.T, cmap=_colours(), vmin=0.0, vmax=top, shading="nearest", rasterized=True
-    )
+        x[i], y[j], result.j1[i, j].T, cmap=_colours(), vmin=0.0, vmax=top, shading="nearest",
+        rasterized=True,
+    )  # fmt: skip
     bar = figure.colorbar(mesh, ax=ax, extend="max", pad=0.02)
     bar.set_label("J1 (s)")
     bar.ax.tick_params(labelsize=SMALL)

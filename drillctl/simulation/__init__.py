@@ -5,7 +5,8 @@
   paper's own three branches; `trajectory.py`: signals and measures.
 - `batch.py`: thousands of lanes at a fixed step; `lanes.py`: what a lane is; `propagator.py`:
   the exact step of the string; `step_laws.py`: laws with a memory for it; `kernels/`: compiled
-  loops and nothing else.
+  loops and nothing else; `scheme.py`: step and modes; `scheme_reasons.py`: why these;
+  `cost.py`: operations of a step.
 - `start.py`, `measures.py`: shared by both.
 """
 

@@ -7,6 +7,7 @@ what they measured into arrays by name.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -34,12 +35,9 @@ from drillctl.top_drive import SampledDrive
 
 Array = NDArray[np.float64]
 
-CHUNK = 4096
-"""Lanes given to the kernels at a time: half a second's work, so that progress and an
+CHUNK = 16384
+"""Lanes given to the kernels at a time: a fraction of a second, so that progress and an
 interruption are felt."""
-
-SHARES = 12
-"""Shares of the work that each thread takes: they end together though lanes differ."""
 
 FLOATS = (
     "j1", "j1_rate", "stuck_time", "sticks", "stick_slip_index", "mean_bit_speed",
@@ -254,10 +252,33 @@ def _in_threads(advance: Callable[[int, int], Any], blocks: int) -> None:
     if threads == 1:
         advance(0, blocks)
         return
-    share = max(1, blocks // (SHARES * threads))
-    begins = range(0, blocks, share)
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda begin: advance(begin, min(begin + share, blocks)), begins))
+    shares = deque(_shares(blocks, threads))
+
+    def work() -> None:
+        while shares:
+            try:
+                share = shares.popleft()
+            except IndexError:  # another thread took the last one
+                return
+            advance(*share)
+
+    with ThreadPoolExecutor(threads - 1) as pool:
+        others = [pool.submit(work) for _ in range(threads - 1)]
+        try:
+            work()
+        finally:
+            shares.clear()  # interrupted: the others end what they have begun
+        for other in others:
+            other.result()
+
+
+def _shares(blocks: int, threads: int) -> Iterator[tuple[int, int]]:
+    """Half of what each thread has left at a time: few calls, and all threads end together."""
+    begin = 0
+    while begin < blocks:
+        end = begin + max(1, (blocks - begin) // (2 * threads))
+        yield begin, end
+        begin = end
 
 
 def _at_whole_steps(drive: Any, scheme: Scheme) -> Any:

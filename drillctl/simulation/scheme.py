@@ -50,9 +50,10 @@ ACCURACIES = {
     "standard": Accuracy(step=0.025, steps_per_period=220, phase=1.0),
     "fine": Accuracy(step=1.0 / 140.0, steps_per_period=770, phase=0.64),
 }
-"""Steps that go into a tenth of a second, at which signals are kept. Median and 99th percentile of the relative error of J1 over the paper's map: `fast` 1.5e-4 and
-7e-3, `standard` 5e-5 and 2e-3, `fine` 1e-4 at the 99th percentile, held by a test. The error falls
-with the square of the step, counted in periods of the first elastic mode."""
+"""Steps that go into a tenth of a second, at which signals are kept. Median and 99th percentile of
+the relative error of J1 over the paper's map: `fast` 1.5e-4 and 7e-3, `standard` 5e-5 and 2e-3,
+`fine` 1e-4 at the 99th percentile, held by a test. The error falls with the square of the step,
+counted in periods of the first elastic mode."""
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,14 @@ class Start:
 
     Attributes
     ----------
-    twist, turn : ndarray, shape (nodes,)
-        Shapes of the angles and of the speeds in the frame.
-    angle, speed : ndarray, shape (lanes,)
-        What they are to be multiplied with (rad or N m; rad/s).
+    twist : ndarray, shape (nodes,)
+        Shape of the angles in the frame.
+    angle : ndarray, shape (lanes,)
+        What it is to be multiplied with (rad, or N m where the shape is a compliance).
+    turn : ndarray, shape (nodes,)
+        Shape of the speeds in the frame.
+    speed : ndarray, shape (lanes,)
+        What it is to be multiplied with (rad/s).
     """
 
     twist: Array

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -90,14 +92,14 @@ def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> NDArra
     random = np.random.default_rng(SEED)
     edges = [-np.inf, *levels, 2.0 * levels[-1]]
     bands = [
-        list(random.permutation(np.flatnonzero((flat > low) & (flat <= high))))
+        random.permutation(np.flatnonzero((flat > low) & (flat <= high)))
         for low, high in pairwise(edges)
     ]
-    chosen: list[int] = []
-    while len(chosen) < count and any(bands):
-        for band in bands:
-            if band and len(chosen) < count:
-                chosen.append(int(band.pop()))
+    # A band gives its last cells first; of a large map they stay in arrays.
+    turns = sorted(
+        (turn, band) for band, cells in enumerate(bands) for turn in range(min(len(cells), count))
+    )
+    chosen = [int(bands[band][-1 - turn]) for turn, band in turns[:count]]
     return np.array(sorted(chosen), dtype=np.int64)
 
 
@@ -128,27 +130,43 @@ def audit(
     """
     cells = choose_cells(values.reshape(shape_of(axes)), levels, count)
     designs = [cell_design(design, axes, int(cell)) for cell in cells]
-    reference = np.array(_all(designs, progress))
+    reference = references(designs, progress)
     return Audit(cells, values.ravel()[cells], reference)
 
 
-def _all(designs: list[Design], progress: Progress) -> list[float]:
+def references(
+    designs: list[Design], progress: Progress = SILENT, seconds: float = math.inf
+) -> Array:
+    """J1 of designs by the reference solver (s), on all cores; NaN for those that fail.
+
+    Parameters
+    ----------
+    designs : list of Design
+        To be simulated.
+    progress : Progress
+        Told of each.
+    seconds : float
+        After so long (s) no further design is begun: there are then fewer values than designs.
+    """
     import joblib
     import numba
 
     if not designs:
-        return []
+        return np.empty(0)
     progress.begin("auditing cells", len(designs))
-    found = []
+    begin, found = time.perf_counter(), list[float]()
     # As many as the lanes may use, which is what `--threads` sets.
     workers = min(len(designs), numba.get_num_threads())
-    runs = joblib.Parallel(n_jobs=workers, return_as="generator")(
-        joblib.delayed(reference_j1)(d) for d in designs
-    )
-    for value in runs:
-        found.append(value)
-        progress.advance(1)
-    return found
+    at_a_time = len(designs) if math.isinf(seconds) else workers
+    with joblib.Parallel(n_jobs=workers, return_as="generator") as parallel:
+        for first in range(0, len(designs), at_a_time):
+            if time.perf_counter() - begin > seconds:
+                break
+            part = designs[first : first + at_a_time]
+            for value in parallel(joblib.delayed(reference_j1)(d) for d in part):
+                found.append(value)
+                progress.advance(1)
+    return np.array(found)
 
 
 def reference_j1(design: Design) -> float:

@@ -66,8 +66,9 @@ class ChosenCells:
         self._group = np.empty(count, dtype=np.int32)
         self._lane = np.empty(count, dtype=np.int64)
         for number, group in enumerate(self._groups):
-            self._group[group.cells] = number
-            self._lane[group.cells] = np.arange(len(group.cells))
+            lanes = np.arange(len(group))
+            cells = group.cells_of(lanes)
+            self._group[cells], self._lane[cells] = number, lanes
 
     @property
     def scheme(self) -> tuple[float, int] | tuple[None, None]:
@@ -97,7 +98,7 @@ class ChosenCells:
             mine = np.flatnonzero(self._group[cells] == number)
             for first in range(0, len(mine), CHUNK):
                 part = mine[first : first + CHUNK]
-                lanes = self._groups[number].lanes[self._lane[cells[part]]]
+                lanes = self._groups[number].some(self._lane[cells[part]])
                 batch = self._block_of(lanes, prepared)
                 for name, values in batch.measures.items():
                     measures[name][part] = values
@@ -121,8 +122,8 @@ class ChosenCells:
         if number not in self._prepared:
             group = self._groups[number]
             table = group.design.tables.simulation
-            made = self._blocks.prepared(number, partial(prepare, group.lanes, table))
-            lanes = group.lanes
+            lanes = group.telling
+            made = self._blocks.prepared(number, partial(prepare, lanes, table))
             kind = tuple(
                 map(type, (made.stepper.string, lanes.friction, lanes.drive, lanes.weight))
             )

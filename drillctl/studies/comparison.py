@@ -24,7 +24,7 @@ from drillctl.simulation.measures import STATUSES
 from drillctl.studies.cases import case_designs, in_case, refuse_unequal
 from drillctl.studies.drawn_lanes import Failures, drawn_lanes
 from drillctl.studies.drawn_runs import DrawnRuns, equalising_shift, run_draws, start_up
-from drillctl.studies.draws import draw, uncertain_parameters
+from drillctl.studies.draws import draw, refuse_dependent, uncertain_parameters
 from drillctl.studies.intervals import Interval, mean_interval, share_interval
 from drillctl.studies.memory import refuse_too_large
 from drillctl.studies.nominal import Nominal, labelled, nominal_design, nominal_runs
@@ -331,6 +331,7 @@ def compare(
         design = first.replace(asked) if asked else first
     refuse_unequal(named)
     draws, equal = design.tables.uncertainty, design.tables.compare.equal_mean_weight
+    refuse_dependent(design)
     refuse_too_large([draws.realizations, len(named)], "uncertainty.realizations")
     progress.begin("simulating cases", draws.realizations * len(named))
     runs, own = [], {}

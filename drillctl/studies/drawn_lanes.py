@@ -90,7 +90,7 @@ def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
     InputError
         Every draw is impossible; the message is that of the first.
     """
-    design = _beyond_the_table(design, draws)
+    design = beyond_the_table(design, tuple(draws.values))
     apart = any(path.startswith(SHARED) for path in draws.values)
     possible: list[_Drawn] = []
     errors: list[InputError] = []
@@ -112,7 +112,7 @@ def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
     parts = [[one] for one in possible]
     if not apart:
         parts = [[one for one in possible if one.design is kept] for kept in like.values()]
-    return DrawnLanes(tuple(_group(part) for part in parts), _told(errors))
+    return DrawnLanes(tuple(_group(part) for part in parts), told(errors))
 
 
 class _Drawn(NamedTuple):
@@ -123,9 +123,18 @@ class _Drawn(NamedTuple):
     lane: dict[str, float]
 
 
-def _beyond_the_table(design: Design, draws: Draws) -> Design:
+def beyond_the_table(design: Design, drawn: tuple[str, ...]) -> Design:
+    """The design with its friction table extrapolated, if the weight on bit is drawn.
+
+    Parameters
+    ----------
+    design : Design
+        Of any law of the rock.
+    drawn : tuple of str
+        Paths of what is uncertain.
+    """
     table = getattr(design.tables.bit_rock, "table", None)
-    if table is None or "operating_point.weight_on_bit" not in draws.values:
+    if table is None or "operating_point.weight_on_bit" not in drawn:
         return design
     return design.replace({"bit_rock.outside_table": "extrapolate"})
 
@@ -136,8 +145,14 @@ def _group(part: list[_Drawn]) -> DrawnGroup:
     return DrawnGroup(design, lanes_of(design, columns), np.array([one.number for one in part]))
 
 
-def _told(errors: list[InputError]) -> tuple[Failures, ...]:
-    """Errors counted by the key that they name: their numbers differ from draw to draw."""
+def told(errors: list[InputError]) -> tuple[Failures, ...]:
+    """Errors counted by the key that they name: their numbers differ from draw to draw.
+
+    Parameters
+    ----------
+    errors : list of InputError
+        One a draw.
+    """
     by_key: dict[str, list[InputError]] = {}
     for error in errors:
         by_key.setdefault(error.where, []).append(error)

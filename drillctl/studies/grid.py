@@ -5,15 +5,19 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design, parameter
+from drillctl.design.drive import tracking
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
+from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
+from drillctl.studies.lane_grid import Index, NumberGrid, compact
 from drillctl.studies.memory import refuse_too_large
 
 Array = NDArray[np.float64]
@@ -52,6 +56,51 @@ class Axis:
         return len(self.values)
 
 
+OF_THE_ROCK = ("friction.", "before.", "weight.", "weight_program.", "set_speed")
+"""Names of numbers on which the steepest falling slope of the rock depends."""
+OF_THE_PROGRAM = ("speed_program.", "weight_program.", "rock_until")
+"""Names of numbers that say when something jumps or turns."""
+TRACKING, TRACKED_BY = "drive.tracking", "controller.drive.tracking_time"
+"""The one number that two usual axes have in common: it follows from both gains, unless given."""
+SEARCHED = 4096
+"""Lanes in which the steepest rock is looked for at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The cells of a grid that share a string and the types of their laws.
+
+    Attributes
+    ----------
+    design : Design
+        With the values of the axes that all of the cells share.
+    axes : tuple of Axis
+        The other axes, over which the cells run.
+    begins, shape : tuple of int
+        Where the part begins along each axis of the whole grid, and how far it goes.
+    whole : tuple of int
+        Shape of the whole grid.
+    """
+
+    design: Design
+    axes: tuple[Axis, ...]
+    begins: tuple[int, ...]
+    shape: tuple[int, ...]
+    whole: tuple[int, ...]
+
+    def at(self, corner: int) -> Design:
+        """The design of the first cell (0) or of the last (-1)."""
+        values = {a.path: a.values[corner] for a in self.axes}
+        return replaced(self.design, values) if values else self.design
+
+    @cached_property
+    def cells(self) -> Index:
+        """Index of each cell in the flattened grid, shape (cells,)."""
+        every = np.arange(np.prod(self.whole, dtype=int)).reshape(self.whole)
+        ends = zip(self.begins, self.shape, strict=True)
+        return every[tuple(slice(begin, begin + n) for begin, n in ends)].ravel()
+
+
 @dataclass(frozen=True, eq=False)
 class Group:
     """The cells of a grid that share a string and the types of their laws.
@@ -60,15 +109,71 @@ class Group:
     ----------
     design : Design
         Of the first cell.
-    lanes : Lanes
-        One a cell.
-    cells : ndarray of int, shape (lanes,)
-        Index of each cell in the flattened grid.
+    numbers : NumberGrid
+        Lane numbers over the axes that the lanes do not share.
+    begins, shape : tuple of int
+        Where the group begins along each axis of the whole grid, and how far it goes.
+    whole : tuple of int
+        Shape of the whole grid.
     """
 
     design: Design
-    lanes: Lanes
-    cells: NDArray[np.int64]
+    numbers: NumberGrid
+    begins: tuple[int, ...]
+    shape: tuple[int, ...]
+    whole: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def some(self, chosen: Index) -> Lanes:
+        """Some of its lanes, by number."""
+        return lanes_of(self.design, self.numbers.of(chosen))
+
+    def cells_of(self, chosen: Index) -> Index:
+        """Index in the flattened grid of some of its lanes."""
+        if not self.whole:
+            return chosen
+        inside = np.unravel_index(chosen, self.shape)
+        at = tuple(begin + i for begin, i in zip(self.begins, inside, strict=True))
+        return np.ravel_multi_index(at, self.whole)
+
+    def lanes_at(self, cells: Index) -> Index:
+        """Lane of each cell of the flattened grid; -1 for cells of other groups."""
+        if not self.whole:
+            return cells
+        at = np.array(np.unravel_index(cells, self.whole))
+        inside = at - np.array(self.begins)[:, None]
+        ends = np.array(self.shape)[:, None]
+        mine = ((inside >= 0) & (inside < ends)).all(axis=0)
+        return np.where(mine, np.ravel_multi_index(tuple(inside % ends), self.shape), -1)
+
+    @cached_property
+    def lanes(self) -> Lanes:
+        """All of them at once, one a cell: mind the memory."""
+        return self.some(np.arange(len(self)))
+
+    @cached_property
+    def cells(self) -> Index:
+        """Index of each cell in the flattened grid, shape (lanes,)."""
+        return self.cells_of(np.arange(len(self)))
+
+    @cached_property
+    def telling(self) -> Lanes:
+        """Lanes that ask for the same scheme as all: the steepest rock, each turn of a program.
+
+        Found a part at a time, over those axes alone that matter.
+        """
+        numbers = self.numbers
+        rock, program = numbers.varies(OF_THE_ROCK), numbers.varies(OF_THE_PROGRAM)
+        steepest, cells = -1.0, np.empty(0, dtype=np.int64)
+        for first in range(0, int(np.prod(numbers.along(rock), dtype=int)), SEARCHED):
+            part = numbers.cells_along(rock, first, SEARCHED)
+            fall = self.some(part).steepest_fall
+            if fall > steepest:
+                steepest, cells = fall, part
+        turns = numbers.cells_along(program, 0, len(self))
+        return self.some(np.union1d(cells, turns) if program else cells)
 
 
 def axis(design: Design, table: AxisTable) -> Axis:
@@ -94,21 +199,41 @@ def axis(design: Design, table: AxisTable) -> Axis:
     return Axis(table.path, found.si_unit, values)
 
 
-def axes_of(design: Design, tables: tuple[AxisTable, ...]) -> tuple[Axis, ...]:
-    """All axes of a grid; see `axis`.
+def axes_of(
+    design: Design, tables: tuple[AxisTable, ...], kept: int = len(FLOATS)
+) -> tuple[Axis, ...]:
+    """All axes of a grid; see `axis`. `kept`: how many measures are kept of each cell.
 
     Raises
     ------
     InputError
         An axis that does not fit the design, or a grid too large for the memory.
     """
-    refuse_too_large([table.points for table in tables])
+    refuse_too_large([table.points for table in tables], kept=kept)
     return tuple(axis(design, table) for table in tables)
 
 
 def shape_of(axes: tuple[Axis, ...]) -> tuple[int, ...]:
     """Number of points along each axis."""
     return tuple(len(a) for a in axes)
+
+
+def parts(design: Design, axes: tuple[Axis, ...]) -> Iterator[Part]:
+    """The cells of a grid, string by string and kind by kind.
+
+    Raises
+    ------
+    InputError
+        A value on the grid is impossible; the message says which.
+    """
+    slices = [_singly(a) if a.shared else _by_kind(design, axes, a) for a in axes]
+    for chosen in itertools.product(*slices):
+        pairs = list(zip(axes, chosen, strict=True))
+        variant = replaced(design, {a.path: a.values[p.start] for a, p in pairs if a.shared})
+        own = tuple(Axis(a.path, a.unit, a.values[p]) for a, p in pairs if not a.shared)
+        begins = tuple(part.start for part in chosen)
+        shape = tuple(part.stop - part.start for part in chosen)
+        yield Part(variant, own, begins, shape, shape_of(axes))
 
 
 def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
@@ -119,21 +244,9 @@ def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
     InputError
         A value on the grid is impossible; the message says which.
     """
-    cells = np.arange(np.prod(shape_of(axes), dtype=int)).reshape(shape_of(axes))
-    parts = [_singly(a) if a.shared else _by_kind(design, axes, a) for a in axes]
-    for chosen in itertools.product(*parts):
-        variant = _replaced(
-            design,
-            {a.path: a.values[p.start] for a, p in zip(axes, chosen, strict=True) if a.shared},
-        )
-        own = tuple(
-            Axis(a.path, a.unit, a.values[p])
-            for a, p in zip(axes, chosen, strict=True)
-            if not a.shared
-        )
-        like = _replaced(variant, {a.path: a.values[0] for a in own}) if own else variant
-        lanes = lanes_of(like, _numbers(variant, own))
-        yield Group(like, lanes, cells[chosen].ravel())
+    for part in parts(design, axes):
+        numbers = _numbers(part.design, part.axes)
+        yield Group(part.at(0), numbers, part.begins, part.shape, part.whole)
 
 
 def _singly(a: Axis) -> list[slice]:
@@ -148,7 +261,7 @@ def _by_kind(design: Design, axes: tuple[Axis, ...], a: Axis) -> list[slice]:
     if not a.path.startswith(("controller.drive.", "weight_on_bit.path.", "scenario.")):
         return [slice(0, len(a))]
     low = {other.path: other.values[0] for other in axes}
-    kind = [kinds(_replaced(design, low | {a.path: value})) for value in a.values]
+    kind = [kinds(replaced(design, low | {a.path: value})) for value in a.values]
     starts = [0, *(k for k in range(1, len(a)) if kind[k] != kind[k - 1])]
     return [slice(i, j) for i, j in itertools.pairwise([*starts, len(a)])]
 
@@ -156,11 +269,19 @@ def _by_kind(design: Design, axes: tuple[Axis, ...], a: Axis) -> list[slice]:
 def cell_design(design: Design, axes: tuple[Axis, ...], cell: int) -> Design:
     """The design of one cell of the flattened grid."""
     where = np.unravel_index(cell, shape_of(axes))
-    return _replaced(design, {a.path: a.values[k] for a, k in zip(axes, where, strict=True)})
+    return replaced(design, {a.path: a.values[k] for a, k in zip(axes, where, strict=True)})
 
 
-def _replaced(design: Design, values: dict[str, float]) -> Design:
-    """The design with SI values put in; an impossible one is told with its path and value."""
+def replaced(design: Design, values: dict[str, float]) -> Design:
+    """The design with SI values put in; an impossible one is told with its path and value.
+
+    Parameters
+    ----------
+    design : Design
+        To be changed.
+    values : dict
+        Dotted path to value (SI).
+    """
     try:
         return design.replace({path: units.SI(value) for path, value in values.items()})
     except InputError as error:
@@ -168,45 +289,71 @@ def _replaced(design: Design, values: dict[str, float]) -> Design:
         raise InputError(f"at {at}: {error}", "map.axes") from None
 
 
-def _numbers(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array]:
-    """Lane numbers of every cell, flattened."""
+def cell_numbers(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array]:
+    """Lane numbers of every cell, flattened.
+
+    Parameters
+    ----------
+    design : Design
+        With whatever the axes do not say.
+    axes : tuple of Axis
+        Over which the cells run.
+    """
+    numbers = _numbers(design, axes)
+    return numbers.of(np.arange(len(numbers)))
+
+
+def _numbers(design: Design, axes: tuple[Axis, ...]) -> NumberGrid:
+    """Lane numbers over a grid."""
     grid = _outer_product(design, axes)
-    if grid is None:
-        cells = [
-            lane_numbers(cell_design(design, axes, cell))
-            for cell in range(int(np.prod(shape_of(axes), dtype=int)))
-        ]
-        grid = {key: np.array([c[key] for c in cells]) for key in cells[0]}
-    return {key: values.ravel() for key, values in grid.items()}
+    return _cell_by_cell(design, axes) if grid is None else grid
 
 
-def _outer_product(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array] | None:
+def _cell_by_cell(design: Design, axes: tuple[Axis, ...]) -> NumberGrid:
+    """Lane numbers of every cell resolved by itself."""
+    shape = shape_of(axes)
+    found: dict[str, Array] = {}
+    for cell in range(int(np.prod(shape, dtype=int))):
+        for key, value in lane_numbers(cell_design(design, axes, cell)).items():
+            found.setdefault(key, np.empty(shape)).ravel()[cell] = value
+    return NumberGrid(shape, compact(found))
+
+
+def _outer_product(design: Design, axes: tuple[Axis, ...]) -> NumberGrid | None:
     """Lane numbers over the grid, from each axis resolved alone; None if that does not hold.
 
     The other axes stand at their lowest values meanwhile, not at the design's: those may be
     impossible together with values of this axis, or the reason why it changes nothing.
     """
     low = {a.path: a.values[0] for a in axes}
-    base = lane_numbers(_replaced(design, low) if axes else design)
-    grid = {key: np.full(shape_of(axes), value) for key, value in base.items()}
+    base = lane_numbers(replaced(design, low) if axes else design)
+    found = {key: np.full((1,) * len(axes), value) for key, value in base.items()}
     taken: set[str] = set()
+    tracked = {TRACKING} & set(base) if TRACKED_BY not in low else set()
     for dimension, a in enumerate(axes):
-        column = [lane_numbers(_replaced(design, low | {a.path: v})) for v in a.values]
+        column = [lane_numbers(replaced(design, low | {a.path: v})) for v in a.values]
         touched = {key for key in base if any(n[key] != base[key] for n in column)}
-        if touched & taken:
+        if (touched & taken) - tracked:
             return None
         taken |= touched
         along = [-1 if d == dimension else 1 for d in range(len(axes))]
         for key in touched:
-            grid[key][:] = np.array([n[key] for n in column]).reshape(along)
+            found[key] = np.array([n[key] for n in column]).reshape(along)
+    if tracked and found["drive.kp"].size > 1 and found["drive.ki"].size > 1:
+        drive = design.tables.controller.drive
+        found[TRACKING] = tracking(found["drive.kp"], found["drive.ki"], drive)
+    grid = NumberGrid(shape_of(axes), found)
     return grid if _right_at_corners(design, axes, grid) else None
 
 
-def _right_at_corners(design: Design, axes: tuple[Axis, ...], grid: dict[str, Array]) -> bool:
+def _right_at_corners(design: Design, axes: tuple[Axis, ...], grid: NumberGrid) -> bool:
     """Whether every corner, resolved as a whole, is possible and what the grid says it is."""
     for corner in itertools.product((0, -1), repeat=len(axes)):
         values = {a.path: a.values[k] for a, k in zip(axes, corner, strict=True)}
-        numbers = lane_numbers(_replaced(design, values) if axes else design)
-        if any(grid[key][corner] != value for key, value in numbers.items()):
+        numbers = lane_numbers(replaced(design, values) if axes else design)
+        at = tuple(k % len(a) for a, k in zip(axes, corner, strict=True))
+        cell = int(np.ravel_multi_index(at, grid.shape)) if axes else 0
+        said = grid.of(np.array([cell]))
+        if any(said[key][0] != value for key, value in numbers.items()):
             return False
     return True

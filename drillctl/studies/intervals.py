@@ -24,10 +24,40 @@ def share_interval(hits: int, total: int) -> Interval:
     hits, total : int
         How many of how many; `total` is positive.
     """
-    from scipy.stats import binomtest
+    low, high = share_intervals(np.array([hits]), total)
+    return float(low[0]), float(high[0])
 
-    found = binomtest(hits, total).proportion_ci(CONFIDENCE, method="exact")
-    return float(found.low), float(found.high)
+
+def share_intervals(
+    hits: NDArray[np.int64], total: int, confidence: float = CONFIDENCE
+) -> tuple[Array, Array]:
+    """Clopper-Pearson intervals of many probabilities.
+
+    Clopper & Pearson, Biometrika 26 (1934) 404-413: each holds the probability with at least
+    the confidence, whatever the probability is.
+
+    Parameters
+    ----------
+    hits : ndarray of int
+        How many of the draws, for each probability.
+    total : int
+        Independent draws; positive.
+    confidence : float
+        Of each interval.
+
+    Returns
+    -------
+    tuple of ndarray, shape of `hits`
+        Lower and upper ends.
+    """
+    from scipy.special import betaincinv
+
+    tail = 0.5 * (1.0 - confidence)
+    with np.errstate(invalid="ignore"):  # of the ends that are 0 and 1
+        low = np.where(hits > 0, betaincinv(np.maximum(hits, 1), total - hits + 1, tail), 0.0)
+        missed = np.maximum(total - hits, 1)
+        high = np.where(hits < total, betaincinv(hits + 1, missed, 1.0 - tail), 1.0)
+    return low, high
 
 
 def mean_interval(values: Array, seed: int) -> Interval | None:

@@ -10,13 +10,15 @@ from pathlib import Path
 from drillctl.errors import InputError
 from drillctl.simulation.batch import FLOATS
 
-BYTES_PER_CELL = 8 * (2 * len(FLOATS) + 20)
-"""Memory that a cell takes while a sweep runs."""
+BYTES_PER_CELL, BYTES_PER_MEASURE = 80, 10
+"""Memory that a cell takes in a sweep, its regions and its file, and each measure kept of it."""
 MEMORY_SHARE = 0.5
 """Largest share of the free memory that a sweep may ask for."""
 
 
-def refuse_too_large(points: Sequence[int], where: str = "map.axes") -> None:
+def refuse_too_large(
+    points: Sequence[int], where: str = "map.axes", kept: int = len(FLOATS)
+) -> None:
     """Refuse (`InputError`) a grid of so many points along its axes, if memory falls short.
 
     Parameters
@@ -25,13 +27,37 @@ def refuse_too_large(points: Sequence[int], where: str = "map.axes") -> None:
         Along each axis.
     where : str
         Key that asks for them.
+    kept : int
+        How many measures are kept of a cell.
     """
     cells = math.prod(points)
-    needed, usable = cells * BYTES_PER_CELL, MEMORY_SHARE * _free_memory()
+    refuse_more_bytes(
+        cells * (BYTES_PER_CELL + kept * BYTES_PER_MEASURE),
+        f"{cells:,} cells",
+        where,
+        "fewer points",
+    )
+
+
+def refuse_more_bytes(needed: float, what: str, where: str, instead: str = "fewer of them") -> None:
+    """Refuse (`InputError`) what needs more memory than may be used.
+
+    Parameters
+    ----------
+    needed : float
+        Memory (bytes).
+    what : str
+        What needs it.
+    where : str
+        Key that asks for it.
+    instead : str
+        What would help.
+    """
+    usable = MEMORY_SHARE * _free_memory()
     if needed > usable:
         raise InputError(
-            f"{cells:,} cells need about {needed / 2**30:,.1f} GiB; "
-            f"{usable / 2**30:.1f} GiB may be used: fewer points",
+            f"{what} need about {needed / 2**30:,.1f} GiB; "
+            f"{usable / 2**30:.1f} GiB may be used: {instead}",
             where,
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.errors import InputError
+from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.batch import CHUNK, FLOATS, Batch, prepare, run_batch, warm_up
@@ -52,7 +53,7 @@ class Sweep:
     levels : tuple of float
         Levels of J1 (s).
     measures : dict of ndarray, shape of the grid
-        By the names of `simulation.batch.FLOATS`; NaN where undefined.
+        By the names of `simulation.batch.FLOATS`, those that were kept; NaN where undefined.
     status : ndarray of int8, shape of the grid
         Index into `simulation.measures.STATUSES`.
     audit : Audit
@@ -151,8 +152,11 @@ def sweep(
     audit_cells: int | None = None,
     progress: Progress = SILENT,
     blocks: Blocks | None = None,
+    measures: Sequence[str] | None = None,
 ) -> Sweep:
     """Simulate a design over a grid of its parameters with the batch engine.
+
+    Lanes are made, run and forgotten block by block: the memory is that of what is kept.
 
     Parameters
     ----------
@@ -166,6 +170,9 @@ def sweep(
         Told of blocks and audited cells.
     blocks : Blocks, optional
         Where finished blocks are kept and found again.
+    measures : sequence of str, optional
+        Measures to keep of each cell, by the names of `simulation.batch.FLOATS`; J1 and the
+        status always are. All by default.
 
     Returns
     -------
@@ -175,13 +182,14 @@ def sweep(
     Raises
     ------
     InputError
-        An axis that does not fit the design, or a grid too large for the memory.
+        An axis that does not fit the design, no measure of that name, or a grid too large for
+        the memory.
     """
     begin = time.perf_counter()
-    table = design.tables.map
-    axes = axes_of(design, table.axes) if axes is None else axes
-    refuse_too_large(shape_of(axes))
-    collected = _Collected(axes)
+    table, kept = design.tables.map, kept_measures(measures)
+    axes = axes_of(design, table.axes, len(kept)) if axes is None else axes
+    refuse_too_large(shape_of(axes), kept=len(kept))
+    collected = _Collected(axes, kept)
     collected.run(design, progress, blocks or KeepNothing())
     count = table.audit_cells if audit_cells is None else audit_cells
     audited = auditing.audit(design, axes, collected.measures["j1"], table.levels, count, progress)
@@ -201,6 +209,22 @@ def sweep(
     )
 
 
+def kept_measures(asked: Sequence[str] | None) -> tuple[str, ...]:
+    """Names of the measures to keep, in the order of `FLOATS`; all if none are asked for.
+
+    Raises
+    ------
+    InputError
+        No measure of that name.
+    """
+    if asked is None:
+        return FLOATS
+    for name in asked:
+        if name not in FLOATS:
+            raise InputError(f"no measure {name!r}; {nearest(name, FLOATS)}", "measures")
+    return tuple(name for name in FLOATS if name == "j1" or name in asked)
+
+
 def stability_map(design: Design, **options: Any) -> Sweep:
     """The J1 map of a design over the two parameters of its `[map]` table.
 
@@ -216,7 +240,8 @@ def stability_map(design: Design, **options: Any) -> Sweep:
     InputError
         The map does not run over exactly two parameters.
     """
-    axes = options.pop("axes", None) or axes_of(design, design.tables.map.axes)
+    kept = len(kept_measures(options.get("measures")))
+    axes = options.pop("axes", None) or axes_of(design, design.tables.map.axes, kept)
     if len(axes) != 2:
         raise InputError(f"a map runs over 2 parameters, got {len(axes)}; use sweep", "map.axes")
     return sweep(design, axes, **options)
@@ -225,10 +250,10 @@ def stability_map(design: Design, **options: Any) -> Sweep:
 class _Collected:
     """Measures of the cells as blocks of them are finished."""
 
-    def __init__(self, axes: tuple[Axis, ...]) -> None:
+    def __init__(self, axes: tuple[Axis, ...], kept: tuple[str, ...]) -> None:
         self.axes = axes
         cells = int(np.prod(shape_of(axes), dtype=int))
-        self.measures = {name: np.full(cells, np.nan) for name in FLOATS}
+        self.measures = {name: np.full(cells, np.nan) for name in kept}
         self.status = np.full(cells, STATUSES.index("failed"), dtype=np.int8)
         self.schemes: set[tuple[float, int]] = set()
         self.seconds = 0.0
@@ -237,7 +262,7 @@ class _Collected:
         number = done = 0
         warm: set[type] = set()
         for index, group in enumerate(groups(design, self.axes)):
-            table, lanes = group.design.tables.simulation, group.lanes
+            table, lanes = group.design.tables.simulation, group.telling
             prepared = blocks.prepared(index, partial(prepare, lanes, table))
             self.schemes.add((prepared.scheme.step, prepared.scheme.modes))
             kind = type(prepared.stepper.string)
@@ -247,15 +272,16 @@ class _Collected:
                 warm_up(lanes, prepared)
                 progress.begin("simulating lanes", len(self.status))
                 progress.advance(done)
-            for first in range(0, len(lanes), CHUNK):
-                part = slice(first, first + CHUNK)
+            for first in range(0, len(group), CHUNK):
+                part = np.arange(first, min(first + CHUNK, len(group)))
                 batch = blocks.find(number)
                 if batch is None:
+                    lanes = group.some(part)
                     begin = time.perf_counter()
-                    batch = run_batch(lanes[part], prepared)
+                    batch = run_batch(lanes, prepared)
                     self.seconds += time.perf_counter() - begin
                     blocks.keep(number, batch)
-                self._put(group.cells[part], batch)
+                self._put(group.cells_of(part), batch)
                 progress.advance(len(batch.status))
                 done += len(batch.status)
                 number += 1
@@ -266,6 +292,6 @@ class _Collected:
         return next(iter(self.schemes)) if len(self.schemes) == 1 else (None, None)
 
     def _put(self, cells: NDArray[np.int64], batch: Batch) -> None:
-        for name, values in batch.measures.items():
-            self.measures[name][cells] = values
+        for name, values in self.measures.items():
+            values[cells] = batch.measures[name]
         self.status[cells] = batch.status

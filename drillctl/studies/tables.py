@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.adaptive import AdaptiveMap
 from drillctl.studies.comparison import MEASURES, QUANTILES, Comparison
@@ -30,8 +29,8 @@ def write_tables(result: Sweep, folder: Path) -> None:
     paths = [axis.path for axis in result.axes]
     with (folder / "map.csv").open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow([*paths, *FLOATS, "status"])
-        columns = [result.measures[name].ravel() for name in FLOATS]
+        writer.writerow([*paths, *result.measures, "status"])
+        columns = [values.ravel() for values in result.measures.values()]
         points = itertools.product(*(axis.values for axis in result.axes))
         for point, status, *values in zip(points, result.status.ravel(), *columns, strict=True):
             # An undefined measure is an empty field.

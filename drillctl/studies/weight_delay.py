@@ -30,7 +30,7 @@ from drillctl.studies.delay_limits import (
 )
 from drillctl.studies.delayed_lanes import MEASURES, Runs, delayed_lanes, following_design
 from drillctl.studies.drawn_lanes import Failures
-from drillctl.studies.draws import draw, uncertain_parameters
+from drillctl.studies.draws import draw, refuse_dependent, uncertain_parameters
 from drillctl.studies.intervals import Interval, mean_interval, share_interval
 from drillctl.studies.memory import refuse_too_large
 
@@ -337,6 +337,7 @@ def weight_delay(
     """
     begin = time.perf_counter()
     design = _asked(design, gains, delays, realizations)
+    refuse_dependent(design)
     table, count = design.tables.weight_delay, design.tables.uncertainty.realizations
     refuse_too_large([len(table.gains), len(table.delays), count], "weight_delay")
     following = following_design(design)

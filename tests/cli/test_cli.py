@@ -312,6 +312,10 @@ def verbs_on(name):
     short = ["--set", f"simulation.duration={duration}"]
     verbs = {"modes": [], "loop": axes, "simulate": short}
     verbs |= {"compare": [*short, "--realizations", "3"]}
+    few = ["--realizations", "8"]
+    if drillctl.load(name).tables.uncertainty.sensitivity is not None:
+        few += ["--sensitivity", "2"]
+    verbs |= {"uncertainty": [*axes, *short, *few, "--audit", "0"]}
     verbs |= {"regions": axes, "map": [*axes, *short, "--audit", "0"]}
     # A long run of thirty elements takes ten seconds: `cycle` has tests of its own.
     return verbs | ({"cycle": []} if "2dof" in name else {})
@@ -322,7 +326,8 @@ def verbs_on(name):
 SLOW = (
     "monteiro-trindade-80kn", "monteiro-trindade-100kn", "monteiro-trindade-160kn",
     "pi-vs-delayed-wob-140kn", "start-up-140kn", "slip-laws-140kn", "six-drives-100kn",
-    "torque-limited-140kn", "pi-vs-dynamic-wob-140kn",
+    "torque-limited-140kn", "pi-vs-dynamic-wob-140kn", "monteiro-trindade-fig6-10000",
+    "five-weights-uncertain",
 )  # fmt: skip
 
 
@@ -360,7 +365,8 @@ def test_pictures_of_every_verb(call):
     for verb, options in verbs_on("wob-rpm-chart").items():
         assert call(verb, "wob-rpm-chart", *options, "--out", verb)[0] == 0
         pictures = list(Path(verb).glob("*.png"))
-        expected = {"modes": 3, "loop": 9, "simulate": 1, "map": 2, "regions": 1, "compare": 4}
+        expected = {"modes": 3, "loop": 9, "simulate": 1, "map": 2, "regions": 1, "compare": 4,
+                    "uncertainty": 5}  # fmt: skip
         assert len(pictures) == expected[verb]
         assert all(path.stat().st_size > 3000 for path in pictures)
 
@@ -691,6 +697,24 @@ def test_impossible_run_leaves_the_folder_for_the_next(call):
     assert list(Path().iterdir()) == [Path("kept")]
     assert not list(Path("kept").iterdir())
     assert call("map", DESIGN, *SMALL, "--out", "kept")[0] == 0
+
+
+def test_a_map_of_chosen_measures(call):
+    code, out, err = call("map", DESIGN, *SMALL, "--measure", "sticks", "--out", "some", "--json")
+    assert code == 0, err
+    assert parsed(out)["regions"]
+    head = Path("some/map.csv").read_text().splitlines()[0].split(",")
+    assert head[2:] == ["j1", "sticks", "status"]
+    assert list(drillctl.open("some").measures) == ["j1", "sticks"]
+    # The same again is shown; another choice is another run.
+    assert call("map", DESIGN, *SMALL, "--measure", "sticks", "--out", "some")[0] == 0
+    assert call("map", DESIGN, *SMALL, "--out", "some")[0] == 2
+    code, _, err = call("map", DESIGN, *SMALL, "--measure", "stick", "--out", "none")
+    assert code == 2
+    assert "--measure" in err
+    assert "did you mean 'sticks'" in err
+    assert not Path("none").exists()
+    assert call("map", DESIGN, *SMALL, "--measure", "sticks", "--adaptive")[0] == 2
 
 
 # --- interruption ----------------------------------------------------------------------------

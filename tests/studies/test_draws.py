@@ -14,9 +14,9 @@ from drillctl.studies.draws import (
     DEFAULT_COV,
     DEFAULT_PATHS,
     draw,
-    probabilities,
     uncertain_parameters,
 )
+from drillctl.studies.sampling import probabilities
 
 PAPER = "monteiro-trindade-140kn"
 A1 = "bit_rock.a1_factor"
@@ -178,7 +178,9 @@ NORMAL = {"distribution": "normal", "cov": 0.1}
         (A1, {**NORMAL, "cov": 0}, "cov: 0 is not allowed"),
         (A1, {**NORMAL, "cv": 1}, "cv: unknown key; did you mean 'cov'"),
         (A1, {"distribution": "normal"}, "cov is missing"),
-        (A1, {**NORMAL, "min": 1}, "min does not go with normal"),
+        (A1, {**NORMAL, "mode": 1}, "mode does not go with normal"),
+        (A1, {**NORMAL, "mean": -1}, "mean: -1: -1.0 is not allowed: it must be greater"),
+        (A1, {**NORMAL, "max": 0.5}, "mean: 1: it must lie between min and max"),
         (A1, {"distribution": "uniform", "min": 1}, "max is missing"),
         (A1, {"distribution": "uniform", "min": 1, "max": 1}, "min: 1.0 must be less than max 1.0"),
         (
@@ -240,8 +242,8 @@ def test_impossible_draws_are_counted_with_their_reason():
 
 
 def test_a_distribution_without_possible_values_is_refused():
-    design = uncertain(a1={"distribution": "uniform", "min": -2, "max": -1})
-    with pytest.raises(InputError, match=r"every draw is impossible; the first: .*a1_factor"):
+    design = uncertain(a2={"distribution": "uniform", "min": 0.1, "max": 0.2})
+    with pytest.raises(InputError, match=r"every draw is impossible; the first: .*a2_factor"):
         drawn_lanes(design, draw(design, 5, seed=1))
 
 

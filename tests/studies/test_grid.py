@@ -8,6 +8,7 @@ import pytest
 import drillctl
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
+from drillctl.simulation.batch import _turns, prepare
 from drillctl.simulation.lanes import lane_numbers
 from drillctl.studies import sweep
 from drillctl.studies.grid import axes_of, axis, cell_design, groups, shape_of
@@ -203,6 +204,35 @@ def test_large_grids_are_not_resolved_cell_by_cell(paper, monkeypatch):
     assert len(resolved) < 130
 
 
+LIMITED = {"controller.drive.torque_limit": "20 kN*m", "controller.drive.lag": "10 ms"}
+
+
+@pytest.mark.parametrize("windup", ["back-calculation", "none", "1 s"])
+def test_gains_of_a_limited_drive_are_not_resolved_cell_by_cell(paper, windup, monkeypatch):
+    """The rate of the anti-windup is ki / kp, but for gains of zero; 1/s at opposite corners."""
+    key = "tracking_time" if windup == "1 s" else "anti_windup"
+    design = paper.replace(LIMITED | {f"controller.drive.{key}": windup})
+    axes = grid(design, ("controller.kp", 0, 1000, 7), ("controller.ki", 0, 1000, 6))
+    check_every_cell(design, axes)
+    resolved = []
+    real = drillctl.Design.replace
+    monkeypatch.setattr(drillctl.Design, "replace", lambda *a: resolved.append(1) or real(*a))
+    list(groups(design, axes))
+    assert len(resolved) < 25
+
+
+def test_a_limited_drive_with_its_tracking_on_an_axis(paper):
+    """Then the rate follows from three axes: cell by cell."""
+    design = paper.replace(LIMITED | {"controller.drive.tracking_time": "1 s"})
+    check_every_cell(
+        design,
+        grid(
+            design, ("controller.kp", 0, 1000, 2), ("controller.ki", 0, 500, 2),
+            ("controller.drive.tracking_time", "1 s", "3 s", 3),
+        ),
+    )  # fmt: skip
+
+
 SHARED = {
     "length": [("drillstring.sections.pipe.length", "1000 m", "3000 m", 3)],
     "elements": [("drillstring.sections.pipe.elements", 10, 30, 3)],
@@ -267,3 +297,82 @@ def test_unitless_axes_that_are_possible_only_together():
     rig = drillctl.load("monteiro-trindade-140kn", **values)
     (group,) = groups(rig, axes_of(rig, tables))
     assert len(group.lanes) == 9
+
+
+# --- lanes block by block ----------------------------------------------------------------------
+
+SCHEMED = {
+    **OWN,
+    **SHARED,
+    "steep at the end": [
+        ("bit_rock.beta_factor", 0.5, 60.0, 5), ("bit_rock.a2_factor", 1.0, 1.5, 3),
+        ("controller.kp", 0, 500, 3),
+    ],
+    "programs": [
+        ("controller.kp", 0, 500, 3), ("scenario.speed.end", "1.5 s", "3.7 s", 4),
+        ("scenario.weight_on_bit.end", "2 s", "3 s", 3),
+    ],
+}  # fmt: skip
+RAMPED = {"scenario.speed.start": "0 rpm", "scenario.weight_on_bit.start": "0 kN",
+          "scenario.speed.end": "1 s", "scenario.weight_on_bit.end": "1 s"}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SCHEMED)
+def test_a_few_lanes_ask_for_the_scheme_of_all(paper, case, monkeypatch):
+    monkeypatch.setattr("drillctl.studies.grid.SEARCHED", 2)
+    design = paper.replace(RAMPED) if case == "programs" else paper
+    for group in groups(design, grid(design, *SCHEMED[case])):
+        table = group.design.tables.simulation
+        assert prepare(group.telling, table).scheme == prepare(group.lanes, table).scheme
+        assert group.telling.steepest_fall == group.lanes.steepest_fall
+        np.testing.assert_array_equal(_turns(group.telling), _turns(group.lanes))
+
+
+def test_a_grid_of_ten_million_cells_is_two_columns(paper):
+    axes = grid(paper, ("controller.kp", 0, 1000, 3163), ("controller.ki", 0, 500, 3163))
+    (group,) = groups(paper, axes)
+    assert len(group) == 3163**2
+    assert sum(values.size for values in group.numbers.numbers.values()) < 7000
+    assert len(group.telling) == 1
+    chosen = np.array([5, 9_000_000])
+    assert group.some(chosen).drive.kp.tolist() == axes[0].values[chosen // 3163].tolist()
+    assert group.some(chosen).drive.ki.tolist() == axes[1].values[chosen % 3163].tolist()
+    assert group.cells_of(chosen).tolist() == chosen.tolist()
+
+
+def test_a_sweep_makes_the_lanes_of_one_block_at_a_time(paper, monkeypatch):
+    from drillctl.studies import sweeps
+
+    axes = grid(paper, ("controller.kp", 0, 1000, 6), ("controller.ki", 0, 500, 5))
+    whole = sweep(paper, axes, audit_cells=0)
+    most = []
+    real = sweeps.run_batch
+    monkeypatch.setattr(sweeps, "CHUNK", 7)
+    monkeypatch.setattr(sweeps, "run_batch", lambda *a: most.append(len(a[0])) or real(*a))
+    parts = sweep(paper, axes, audit_cells=0)
+    assert most == [7, 7, 7, 7, 2]
+    for name, values in whole.measures.items():
+        np.testing.assert_array_equal(parts.measures[name], values)
+    np.testing.assert_array_equal(parts.status, whole.status)
+
+
+def test_measures_that_are_kept(paper, tmp_path):
+    axes = grid(paper, ("controller.kp", 0, 1000, 3), ("controller.ki", 0, 500, 2))
+    whole = sweep(paper, axes, audit_cells=0)
+    some = sweep(paper, axes, audit_cells=0, measures=["sticks"])
+    assert list(some.measures) == ["j1", "sticks"]
+    np.testing.assert_array_equal(some.measures["sticks"], whole.measures["sticks"])
+    again = drillctl.open(some.save(tmp_path / "some"))
+    assert list(again.measures) == ["j1", "sticks"]
+    np.testing.assert_array_equal(again.j1, whole.j1)
+    with pytest.raises(InputError, match="did you mean 'sticks'"):
+        sweep(paper, axes, measures=["stick"])
+
+
+def test_fewer_measures_are_less_memory(paper, monkeypatch):
+    monkeypatch.setattr("drillctl.studies.memory._free_memory", lambda: 2.5e4)
+    axes = grid(paper, ("controller.kp", 0, 1000, 2))
+    large = (axes[0], type(axes[0])("controller.ki", "N*m/rad", np.linspace(0, 1, 50)))
+    assert sweep(paper, large, audit_cells=0, measures=["j1"]).j1.shape == (2, 50)
+    with pytest.raises(InputError, match="fewer points"):
+        sweep(paper, large)

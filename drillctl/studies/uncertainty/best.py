@@ -1,0 +1,285 @@
+"""The best cell of a map under uncertainty, and the cells that cannot be told apart from it.
+
+All cells saw the same realizations, so cells are compared by differences, realization by
+realization. A cell is told apart from the best one when its difference is above zero beyond the
+sampling error, corrected for the number of cells (Bonferroni): the truly best cell is among those
+that are left with at least 95 % (Gupta, Technometrics 7 (1965) 225-245).
+
+A lane that was stopped early is known to be worse than it says. An objective is still certain
+where no such lane enters it, and the best cell is still certain where every other cell is worse
+even by what is known; otherwise the answer is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.errors import InputError
+from drillctl.studies.intervals import CONFIDENCE, mean_interval, share_interval
+from drillctl.studies.uncertainty.objectives import (
+    Exceedance,
+    Mean,
+    Objective,
+    Quantile,
+    TailMean,
+)
+from drillctl.studies.uncertainty.scatter import Scatter
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+CELLS = 128
+"""Cells looked at at a time: bounds the memory."""
+NEEDS_FULL = "lanes were stopped at the highest level: run with --full"
+
+
+@dataclass(frozen=True, eq=False)
+class Best:
+    """The best cell of a map by one objective.
+
+    Attributes
+    ----------
+    name : str
+        Of the objective.
+    cell : int
+        In the flattened map.
+    value : float
+        Objective there: s, or a probability.
+    interval : tuple of float or None
+        95 % interval of the value in that cell, which was chosen on the same realizations;
+        None for an end that is not known.
+    alike : ndarray of bool, shape (cells,), or None
+        Cells that cannot be told apart from it, itself included; None if lanes were stopped or
+        realizations are too few to say.
+    """
+
+    name: str
+    cell: int
+    value: float
+    interval: tuple[float | None, float | None]
+    alike: Mask | None
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """An objective in every cell.
+
+    Attributes
+    ----------
+    values : ndarray, shape (cells,)
+        What is known at least; NaN in a cell where a lane failed.
+    certain : ndarray of bool, shape (cells,)
+        Where no stopped lane enters the value.
+    """
+
+    values: Array
+    certain: Mask
+
+
+def objectives(levels: tuple[float, ...]) -> tuple[Objective, ...]:
+    """What the best cells are looked for by.
+
+    Parameters
+    ----------
+    levels : tuple of float
+        Levels of J1 (s).
+    """
+    return (Mean(), Quantile(), TailMean(), *(Exceedance(level) for level in levels))
+
+
+def values_of(asked: Iterable[Objective], j1: Array, censored: Mask) -> dict[str, Values]:
+    """Objectives in every cell, by name.
+
+    Parameters
+    ----------
+    asked : iterable of Objective
+        Which.
+    j1 : ndarray, shape (realizations, cells)
+        J1 (s) of the realizations that a rig can have.
+    censored : ndarray of bool, shape (realizations, cells)
+        Lanes whose J1 is a lower bound.
+    """
+    asked, cells = tuple(asked), j1.shape[1]
+    values = {one.name: np.empty(cells) for one in asked}
+    bound = np.full(cells, np.inf)
+    for some in _slabs(cells):
+        ordered = np.sort(j1[:, some], axis=0)
+        for one in asked:
+            values[one.name][some] = one.values(ordered)
+        if censored[:, some].any():
+            bound[some] = np.where(censored[:, some], j1[:, some], np.inf).min(axis=0)
+    failed = np.isnan(j1).any(axis=0)
+    found = {}
+    for one in asked:
+        known = values[one.name]
+        if isinstance(one, Exceedance):
+            certain = bound > one.level
+        elif isinstance(one, Quantile):
+            certain = known < bound
+        else:
+            certain = np.isinf(bound)
+        found[one.name] = Values(np.where(failed, np.nan, known), certain | failed)
+    return found
+
+
+def best_cells(
+    asked: Iterable[Objective],
+    found: Mapping[str, Values],
+    j1: Array,
+    censored: Mask,
+    scatter: Scatter,
+    seed: int,
+) -> dict[str, Best | InputError]:
+    """The best cell by each objective, or why it is not known.
+
+    Parameters
+    ----------
+    asked : iterable of Objective
+        Smaller is better.
+    found : mapping of Values
+        Their values, from `values_of`.
+    j1 : ndarray, shape (realizations, cells)
+        J1 (s) of the realizations that a rig can have.
+    censored : ndarray of bool, shape (realizations, cells)
+        Lanes whose J1 is a lower bound.
+    scatter : Scatter
+        Which realizations are independent.
+    seed : int
+        Of resampling.
+
+    Returns
+    -------
+    dict of Best or InputError
+        The error where every cell has failed lanes, or too many lanes were stopped to know.
+    """
+    asked = tuple(asked)
+    cells: dict[str, int | InputError] = {
+        one.name: _cell(one, found[one.name], j1) for one in asked
+    }
+    known = [one for one in asked if isinstance(cells[one.name], int)]
+    alike = _alike(known, found, cells, j1, censored, scatter)
+    best: dict[str, Best | InputError] = {}
+    for one in asked:
+        cell = cells[one.name]
+        if isinstance(cell, InputError):
+            best[one.name] = cell
+            continue
+        low, high = _interval(one, j1[:, cell], censored[:, cell], scatter, seed)
+        value = float(found[one.name].values[cell])
+        if isinstance(one, Exceedance):  # told as the probability of the level being kept
+            value, low, high = 1.0 - value, *_swapped(low, high)
+        best[one.name] = Best(one.name, cell, value, (low, high), alike.get(one.name))
+    return best
+
+
+def _cell(objective: Objective, found: Values, j1: Array) -> int | InputError:
+    known = np.where(found.certain, found.values, np.nan)
+    if np.isnan(found.values).all():
+        return InputError("every cell has failed lanes", objective.name)
+    if np.isnan(known).all() or np.nanmin(known) > np.nanmin(found.values):
+        return InputError(NEEDS_FULL, objective.name)
+    return _chosen(known, j1)
+
+
+def _swapped(low: float | None, high: float | None) -> tuple[float | None, float | None]:
+    return tuple(None if end is None else 1.0 - end for end in (high, low))  # type: ignore[return-value]
+
+
+def _chosen(known: Array, j1: Array) -> int:
+    """The smallest; among equals, as probabilities often are, that of the smallest mean."""
+    equal = np.flatnonzero(known == np.nanmin(known))
+    if len(equal) == 1:
+        return int(equal[0])
+    return int(equal[np.argmin(j1[:, equal].mean(axis=0))])
+
+
+def _alike(
+    asked: Iterable[Objective],
+    found: Mapping[str, Values],
+    chosen: Mapping[str, Any],
+    j1: Array,
+    censored: Mask,
+    scatter: Scatter,
+) -> dict[str, Mask]:
+    """Cells that cannot be told apart from the best, for the objectives where that is known."""
+    count, cells = j1.shape
+    asked = [] if censored.any() else [one for one in asked if one.enough(count)]
+    reference = {}
+    for one in asked:
+        own = j1[:, chosen[one.name], None]
+        reference[one.name] = one.influence(own, np.sort(own, axis=0))
+    # One side only: nothing is better than the best but by chance.
+    quantile = scatter.quantile(1.0 - 2.0 * (1.0 - CONFIDENCE) / max(cells - 1, 1))
+    alike = {one.name: np.zeros(cells, dtype=bool) for one in asked}
+    for some in _slabs(cells) if asked else ():
+        columns = j1[:, some]
+        ordered = np.sort(columns, axis=0)
+        for one in asked:
+            values = found[one.name].values
+            apart = one.influence(columns, ordered)
+            apart -= reference[one.name]
+            error = scatter.standard_error(apart)
+            with np.errstate(invalid="ignore"):  # of cells with failed lanes
+                alike[one.name][some] = values[some] - values[chosen[one.name]] <= quantile * error
+    return alike
+
+
+def _interval(
+    objective: Objective, j1: Array, censored: Mask, scatter: Scatter, seed: int
+) -> tuple[float | None, float | None]:
+    if scatter.independent and isinstance(objective, Exceedance):
+        return share_interval(int((j1 > objective.level).sum()), len(j1))
+    if scatter.independent and isinstance(objective, Mean):
+        return mean_interval(j1, seed) or (None, None)
+    if scatter.independent and isinstance(objective, Quantile):
+        bound = float(np.where(censored, j1, np.inf).min())
+        return quantile_interval(np.sort(j1), objective.probability, bound)
+    if censored.any() or not objective.enough(len(j1)):
+        return None, None
+    column = j1[:, None]
+    ordered = np.sort(column, axis=0)
+    value = float(objective.values(ordered)[0])
+    error = float(scatter.standard_error(objective.influence(column, ordered))[0])
+    half = scatter.quantile(CONFIDENCE) * error
+    return value - half, value + half
+
+
+def quantile_interval(
+    ordered: Array, probability: float, bound: float = np.inf
+) -> tuple[float | None, float | None]:
+    """Interval of a quantile by order statistics, whatever the distribution.
+
+    David & Nagaraja, Order Statistics (2003), section 7.1.
+
+    Parameters
+    ----------
+    ordered : ndarray, shape (realizations,)
+        Increasing and independent.
+    probability : float
+        Of the quantile.
+    bound : float
+        From which on values are not known.
+
+    Returns
+    -------
+    tuple of float or None
+        None for an end that so few realizations do not bound.
+    """
+    from scipy.stats import binom
+
+    count, tail = len(ordered), 0.5 * (1.0 - CONFIDENCE)
+    low = int(binom.ppf(tail, count, probability))
+    high = int(binom.ppf(1.0 - tail, count, probability)) + 1
+    known = high <= count and ordered[high - 1] < bound
+    upper = float(ordered[high - 1]) if known else None
+    return (float(ordered[low - 1]) if low > 0 else None), upper
+
+
+def _slabs(cells: int) -> Iterator[slice]:
+    for first in range(0, cells, CELLS):
+        yield slice(first, first + CELLS)

@@ -1,0 +1,324 @@
+"""Stability regions under uncertainty: what was simulated, and all that follows from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.provenance import provenance
+from drillctl.simulation.measures import STATUSES
+from drillctl.studies.audit import Audit
+from drillctl.studies.drawn_lanes import Failures
+from drillctl.studies.grid import Axis
+from drillctl.studies.regions import Region, region
+from drillctl.studies.sampling import sampling_of
+from drillctl.studies.uncertainty.areas import Area, region_areas
+from drillctl.studies.uncertainty.best import (
+    NEEDS_FULL,
+    Best,
+    Values,
+    best_cells,
+    objectives,
+    values_of,
+)
+from drillctl.studies.uncertainty.convergence import Convergence, convergence
+from drillctl.studies.uncertainty.objectives import Mean, Objective, Quantile, TailMean
+from drillctl.studies.uncertainty.probability import (
+    INNER,
+    MEDIAN,
+    OUTER,
+    ProbabilityMap,
+    probability_map,
+)
+from drillctl.studies.uncertainty.scatter import Scatter
+from drillctl.studies.uncertainty.sensitivity import Sensitivity
+from drillctl.studies.uncertainty.stopping import Look
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import shapely
+    import xarray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """J1 over a map at every realization of what is uncertain.
+
+    Attributes
+    ----------
+    design : Design
+        With what is uncertain, named or by default.
+    axes : tuple of Axis
+        Of the map.
+    levels : tuple of float
+        Levels of J1 (s).
+    drawn : dict of ndarray, shape (realizations,)
+        Values (SI) of what is uncertain, by path.
+    measures : dict of ndarray, shape (realizations, *map)
+        `j1` and what else was kept; NaN where undefined.
+    status : ndarray of int8, shape (realizations, *map)
+        Index into `simulation.measures.STATUSES`.
+    nominal : ndarray, shape of the map
+        J1 of the design itself (s).
+    audit : Audit
+        Lanes simulated again with the reference solver; cells of the flattened `status`.
+    failures : tuple of Failures
+        Realizations that no rig has, by reason.
+    looks : tuple of Look
+        At which it was decided whether to go on; empty without such a rule.
+    sensitivity : Sensitivity or None
+        Sobol indices, if they were asked for.
+    seconds, total_seconds : float
+        Spent in blocks, and from call to return (s); of a run that was taken up again since then.
+    provenance : dict of str
+        Versions and processor it came from.
+    """
+
+    design: Design
+    axes: tuple[Axis, ...]
+    levels: tuple[float, ...]
+    drawn: dict[str, Array]
+    measures: dict[str, Array]
+    status: NDArray[np.int8]
+    nominal: Array
+    audit: Audit
+    failures: tuple[Failures, ...]
+    looks: tuple[Look, ...]
+    sensitivity: Sensitivity | None
+    seconds: float
+    total_seconds: float
+    provenance: dict[str, str] = field(default_factory=provenance)
+
+    @property
+    def j1(self) -> Array:
+        """J1 of every realization in every cell (s); a lower bound where it was censored."""
+        return self.measures["j1"]
+
+    @property
+    def realizations(self) -> int:
+        """How many."""
+        return len(self.status)
+
+    @property
+    def seed(self) -> int:
+        """What the draws follow from."""
+        return self.design.tables.uncertainty.seed
+
+    @property
+    def scatter(self) -> Scatter:
+        """Which realizations are independent of each other."""
+        return Scatter(sampling_of(self.design.tables.uncertainty).replicates)
+
+    @property
+    def trajectories(self) -> int:
+        """Lanes that the result stands on."""
+        own = self.status.size + self.nominal.size
+        return own + (0 if self.sensitivity is None else self.sensitivity.trajectories)
+
+    @cached_property
+    def censored(self) -> Mask:
+        """Lanes that were stopped, whose J1 is a lower bound."""
+        return np.asarray(self.status == STATUSES.index("censored"))
+
+    @cached_property
+    def possible(self) -> Mask:
+        """Realizations that some rig has; the others failed in every cell."""
+        failed = self._flat(self.status) == STATUSES.index("failed")
+        return np.asarray(~failed.all(axis=1))
+
+    def probability(self, level: float) -> ProbabilityMap:
+        """How probable it is that J1 keeps to a level, over the map.
+
+        Raises
+        ------
+        InputError
+            Lanes were stopped at a lower level.
+        """
+        if level > self.levels[-1] and self.censored.any():
+            raise InputError(f"above the highest level {self.levels[-1]:g}, {NEEDS_FULL}", "level")
+        return probability_map(self.j1, level, self.scatter)
+
+    @cached_property
+    def maps(self) -> dict[float, ProbabilityMap]:
+        """The same at every level of the map."""
+        return {level: self.probability(level) for level in self.levels}
+
+    @cached_property
+    def nominal_regions(self) -> dict[float, Region]:
+        """Regions of the design itself."""
+        return {level: region(self.nominal, self.axes, level) for level in self.levels}
+
+    @cached_property
+    def areas(self) -> dict[float, dict[float, Area]]:
+        """Areas of inner, median and outer region by level, with bootstrap intervals."""
+        asked = [(one, bound) for one in self.maps.values() for bound in (INNER, MEDIAN, OUTER)]
+        areas = region_areas(self._flat(self.j1), asked, self.scatter, self.seed)
+        found: dict[float, dict[float, Area]] = {level: {} for level in self.levels}
+        for (one, bound), area in zip(asked, areas, strict=True):
+            found[one.level][bound] = area
+        return found
+
+    @cached_property
+    def convergence(self) -> Convergence:
+        """Areas of the inner regions against the number of realizations."""
+        return convergence(self._flat(self.j1), self.levels, self.scatter, self.seed)
+
+    @cached_property
+    def objectives(self) -> dict[str, Objective]:
+        """What cells are judged by, by name."""
+        return {one.name: one for one in objectives(self.levels)}
+
+    def best(self, name: str) -> Best:
+        """The best cell by `mean`, `q95`, `cvar95` or `probability_` of a level.
+
+        Raises
+        ------
+        InputError
+            No such objective, every cell has failed lanes, or too many lanes were stopped.
+        """
+        if name not in self.objectives:
+            raise InputError(f"no objective {name!r}; allowed: {', '.join(self.objectives)}")
+        found = self._best[name]
+        if isinstance(found, InputError):
+            raise found
+        return found
+
+    @cached_property
+    def values(self) -> dict[str, Values]:
+        """Every objective in every cell of the flattened map, by name."""
+        return values_of(self.objectives.values(), *self._lanes)
+
+    @cached_property
+    def _best(self) -> dict[str, Best | InputError]:
+        scatter = self.scatter.of(self.possible)
+        return best_cells(self.objectives.values(), self.values, *self._lanes, scatter, self.seed)
+
+    @property
+    def _lanes(self) -> tuple[Array, Mask]:
+        """J1 of the possible realizations and which of it are bounds, shape (rows, cells)."""
+        j1, censored = self._flat(self.j1), self._flat(self.censored)
+        if self.possible.all():  # no copies, then
+            return j1, censored
+        return j1[self.possible], censored[self.possible]
+
+    def mean(self) -> Array:
+        """Mean of J1 over the possible realizations (s), shape of the map; see `over_map`."""
+        return self.over_map(Mean())
+
+    def quantile(self, probability: float) -> Array:
+        """Quantile of J1 over the possible realizations (s), shape of the map; see `over_map`."""
+        return self.over_map(Quantile(probability))
+
+    def tail_mean(self, probability: float = 0.95) -> Array:
+        """CVaR of J1 over the possible realizations (s), shape of the map; see `over_map`."""
+        return self.over_map(TailMean(probability))
+
+    def over_map(self, objective: Objective) -> Array:
+        """An objective in every cell; NaN where lanes failed.
+
+        Parameters
+        ----------
+        objective : Objective
+            Which.
+
+        Raises
+        ------
+        InputError
+            It is not known in some cell because lanes were stopped there.
+        """
+        found = self.values.get(objective.name)
+        if found is None or self.objectives[objective.name] != objective:
+            found = values_of([objective], *self._lanes)[objective.name]
+        if not found.certain.all():
+            lacking = int((~found.certain).sum())
+            raise InputError(f"unknown in {lacking} cells: {NEEDS_FULL}", objective.name)
+        return found.values.reshape(self.nominal.shape)
+
+    def contours(self, level: float, realization: int) -> shapely.MultiPolygon:
+        """Outline of the region of one realization, in SI, over two parameters.
+
+        Parameters
+        ----------
+        level : float
+            Level (s).
+        realization : int
+            Which.
+
+        Raises
+        ------
+        InputError
+            Lanes were stopped, so that the outline between cells is not known; or the map does
+            not run over two parameters.
+        """
+        from drillctl.studies.regions import outline
+
+        if self.censored[realization].any():
+            raise InputError(f"outlines between cells: {NEEDS_FULL}", "contours")
+        if len(self.axes) != 2:
+            raise InputError("outlines are of maps over 2 parameters", "contours")
+        return outline(self.j1[realization], self.axes, level)
+
+    def slices(self) -> dict[float, Uncertainty]:
+        """The map over the first two of three parameters, by value (SI) of the third.
+
+        Empty for a map over another number of parameters.
+        """
+        if len(self.axes) != 3:
+            return {}
+        last = self.axes[2]
+        name = last.path.rpartition(".")[2].replace("_", " ")
+        title = self.design.tables.title or self.design.name
+        found = {}
+        for k, value in enumerate(last.values):
+            shown, unit = units.displayed(float(value), last.unit, "si")
+            values = {last.path: units.SI(value), "title": f"{title}, {name} {shown:g} {unit}"}
+            found[float(value)] = replace(
+                self,
+                design=self.design.replace(values),
+                axes=self.axes[:2],
+                measures={key: v[..., k] for key, v in self.measures.items()},
+                status=self.status[..., k],
+                nominal=self.nominal[..., k],
+                audit=Audit(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)),
+                looks=(),
+                sensitivity=None,
+            )
+        return found
+
+    def at(self, cell: int) -> dict[str, float]:
+        """Parameters (SI) of a cell of the flattened map."""
+        where = np.unravel_index(cell, self.nominal.shape)
+        return {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)}
+
+    def _flat(self, values: NDArray[Any]) -> NDArray[Any]:
+        return values.reshape(len(values), -1)
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """Lanes, counts, probabilities and draws, labelled by parameter path."""
+        from drillctl.studies.uncertainty.labels import dataset
+
+        return dataset(self)
+
+    def summary(self) -> dict[str, Any]:
+        """Levels with areas and intervals, best cells, failures, audit; SI units."""
+        from drillctl.studies.uncertainty.labels import summary
+
+        return summary(self)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)

@@ -1,0 +1,243 @@
+"""Which of the uncertain parameters matters: Sobol indices of J1 and of the areas of regions.
+
+Saltelli's design (Comput. Phys. Commun. 181 (2010) 259-270) as SALib has it: `samples` points of
+a scrambled Sobol sequence in twice as many dimensions as there are parameters, and each again
+with one parameter from the other half. The first index of a parameter is the share of the
+variance that it explains alone, the total index the share that is left when all others are known.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.simulation.measures import STATUSES
+from drillctl.studies.draws import uncertain_parameters
+from drillctl.studies.intervals import CONFIDENCE
+from drillctl.studies.uncertainty.best import NEEDS_FULL
+
+Array = NDArray[np.float64]
+
+_EDGE = 2.0**-53
+"""Nearest to 0 and to 1 that a point comes, where quantiles are infinite."""
+RESAMPLES = 1000
+"""Of the bootstrap of the indices."""
+
+
+@dataclass(frozen=True, eq=False)
+class Indices:
+    """Sobol indices of one figure.
+
+    Attributes
+    ----------
+    of : str
+        What they explain.
+    unit : str
+        Of that figure.
+    first, total : ndarray, shape (parameters,)
+        Indices; NaN where the figure does not vary.
+    first_error, total_error : ndarray, shape (parameters,)
+        Half-widths of 95 % bootstrap intervals; NaN where points are too few to tell.
+    variance : float
+        Of the figure, in its unit squared.
+    """
+
+    of: str
+    unit: str
+    first: Array
+    total: Array
+    first_error: Array
+    total_error: Array
+    variance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Sobol indices of J1 at chosen cells and of the areas under each level.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        Paths of what is uncertain.
+    samples : int
+        Points of Saltelli's design.
+    trajectories : int
+        Lanes simulated for it.
+    indices : tuple of Indices
+        One a figure.
+    """
+
+    parameters: tuple[str, ...]
+    samples: int
+    trajectories: int
+    indices: tuple[Indices, ...]
+
+    def summary(self) -> dict[str, Any]:
+        """Indices by figure and parameter."""
+        return {
+            "parameters": list(self.parameters),
+            "samples": self.samples,
+            "trajectories": self.trajectories,
+            "indices": {
+                one.of: {
+                    "unit": one.unit,
+                    "variance": one.variance,
+                    **{key: getattr(one, key).tolist() for key in COLUMNS},
+                }
+                for one in self.indices
+            },
+        }
+
+
+COLUMNS = ("first", "first_error", "total", "total_error")
+"""Figures of `Indices` that there is one of a parameter."""
+
+
+def read_sensitivity(told: dict[str, Any]) -> Sensitivity:
+    """A `Sensitivity` from its summary.
+
+    Parameters
+    ----------
+    told : dict
+        As `Sensitivity.summary` gives it, perhaps by way of JSON.
+    """
+    found = []
+    for of, one in told["indices"].items():
+        columns = {key: np.array([np.nan if v is None else v for v in one[key]]) for key in COLUMNS}
+        found.append(Indices(of=of, unit=one["unit"], variance=one["variance"], **columns))
+    parameters = tuple(told["parameters"])
+    return Sensitivity(parameters, told["samples"], told["trajectories"], tuple(found))
+
+
+def refuse_correlated(design: Design) -> None:
+    """Refuse (`InputError`) correlated parameters, of which Sobol indices say nothing.
+
+    Parameters
+    ----------
+    design : Design
+        With what is uncertain.
+    """
+    if design.tables.uncertainty.correlations:
+        raise InputError(
+            "Sobol indices are of independent parameters: leave correlations or sensitivity out",
+            "uncertainty.sensitivity",
+        )
+
+
+def points(design: Design, samples: int, seed: int) -> dict[str, Array]:
+    """Realizations of Saltelli's design, in the order in which SALib takes their results.
+
+    Parameters
+    ----------
+    design : Design
+        Its parameters must be independent.
+    samples : int
+        A power of two.
+    seed : int
+        Of the scrambling.
+
+    Returns
+    -------
+    dict of ndarray, shape (samples * (parameters + 2),)
+        Values (SI) by path.
+
+    Raises
+    ------
+    InputError
+        Correlated parameters, of which Sobol indices say nothing.
+    """
+    from SALib.sample import sobol
+
+    refuse_correlated(design)
+    found = uncertain_parameters(design)
+    table = sobol.sample(_problem(tuple(p.path for p in found)), samples,
+                         calc_second_order=False, scramble=True, seed=seed)  # fmt: skip
+    inside = np.clip(table, _EDGE, 1.0 - _EDGE)
+    return {p.path: p.values(inside[:, k]) for k, p in enumerate(found)}
+
+
+def indices(of: str, unit: str, values: Array, parameters: tuple[str, ...], seed: int) -> Indices:
+    """Sobol indices of a figure.
+
+    Parameters
+    ----------
+    of, unit : str
+        What it is.
+    values : ndarray, shape (samples * (parameters + 2),)
+        In the order of `points`; finite.
+    parameters : tuple of str
+        Paths of what is uncertain.
+    seed : int
+        Of the bootstrap.
+    """
+    from SALib.analyze import sobol
+
+    nothing = np.full(len(parameters), np.nan)
+    if np.ptp(values) == 0.0:
+        return Indices(of, unit, nothing, nothing, nothing, nothing, 0.0)
+    # SALib takes a seed of 0 for none. A resample may be of equal values: its error is not known.
+    with np.errstate(invalid="ignore", divide="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        found = sobol.analyze(
+            _problem(parameters), values, calc_second_order=False, num_resamples=RESAMPLES,
+            conf_level=CONFIDENCE, seed=seed + 1,
+        )  # fmt: skip
+    names = {"first": "S1", "total": "ST", "first_error": "S1_conf", "total_error": "ST_conf"}
+    columns = {key: np.asarray(found[name], dtype=float) for key, name in names.items()}
+    return Indices(of=of, unit=unit, variance=float(values.var()), **columns)
+
+
+def _problem(parameters: tuple[str, ...]) -> dict[str, Any]:
+    count = len(parameters)
+    return {"num_vars": count, "names": list(parameters), "bounds": [[0.0, 1.0]] * count}
+
+
+def sensitivity(
+    parameters: tuple[str, ...],
+    samples: int,
+    j1: Array,
+    status: NDArray[np.int8],
+    cells: dict[int, str],
+    levels: tuple[float, ...],
+    seed: int,
+) -> Sensitivity:
+    """Indices of J1 at cells, and of the area under each level.
+
+    Parameters
+    ----------
+    parameters : tuple of str
+        Paths of what is uncertain.
+    samples : int
+        Points of Saltelli's design.
+    j1 : ndarray, shape (samples * (parameters + 2), cells)
+        J1 (s) in the order of `points`.
+    status : ndarray of int8, of the same shape
+        Index into `simulation.measures.STATUSES`.
+    cells : dict of int to str
+        Cells whose J1 is explained, and what they are called.
+    levels : tuple of float
+        Levels of J1 (s).
+    seed : int
+        Of the bootstrap.
+
+    Raises
+    ------
+    InputError
+        A lane at one of the cells was stopped or failed.
+    """
+    found = []
+    for cell, name in cells.items():
+        for reason, problem in (("censored", NEEDS_FULL), ("failed", "lanes failed there")):
+            if (status[:, cell] == STATUSES.index(reason)).any():
+                raise InputError(f"J1 at {name}: {problem}", "uncertainty.sensitivity")
+        found.append(indices(f"J1 at {name}", "s", j1[:, cell], parameters, seed))
+    for level in levels:
+        area = (j1 <= level).mean(axis=1)
+        found.append(indices(f"area of J1 <= {level:g}", "1", area, parameters, seed))
+    return Sensitivity(parameters, samples, j1.size, tuple(found))

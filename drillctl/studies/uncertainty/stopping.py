@@ -1,0 +1,114 @@
+"""When enough realizations were run: a fixed schedule of looks, intervals corrected for it.
+
+Looking at the data again and again until an interval happens to be narrow makes it hold less
+often than it says. The looks are therefore fixed before the first lane is run, and the interval
+of each has its share of the error that all may make together (Bonferroni).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design.uncertain_tables import UntilTable
+from drillctl.errors import InputError
+from drillctl.studies.intervals import CONFIDENCE, Interval
+from drillctl.studies.uncertainty.areas import region_areas
+from drillctl.studies.uncertainty.probability import probability_map
+from drillctl.studies.uncertainty.scatter import Scatter
+
+Array = NDArray[np.float64]
+
+
+class Look(NamedTuple):
+    """The area as it was known at a number of realizations.
+
+    Attributes
+    ----------
+    realizations : int
+        How many had been run.
+    area : float
+        Share of the map.
+    interval : tuple of float
+        Corrected for the number of looks.
+    confidence : float
+        Of this interval by itself.
+    """
+
+    realizations: int
+    area: float
+    interval: Interval
+    confidence: float
+
+    def enough(self, half_width: float) -> bool:
+        """Whether the area is known to within a half-width on either side."""
+        low, high = self.interval
+        return max(self.area - low, high - self.area) <= half_width
+
+
+def schedule(first: int, most: int) -> tuple[int, ...]:
+    """Numbers of realizations at which the area is looked at: doubling, up to the most.
+
+    Parameters
+    ----------
+    first, most : int
+        First look, and realizations at most.
+    """
+    looks = []
+    while first < most:
+        looks.append(first)
+        first *= 2
+    return (*looks, most)
+
+
+def level_of(table: UntilTable, levels: tuple[float, ...]) -> float:
+    """The level whose region is to be known: that of the table, or the highest of the map.
+
+    Parameters
+    ----------
+    table : UntilTable
+        The rule.
+    levels : tuple of float
+        Of the map (s).
+
+    Raises
+    ------
+    InputError
+        The table's level is none of the map's.
+    """
+    if table.level is None:
+        return levels[-1]
+    if table.level not in levels:
+        allowed = ", ".join(f"{level:g}" for level in levels)
+        raise InputError(
+            f"{table.level:g} is no level of the map; allowed: {allowed}", "uncertainty.until.level"
+        )
+    return table.level
+
+
+def look(
+    j1: Array, table: UntilTable, level: float, looks: int, scatter: Scatter, seed: int
+) -> Look:
+    """The area at one of the looks.
+
+    Parameters
+    ----------
+    j1 : ndarray, shape (realizations, cells)
+        J1 (s).
+    table : UntilTable
+        The rule.
+    level : float
+        Level of J1 (s).
+    looks : int
+        How many there are at most.
+    scatter : Scatter
+        Which realizations are independent.
+    seed : int
+        Of resampling.
+    """
+    confidence = 1.0 - (1.0 - CONFIDENCE) / looks
+    found = probability_map(j1, level, scatter)
+    (area,) = region_areas(j1, [(found, table.probability)], scatter, seed, confidence)
+    return Look(len(j1), area.value, area.interval, confidence)

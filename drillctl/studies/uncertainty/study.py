@@ -1,0 +1,351 @@
+"""Stability regions under uncertainty: realizations over a map, from design to result."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.design.uncertain_tables import SensitivityTable
+from drillctl.errors import InputError, nearest
+from drillctl.progress import SILENT, Progress
+from drillctl.simulation.batch import FLOATS
+from drillctl.studies import audit as auditing
+from drillctl.studies.drawn_lanes import Failures, beyond_the_table, told
+from drillctl.studies.draws import drawing
+from drillctl.studies.grid import Axis, axes_of, cell_design, shape_of
+from drillctl.studies.memory import refuse_more_bytes
+from drillctl.studies.sampling import sampling_of
+from drillctl.studies.sweeps import sweep
+from drillctl.studies.uncertainty import sensitivity as indices
+from drillctl.studies.uncertainty.job import Drawn, Job, Listed, Source
+from drillctl.studies.uncertainty.keeping import InMemory, Keeping
+from drillctl.studies.uncertainty.result import Uncertainty
+from drillctl.studies.uncertainty.running import ThisProcess, Workers, run
+from drillctl.studies.uncertainty.scatter import Scatter
+from drillctl.studies.uncertainty.stopping import Look, level_of, look, schedule
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Array = NDArray[np.float64]
+
+SoFar = Callable[[], Uncertainty | None]
+
+AUDITED = 64
+"""Realizations that audited lanes are chosen from: the first ones are as good as any."""
+COPIES = 4
+"""Of what is kept of a lane, that are held at one time at most."""
+
+
+class Shelf(Protocol):
+    """Where the finished blocks of a study are kept, by the name of what they belong to."""
+
+    def keeping(self, name: str, job: Job) -> Keeping:
+        """The place of one of its parts."""
+        ...
+
+
+class NoShelf:
+    """For studies that live in memory only."""
+
+    def keeping(self, name: str, job: Job) -> Keeping:
+        """A place in memory."""
+        return InMemory(job.cells, job.measures)
+
+
+def uncertainty(
+    design: Design,
+    axes: tuple[Axis, ...] | None = None,
+    realizations: int | None = None,
+    seed: int | None = None,
+    audit_cells: int | None = None,
+    client: Client | None = None,
+    progress: Progress = SILENT,
+    shelf: Shelf | None = None,
+    workers: Workers | None = None,
+    interim: Callable[[SoFar], None] | None = None,
+) -> Uncertainty:
+    """Simulate a map at every realization of what is uncertain in a design.
+
+    Parameters
+    ----------
+    design : Design
+        Its `[uncertain]` tables, or the rock by 5 %; `[uncertainty]`; axes, levels and number of
+        audited lanes of `[map]`.
+    axes : tuple of Axis, optional
+        Instead of the design's own.
+    realizations, seed : int, optional
+        Instead of those of the design.
+    audit_cells : int, optional
+        Lanes simulated again with the reference solver, instead of the design's own.
+    client : distributed.Client, optional
+        Cluster that computes blocks, instead of threads of this process.
+    progress : Progress
+        Told of lanes.
+    shelf : Shelf, optional
+        Where finished blocks are kept and found again.
+    workers : Workers, optional
+        Who computes blocks, instead of `client` or this process.
+    interim : callable, optional
+        Called after every block with a function that gives the result of all realizations
+        that are finished up to the first that is not; None if that is the very first.
+
+    Returns
+    -------
+    Uncertainty
+        The same bits for any number of threads, blocks and workers of one type of processor.
+
+    Raises
+    ------
+    InputError
+        Impossible distributions or correlations, a parameter that is an axis too, an axis that
+        does not fit the design, unknown measures, or more than fits the memory.
+    """
+    begin = time.perf_counter()
+    given = {"uncertainty.realizations": realizations, "uncertainty.seed": seed}
+    asked = {path: value for path, value in given.items() if value is not None}
+    design = design.replace(asked) if asked else design
+    axes = map_axes(design) if axes is None else axes
+    study = _Study(design, axes, progress, shelf or NoShelf(), workers or _workers(client), interim)
+    return study.result(begin, audit_cells)
+
+
+def map_axes(design: Design) -> tuple[Axis, ...]:
+    """Axes of the map under uncertainty: those of `[map]`, then those of `[uncertainty]`.
+
+    Parameters
+    ----------
+    design : Design
+        With both tables.
+
+    Raises
+    ------
+    InputError
+        An axis that does not fit the design, or two over one parameter.
+    """
+    tables = (*design.tables.map.axes, *design.tables.uncertainty.axes)
+    paths = [table.path for table in tables]
+    for path in paths:
+        if paths.count(path) > 1:
+            raise InputError(f"two axes run over {path!r}", "uncertainty.axes")
+    return axes_of(design, tables)
+
+
+def _workers(client: Client | None) -> Workers:
+    if client is None:
+        return ThisProcess()
+    from drillctl.studies.uncertainty.cluster import Cluster
+
+    return Cluster(client)
+
+
+class _Study:
+    """What the steps of a study have in common."""
+
+    def __init__(
+        self,
+        design: Design,
+        axes: tuple[Axis, ...],
+        progress: Progress,
+        shelf: Shelf,
+        workers: Workers,
+        interim: Callable[[SoFar], None] | None,
+    ) -> None:
+        self.design, self.axes, self.progress = design, axes, progress
+        self.shelf, self.workers, self.interim = shelf, workers, interim
+        self.table = design.tables.uncertainty
+        self.levels = design.tables.map.levels
+        refuse_impossible(design, axes)
+        self.measures = _kept(self.table.keep)
+        self.draw = drawing(design, self.table.seed)
+        cells = int(np.prod(shape_of(axes)))
+        refuse_more_bytes(
+            COPIES * 8 * self.table.realizations * cells * len(self.measures),
+            f"{self.table.realizations:,} realizations of {cells:,} cells",
+            "uncertainty.realizations",
+        )
+
+    def result(self, begin: float, audit_cells: int | None) -> Uncertainty:
+        """All of it."""
+        nominal = sweep(self.design, self.axes, audit_cells=0, progress=self.progress).j1
+        job = self._job(Drawn(self.table.seed), None if self.table.full else self.levels[-1])
+        kept = self.shelf.keeping("realizations", job)
+        job = job.prepare(kept.prepared)
+        count, looks, seconds = self._run(job, kept, nominal)
+        found = self._made(kept, count, nominal)
+        sensitivity = None
+        if self.table.sensitivity is not None:
+            sensitivity, more = self._sensitivity(self.table.sensitivity)
+            seconds += more
+        wanted = self.design.tables.map.audit_cells if audit_cells is None else audit_cells
+        return replace(
+            found,
+            audit=self._audit(found, wanted),
+            failures=self._failures(found),
+            looks=looks,
+            sensitivity=sensitivity,
+            seconds=seconds,
+            total_seconds=time.perf_counter() - begin,
+        )
+
+    def _made(self, kept: Keeping, count: int, nominal: Array) -> Uncertainty:
+        """The first `count` realizations, as yet without what is found out about them."""
+        measures, status = kept.read(count)
+        shape = (count, *shape_of(self.axes))
+        return Uncertainty(
+            design=self.design,
+            axes=self.axes,
+            levels=self.levels,
+            drawn=self.draw(count, 0).values,
+            measures={name: values.reshape(shape) for name, values in measures.items()},
+            status=status.reshape(shape),
+            nominal=nominal,
+            audit=auditing.Audit(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)),
+            failures=(),
+            looks=(),
+            sensitivity=None,
+            seconds=0.0,
+            total_seconds=0.0,
+        )
+
+    def _job(self, source: Source, censor: float | None) -> Job:
+        return Job(self.design, self.axes, source, self.measures, censor)
+
+    def _run(self, job: Job, kept: Keeping, nominal: Array) -> tuple[int, tuple[Look, ...], float]:
+        """Realizations that were run, what was seen at each look, and the time (s)."""
+        most, until = self.table.realizations, self.table.until
+
+        def so_far(asked: int) -> Uncertainty | None:
+            left = kept.missing(asked)
+            done = left[0][0] if left else asked
+            return self._made(kept, done, nominal) if done else None
+
+        def after(asked: int) -> None:
+            if self.interim is not None:
+                self.interim(partial(so_far, asked))
+
+        if until is None:
+            seconds = run(job, most, kept, self.workers, self.progress, lambda: after(most))
+            return most, (), seconds
+        level, seconds = level_of(until, self.levels), 0.0
+        scatter = Scatter(sampling_of(self.table).replicates)
+        counts, looks = schedule(until.first_look, most), []
+        for count in counts:
+            seconds += run(job, count, kept, self.workers, self.progress, partial(after, count))
+            j1 = kept.read(count)[0]["j1"]
+            looks.append(look(j1, until, level, len(counts), scatter, self.table.seed))
+            if looks[-1].enough(until.half_width):
+                break
+        return looks[-1].realizations, tuple(looks), seconds
+
+    def _sensitivity(self, table: SensitivityTable) -> tuple[indices.Sensitivity, float]:
+        columns = indices.points(self.design, table.samples, self.table.seed)
+        job = self._job(Listed(columns), None)  # a variance is of all that J1 may be
+        kept = self.shelf.keeping("sensitivity", job)
+        job = job.prepare(kept.prepared)
+        count = len(next(iter(columns.values())))
+        seconds = run(job, count, kept, self.workers, self.progress)
+        measures, status = kept.read(count)
+        cells = _cells(self.design, self.axes, table)
+        found = indices.sensitivity(
+            tuple(columns), table.samples, measures["j1"], status, cells, self.levels,
+            self.table.seed,
+        )  # fmt: skip
+        return found, seconds
+
+    def _audit(self, found: Uncertainty, count: int) -> auditing.Audit:
+        known = np.where(found.censored, np.nan, found.j1)[:AUDITED]
+        lanes = auditing.choose_cells(known, self.levels, count)
+        rig = beyond_the_table(self.design, tuple(found.drawn))
+        designs = []
+        for lane in lanes:
+            row, cell = divmod(int(lane), found.nominal.size)
+            designs.append(cell_design(rig, self.axes, cell).replace(_of(found.drawn, row)))
+        reference = auditing.references(designs, self.progress)
+        return auditing.Audit(lanes, known.ravel()[lanes], reference)
+
+    def _failures(self, found: Uncertainty) -> tuple[Failures, ...]:
+        """Realizations that failed in every cell, by reason."""
+        rig = beyond_the_table(self.design, tuple(found.drawn))
+        first = cell_design(rig, self.axes, 0)
+        errors, broken = [], 0
+        for row in np.flatnonzero(~found.possible):
+            try:
+                first.replace(_of(found.drawn, int(row)))
+                broken += 1
+            except InputError as error:
+                errors.append(error)
+        reasons = told(errors)
+        if broken:
+            reasons = (*reasons, Failures("no finite answer", broken, "in any cell"))
+        return reasons
+
+
+def _of(drawn: dict[str, Array], row: int) -> dict[str, units.SI]:
+    return {path: units.SI(column[row]) for path, column in drawn.items()}
+
+
+def refuse_impossible(design: Design, axes: tuple[Axis, ...]) -> None:
+    """Refuse (`InputError`) what a study under uncertainty cannot be asked for.
+
+    Parameters
+    ----------
+    design : Design
+        With what is uncertain.
+    axes : tuple of Axis
+        Of the map.
+    """
+    table = design.tables.uncertainty
+    for a in axes:
+        if a.path in design.tables.uncertain:
+            where = f"uncertain.{a.path}"
+            raise InputError(
+                "is an axis of the map, which gives it its values, and cannot be drawn",
+                f"{design.origin}: {where}" if design.origin else where,
+            )
+    drawing(design, table.seed)
+    _kept(table.keep)
+    if table.until is not None:
+        level_of(table.until, design.tables.map.levels)
+    if table.sensitivity is not None:
+        _cells(design, axes, table.sensitivity)
+        indices.refuse_correlated(design)
+
+
+def _kept(names: tuple[str, ...]) -> tuple[str, ...]:
+    for name in names:
+        if name not in FLOATS:
+            raise InputError(f"no measure {name!r}; {nearest(name, FLOATS)}", "uncertainty.keep")
+    return tuple(dict.fromkeys(("j1", *names)))
+
+
+def _cells(design: Design, axes: tuple[Axis, ...], table: SensitivityTable) -> dict[int, str]:
+    """Cells nearest to what was asked for, with what they are called."""
+    from drillctl.design import parameter
+
+    where = "uncertainty.sensitivity.cells"
+    known = {a.path: a for a in axes}
+    found: dict[int, str] = {}
+    for given in table.cells or ({},):
+        for path in given:
+            if path not in known:
+                raise InputError(f"{path!r} is no axis of the map; {nearest(path, known)}", where)
+        place = []
+        for a in axes:
+            target = parameter(design, a.path)
+            value = target.parse(given[a.path]) if a.path in given else target.value
+            middle = 0.5 * (float(a.values[0]) + float(a.values[-1]))
+            place.append(int(np.argmin(np.abs(a.values - (middle if value is None else value)))))
+        cell = int(np.ravel_multi_index(place, shape_of(axes)))
+        found[cell] = ", ".join(
+            f"{a.path} {a.values[k]:g} {a.unit}".rstrip() for a, k in zip(axes, place, strict=True)
+        )
+    return found

@@ -1,0 +1,206 @@
+"""Blocks on dask.distributed: the same bits as here, whoever dies on the way."""
+
+from __future__ import annotations
+
+import os
+import signal
+from typing import NamedTuple
+
+import pytest
+
+import drillctl
+from drillctl.errors import InputError, SimulationError
+from drillctl.studies.grid import axes_of
+from drillctl.studies.uncertainty import cluster as cluster_module
+from drillctl.studies.uncertainty import keeping as keeping_module
+from drillctl.studies.uncertainty import uncertainty
+from drillctl.studies.uncertainty.cluster import Cluster, connect
+from drillctl.studies.uncertainty.job import Drawn, Job
+
+distributed = pytest.importorskip("distributed")
+
+GAINS = [
+    {"path": "controller.kp", "min": 500.0, "max": 700.0, "points": 5},
+    {"path": "controller.ki", "min": 100.0, "max": 150.0, "points": 5},
+]
+FIVE = {"distribution": "lognormal", "cov": 0.05}
+STRING = "drillstring.sections.pipe.length"
+
+
+def design(*paths):
+    """25 cells of the paper's map, runs of 20 s."""
+    values = {"simulation.duration": "20 s", "simulation.accuracy": "fast", "map.audit_cells": 0,
+              "map.axes": GAINS}  # fmt: skip
+    if paths:
+        values["uncertain"] = dict.fromkeys(paths, FIVE)
+    return drillctl.load("monteiro-trindade-140kn", **values)
+
+
+@pytest.fixture(scope="module")
+def client():
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as local,
+        distributed.Client(local, set_as_default=False) as found,
+    ):
+        yield found
+
+
+@pytest.fixture(autouse=True)
+def _small_blocks(monkeypatch):
+    monkeypatch.setattr(keeping_module, "LANES", 25 * 4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("paths", [(), (STRING,)], ids=["friction", "strings"])
+def test_two_workers_give_the_bits_of_this_process(client, paths):
+    here = uncertainty(design(*paths), realizations=40)
+    there = uncertainty(design(*paths), realizations=40, client=client)
+    assert there.j1.tobytes() == here.j1.tobytes()
+    assert there.status.tobytes() == here.status.tobytes()
+
+
+@pytest.mark.slow
+def test_a_worker_may_be_killed_half_way(client):
+    here = uncertainty(design(), realizations=400)
+    victim = min(client.run(os.getpid).values())
+    blocks = []
+
+    class Killing(Cluster):
+        def blocks(self, job, pieces):
+            for block in super().blocks(job, pieces):
+                blocks.append(block.first)
+                if len(blocks) == 40:
+                    os.kill(victim, signal.SIGKILL)
+                yield block
+
+    there = uncertainty(design(), realizations=400, workers=Killing(client))
+    assert len(blocks) == 100
+    assert sorted(blocks) == list(range(0, 400, 4))
+    assert victim not in client.run(os.getpid).values()
+    assert there.j1.tobytes() == here.j1.tobytes()
+
+
+@pytest.mark.slow
+def test_a_scheduler_is_found_by_its_address(client):
+    with connect(client.scheduler.address) as other:
+        assert len(other.nthreads()) == 2
+
+
+@pytest.mark.slow
+def test_the_command_takes_a_scheduler(client, tmp_path, monkeypatch, capsys):
+    from drillctl.cli import run
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
+    options = ["--set", "simulation.duration=20 s", "--realizations", "8", "--audit", "0",
+               "--axis", "controller.kp=500:700:3",
+               "--axis", "controller.ki=100:150:2"]  # fmt: skip
+    name = "monteiro-trindade-140kn"
+    assert run(["uncertainty", name, *options, "--out", "here"]) == 0
+    address = ["--scheduler", client.scheduler.address]
+    assert run(["uncertainty", name, *options, *address, "--out", "there"]) == 0
+    assert drillctl.open("here").j1.tobytes() == drillctl.open("there").j1.tobytes()
+
+
+# --- without a cluster -------------------------------------------------------------------------
+
+
+class Worker(NamedTuple):
+    """What dask tells of a worker that died."""
+
+    address: str
+
+
+class Pretended:
+    """As much of a client as `Cluster` asks for; every block is computed at once."""
+
+    loop = None
+
+    def __init__(self, found, errors=()):
+        self.found, self.errors = found, list(errors)
+
+    def run(self, function):
+        return {"worker": self.found}
+
+    def nthreads(self):
+        return {"worker": 1}
+
+    def submit(self, function, *arguments, **options):
+        return Future(self, function, arguments)
+
+
+class Future:
+    count = 0
+
+    def __init__(self, client, function, arguments):
+        Future.count += 1
+        self.key = str(Future.count)
+        self.error = client.errors.pop(0) if client.errors else None
+        self.call = lambda: function(*arguments)
+
+    def exception(self):
+        return self.error
+
+    def result(self):
+        return self.call()
+
+    def release(self):
+        pass
+
+
+class Completed(list):
+    """`as_completed` of those: the last submitted is the first finished."""
+
+    def __init__(self, futures, loop):
+        super().__init__(futures)
+
+    def add(self, future):
+        self.append(future)
+
+    def __iter__(self):
+        while self:
+            yield self.pop()
+
+
+@pytest.fixture
+def job(monkeypatch):
+    monkeypatch.setattr(distributed, "as_completed", Completed)
+    one = design()
+    return Job(one, axes_of(one, one.tables.map.axes), Drawn(1), ("j1",), None)
+
+
+def here():
+    from drillctl.provenance import provenance
+
+    return dict(provenance())
+
+
+def test_every_block_comes_once_in_whatever_order(job):
+    pieces = [(4 * k, 4) for k in range(9)]
+    blocks = list(Cluster(Pretended(here())).blocks(job, pieces))
+    assert [block.first for block in blocks] != [first for first, _ in pieces]
+    assert sorted(block.first for block in blocks) == [first for first, _ in pieces]
+    assert list(Cluster(Pretended(here())).blocks(job, [])) == []
+
+
+def test_blocks_of_dead_workers_are_given_out_again(job):
+    dead = distributed.KilledWorker("block", Worker("tcp://there:1"), 3)
+    blocks = list(Cluster(Pretended(here(), [dead, dead])).blocks(job, [(0, 2), (2, 2)]))
+    assert sorted(block.first for block in blocks) == [0, 2]
+    deadly = [dead] * (cluster_module.DEATHS + 1)
+    with pytest.raises(SimulationError, match="workers died 21 times over one block"):
+        list(Cluster(Pretended(here(), deadly)).blocks(job, [(0, 2)]))
+    with pytest.raises(ZeroDivisionError):
+        list(Cluster(Pretended(here(), [ZeroDivisionError()])).blocks(job, [(0, 2)]))
+
+
+def test_workers_of_another_kind_are_refused(job):
+    other = here() | {"processor": "Abacus"}
+    with pytest.raises(InputError, match=r"processor Abacus, .*--allow-mixed lets it"):
+        list(Cluster(Pretended(other)).blocks(job, [(0, 2)]))
+    assert len(list(Cluster(Pretended(other), allow_mixed=True).blocks(job, [(0, 2)]))) == 1
+    older = here() | {"numba": "0.1"}
+    with pytest.raises(InputError, match=r"a worker has numba 0\.1, this process"):
+        list(Cluster(Pretended(older), allow_mixed=True).blocks(job, [(0, 2)]))
