@@ -16,6 +16,7 @@ from drillctl.design import (
     delay_tables,
     scenario_tables,
     tables,
+    tune_tables,
     uncertain_tables,
     weight_tables,
 )
@@ -79,6 +80,10 @@ TABLES = (
     ("[compare]", compare_tables.CompareTable),
     ("entries of compare.cases", compare_tables.CaseTable),
     ("[weight_delay]", delay_tables.WeightDelayTable),
+    ("[tune]", tune_tables.TuneTable),
+    ('[tune.parameters."dotted.path"]', tune_tables.RangeTable),
+    ("[tune.weights]", tune_tables.TuneWeightsTable),
+    ("[tune.constraints]", tune_tables.TuneConstraintsTable),
 )
 
 

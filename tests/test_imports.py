@@ -56,6 +56,10 @@ def test_map_needs_neither_control_nor_casadi():
     assert not {"control", "casadi", "matplotlib"} & set(loaded_by("import drillctl.studies"))
 
 
+def test_the_search_for_gains_takes_casadi_when_it_needs_it():
+    assert "casadi" not in loaded_by("import drillctl.studies.robust")
+
+
 def test_pyplot_is_never_imported():
     for name in MODULES:
         source = inspect.getsource(importlib.import_module(name))

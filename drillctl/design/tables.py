@@ -19,6 +19,7 @@ from drillctl.design.compare_tables import CompareTable
 from drillctl.design.controller_tables import ControllerTable, PITable
 from drillctl.design.delay_tables import WeightDelayTable
 from drillctl.design.scenario_tables import ScenarioTable
+from drillctl.design.tune_tables import TuneTable
 from drillctl.design.uncertain_tables import DistributionTable, UncertaintyTable, flattened
 from drillctl.design.weight_tables import ConstantWeightTable, WeightOnBitTable
 from drillctl.drillstring import GRADES, PIPES
@@ -255,6 +256,7 @@ class DesignTables(Table):
     uncertainty: UncertaintyTable = UncertaintyTable()
     compare: CompareTable = CompareTable()
     weight_delay: WeightDelayTable = WeightDelayTable()
+    tune: TuneTable = TuneTable()
 
     @field_validator("uncertain", mode="before")
     @classmethod

@@ -1,0 +1,111 @@
+"""The table of a search for robust gains: what is tuned, to what end, within which limits."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from drillctl.design import quantities as q
+from drillctl.design.base import Table, number_or_quantity
+from drillctl.design.uncertain_tables import flattened
+from drillctl.errors import InputError
+
+
+def _inside(value: float) -> float:
+    if not 0.0 < value < 1.0:
+        raise InputError(f"must be more than 0 and less than 1, got {value:g}")
+    return value
+
+
+class RangeTable(Table):
+    """Least and largest value of a tuned parameter, as they would be written at its path."""
+
+    min: float | str
+    max: float | str
+
+    @field_validator("min", "max", mode="before")
+    @classmethod
+    def _number_or_quantity(cls, value: object) -> object:
+        return number_or_quantity(value)
+
+
+class TuneWeightsTable(Table):
+    """What other measures add to the objective, in seconds of J1.
+
+    `effort`: per root mean square deviation of the top torque from its steady value, over the
+    static torque of the bit. `peak_top_torque`: per peak, over the same. `lost_weight`: per share
+    of the nominal weight on bit that the mean weight falls short of it.
+    """
+
+    effort: q.NonNegativeNumber = 0.0
+    peak_top_torque: q.NonNegativeNumber = 0.0
+    lost_weight: q.NonNegativeNumber = 0.0
+
+
+class TuneConstraintsTable(Table):
+    """What tuned gains must keep; nothing is asked where nothing is given.
+
+    Of the runs: the `quantile` of the peak top torque over the realizations, and the mean weight
+    on bit. Of the linear loop, at every string: how far its slope margin stands above the slope
+    of the rock (`slope_reserve`), its largest sensitivity at the top torque, the least damping
+    ratio of its first modes, and a delay at the top torque that it bears.
+    """
+
+    peak_top_torque: q.Torque | None = None
+    mean_weight_on_bit: q.Weight | None = None
+    slope_reserve: q.Damping | None = None
+    peak_sensitivity: q.PositiveNumber | None = None
+    damping_ratio: q.PositiveNumber | None = None
+    modes: q.Count = 1
+    delay: q.Time | None = None
+
+    @field_validator("peak_sensitivity")
+    @classmethod
+    def _above_one(cls, value: float | None) -> float | None:
+        if value is not None and value <= 1.0:
+            raise InputError(f"must be more than 1, which any loop has, got {value:g}")
+        return value
+
+    @field_validator("damping_ratio")
+    @classmethod
+    def _under_one(cls, value: float | None) -> float | None:
+        return None if value is None else _inside(value)
+
+
+class TuneTable(Table):
+    """What is tuned, to what end.
+
+    `parameters` names the paths and their bounds; by default those of the controller's law. The
+    objective is J1 over the realizations: its `mean`, its `quantile`, the mean of what lies
+    beyond that quantile (`cvar`), or the `worst` of all. `level` and `probability` are what the
+    result is certified against: P(J1 <= level) >= probability. `starts`: how many of the best
+    gains of the first look are followed further. `realizations` and `seed` of the search.
+    """
+
+    parameters: dict[str, RangeTable] = Field(default_factory=dict)
+    objective: Literal["mean", "quantile", "cvar", "worst"] = "quantile"
+    quantile: q.PositiveNumber = 0.95
+    weights: TuneWeightsTable = TuneWeightsTable()
+    constraints: TuneConstraintsTable = TuneConstraintsTable()
+    level: q.PositiveNumber = 33.0
+    probability: q.PositiveNumber = 0.95
+    realizations: q.Count = 1000
+    seed: q.CountOrZero = 2012
+    starts: q.Count = 3
+
+    @field_validator("parameters", mode="before")
+    @classmethod
+    def _paths(cls, value: object) -> Any:
+        return flattened(value) if isinstance(value, dict) else value
+
+    @field_validator("quantile", "probability")
+    @classmethod
+    def _inside(cls, value: float) -> float:
+        return _inside(value)
+
+    @model_validator(mode="after")
+    def _enough(self) -> TuneTable:
+        if self.realizations < 2:
+            raise InputError("realizations must be 2 or more")
+        return self

@@ -1,0 +1,149 @@
+r"""A string as data: its chain parameters on a frequency grid, and near any one frequency.
+
+With s the complex frequency, c the impedance of the drive and b that of the rock the string is
+
+.. math:: Z_{bit} = \frac{\alpha + c\,\beta}{\gamma + c\,\delta}, \qquad
+          Z_{top} = \frac{\alpha + b\,\gamma}{\beta + b\,\delta}, \qquad
+          \text{poles at} \quad \alpha + c \beta + b\,(\gamma + c\,\delta) = 0
+
+(the ends' own inertias and dampers in it). Of the mobilities t at the top, h at the bit, x across
+and their determinant d: alpha = 1/x, beta = t/x, gamma = h/x, delta = d/x. Mobilities have poles
+at every resonance; these four have none, whatever the damping, and change over the frequency
+1 / travel time of the pipe. A few numbers on a circle about a frequency therefore tell all of
+them inside it to rounding, off the axis too: an NLP gets the string as data.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.linear.ends import Ends, telling_grid
+from drillctl.studies.robust.pairs import Pair, pair
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+TERMS = 16
+"""Terms of the power series within a circle."""
+WITHIN = 0.6
+"""Share of the circle's radius within which the series is used: 0.6^16 / 16! is under rounding."""
+
+
+class Chain(NamedTuple):
+    """Alpha, beta, gamma, delta of a string; N m s/rad, 1, 1, rad/(N m s)."""
+
+    alpha: Any
+    beta: Any
+    gamma: Any
+    delta: Any
+
+    def bit(self, drive: Any) -> tuple[Any, Any]:
+        """Numerator and denominator of the impedance at the bit, the drive closed."""
+        return self.alpha + drive * self.beta, self.gamma + drive * self.delta
+
+    def characteristic(self, drive: Any, rock: Any) -> Any:
+        """Zero at the poles of the loop."""
+        over, under = self.bit(drive)
+        return over + rock * under
+
+
+def chain(ends: Ends, s: ComplexArray) -> Chain:
+    """Chain parameters of a string at complex frequencies `s` (1/s, not zero)."""
+    # Between resistors at both ends no resonance is near; what they add is taken off again.
+    first = ends.parts.sections[0]
+    resistor = first.impedance or math.sqrt(first.stiffness * _inertia(ends))
+    seen = ends.mobility(s, top=resistor + 0.0 * s, bit=resistor + 0.0 * s)
+    t, h, x = seen.top, seen.bit, seen.transfer
+    d = t * h - x**2
+    alpha = (1.0 - resistor * (t + h) + resistor**2 * d) / x
+    return Chain(alpha, (t - resistor * d) / x, (h - resistor * d) / x, d / x)
+
+
+def _inertia(ends: Ends) -> float:
+    return ends.parts.top_inertia + ends.parts.bit_inertia
+
+
+class Grid(NamedTuple):
+    """A string on a frequency grid.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (frequencies,)
+        rad/s, increasing.
+    chain : Chain
+        Of arrays of that shape.
+    """
+
+    omega: Array
+    chain: Chain
+
+
+def grid_of(ends: Ends, apart: float = math.inf) -> Grid:
+    """The string where nothing of it goes unseen.
+
+    Parameters
+    ----------
+    ends : Ends
+        The string.
+    apart : float
+        Largest distance of two frequencies (rad/s), for the turns of a delay.
+    """
+    omega = telling_grid(ends)
+    if math.isfinite(apart):
+        omega = np.union1d(omega, np.arange(apart, omega[-1], apart))
+    return Grid(omega, chain(ends, 1j * omega))
+
+
+class Circle(NamedTuple):
+    """A string near one complex frequency: power series of its chain parameters.
+
+    Attributes
+    ----------
+    centre : complex
+        Where (1/s).
+    radius : float
+        Of the circle it was read on (1/s).
+    terms : ndarray of complex, shape (4, TERMS)
+        Coefficients over powers of (s - centre) / radius.
+    """
+
+    centre: complex
+    radius: float
+    terms: ComplexArray
+
+
+def circles(ends: Ends, centres: ComplexArray) -> list[Circle]:
+    """The string near complex frequencies (1/s, not zero), shape (places,)."""
+    travel = sum(x.travel_time for x in ends.parts.sections if x.inertia > 0.0)
+    widest = 1.0 / travel if travel > 0.0 else math.inf
+    # The origin, where nothing turns, stays outside.
+    radius = np.minimum(widest, 0.8 * np.abs(centres))
+    turns = np.exp(2j * math.pi * (np.arange(TERMS) + 0.5) / TERMS)
+    read = chain(ends, centres[:, None] + radius[:, None] * turns)
+    powers = turns[:, None] ** -np.arange(TERMS) / TERMS
+    terms = np.stack([np.asarray(part) @ powers for part in read], axis=1)
+    return [Circle(complex(c), float(r), x) for c, r, x in zip(centres, radius, terms, strict=True)]
+
+
+def chain_at(terms: tuple[Any, Any], u: Pair) -> Chain:
+    """Chain parameters at centre + radius u, symbolically.
+
+    Parameters
+    ----------
+    terms : tuple of casadi.SX, shape (4, TERMS)
+        Real and imaginary parts of a circle's coefficients.
+    u : Pair
+        Within `WITHIN`.
+    """
+    real, imaginary = terms
+    values = []
+    for row in range(4):
+        total = pair(0.0)
+        for k in reversed(range(TERMS)):
+            total = total * u + Pair(real[row, k], imaginary[row, k])
+        values.append(total)
+    return Chain(*values)

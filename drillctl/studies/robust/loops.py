@@ -1,0 +1,179 @@
+"""The loops that a linear design must hold for: strings, slopes of the rock, delays.
+
+A loop is a design at one realization, seen from its ends: the string as data on a frequency grid,
+the slope of the rock, what a moving weight adds. Drive and weight are closed by functions that
+take numbers, arrays or pairs of symbols alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.linear.ends import Ends, ends_of
+from drillctl.linear.operating_point import at_speed
+from drillctl.linear.weight_path import WeightPath, weight_path
+from drillctl.linear.whole_margins import TURNS
+from drillctl.studies.robust.line_data import Grid, grid_of
+from drillctl.studies.robust.tuned import (
+    LAW_KEYS,
+    WEIGHT_KEYS,
+    StringNumbers,
+    Tuned,
+    drive_numbers,
+    middle,
+    string_numbers,
+)
+from drillctl.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class WeightSide:
+    """A weight on bit that follows the bit speed.
+
+    Attributes
+    ----------
+    torque : float
+        Torque of the rock per weight at constant speed (m).
+    gain : float
+        K_w (N s/rad).
+    path : WeightPath
+        Its lags.
+    """
+
+    torque: Any  # these two may be symbols
+    gain: Any
+    path: WeightPath
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """One loop that gains must hold for.
+
+    Attributes
+    ----------
+    design : Design
+        With the tuned parameters halfway, which gives laws their types.
+    ends : Ends
+        Its string.
+    grid : Grid
+        The string on a frequency grid.
+    string : StringNumbers
+        What drives are tuned to.
+    slope : float
+        Falling slope of the rock at constant weight (N m s/rad).
+    weight : WeightSide or None
+        Of a weight that follows the bit speed.
+    """
+
+    design: Design
+    ends: Ends
+    grid: Grid
+    string: StringNumbers
+    slope: Any  # may be a symbol
+    weight: WeightSide | None
+
+    def drive(self, values: Mapping[str, Any], s: Any) -> Any:
+        """Impedance of the drive (N m s/rad) at `s`, with tuned values by path."""
+        law: Any = self.design.top_drive
+        numbers = drive_numbers(self.design, values, self.string)
+        law = law._replace(**{k: v for k, v in numbers.items() if k in law._fields})
+        return law.impedance(s)
+
+    def rock(self, values: Mapping[str, Any], s: Any) -> Any:
+        """What the moving weight adds to the impedance of the bit (N m s/rad)."""
+        if self.weight is None:
+            return 0.0 * s
+        side = self.weight
+        gain = values.get("weight_on_bit.gain", side.gain)
+        delay = values.get("weight_on_bit.path.delay")
+        path = side.path if delay is None else replace(side.path, delay=delay + _held(self.design))
+        return replace(path, gain=side.torque * gain).feedback(s).bit + 0.0 * s
+
+
+def _held(design: Design) -> float:
+    """Mean age of a reading (s)."""
+    return 0.5 * float(getattr(design.weight_on_bit, "period", 0.0))
+
+
+def refuse_not_linear(design: Design, tuned: tuple[Tuned, ...]) -> None:
+    """Refuse (`InputError`) what the linear loop does not depend on, or not in a known way."""
+    law = design.tables.controller.law
+    if law == "constant-torque":
+        raise InputError("a constant torque has no loop that could be tuned", "controller.law")
+    allowed = [f"controller.{key}" for key in LAW_KEYS[law]]
+    if isinstance(design.weight_on_bit, (FollowingSpeed, RealWeight)):
+        allowed += WEIGHT_KEYS
+    for t in tuned:
+        if t.path not in allowed:
+            raise InputError(
+                f"{t.path!r} is not tuned in the linear loop; allowed: {', '.join(allowed)}",
+                "tune.parameters",
+            )
+    if isinstance(design.weight_on_bit, ObservedWeight):
+        raise InputError(
+            "the linear design takes a weight that follows the bit speed itself, not an observer",
+            "weight_on_bit.law",
+        )
+
+
+def loops_of(designs: Iterable[Design], tuned: tuple[Tuned, ...]) -> list[Loop]:
+    """Loops of a number of realizations of a design.
+
+    Parameters
+    ----------
+    designs : iterable of Design
+        The realizations.
+    tuned : tuple of Tuned
+        What is tuned.
+
+    Returns
+    -------
+    list of Loop
+        Of realizations that differ in the slope of the rock alone, the steepest.
+    """
+    found: dict[tuple[Any, ...], Loop] = {}
+    strings: dict[Any, tuple[Ends, Grid, StringNumbers]] = {}
+    for design in designs:
+        loop = _loop(middle(design, tuned), strings, tuned)
+        side = None if loop.weight is None else (loop.weight.torque, loop.weight.path, loop.slope)
+        key = (design.string.parts, design.tables.controller.model_dump_json(), side)
+        if key not in found or found[key].slope < loop.slope:
+            found[key] = loop
+    return list(found.values())
+
+
+def _loop(
+    design: Design, strings: dict[Any, tuple[Ends, Grid, StringNumbers]], tuned: tuple[Tuned, ...]
+) -> Loop:
+    point = at_speed(design, design.speed)
+    side, slope = _weight(design, point.slope)
+    longest = max([t.high for t in tuned if t.path == WEIGHT_KEYS[1]], default=0.0)
+    if side is not None:
+        longest = max(longest, side.path.delay)
+    parts = design.string.parts
+    if parts not in strings:
+        ends = ends_of(design.string)
+        apart = 2.0 * math.pi / (TURNS * longest) if longest > 0.0 else math.inf
+        strings[parts] = (ends, grid_of(ends, apart), string_numbers(design.string))
+    return Loop(design, *strings[parts], slope, side)
+
+
+def _weight(design: Design, slope: float) -> tuple[WeightSide | None, float]:
+    """The side of the weight, and the slope of the rock at constant weight."""
+    path = weight_path(design, design.speed)
+    if path is None:
+        return None, slope
+    law: Any = design.weight_on_bit
+    if law.moves:  # its part in the slope is the path's here
+        slope += path.gain
+    return WeightSide(path.gain / float(law.gain), float(law.gain), path), slope

@@ -1,0 +1,168 @@
+r"""What a search lowers: a statistic of J1 over the realizations, and what is added to it.
+
+Every statistic here is a weighted sum of the sorted values, weights :math:`w_i \ge 0` that sum to
+one: mean 1/n each; the worst alone; CVaR the mean of the largest share 1 - q; a quantile the
+values next to it. Its derivative is that sum of derivatives, in the same order.
+
+What a search compares is a smooth quantile, over more of its neighbours by a kernel on their
+ranks (after Sheather & Marron, J. Am. Stat. Assoc. 85 (1990) 410-416). The plain one turns from
+realization to realization; its least value, besides, lies where just under a share 1 - q of the
+realizations has begun to stick, next to a cliff that other realizations put elsewhere. The kernel
+feels the cliff from two hundredths away. It ends well before the largest values: runs that stick
+to the end are several times the quantile, and no smoothing may let them in. What is reported is
+always the plain statistic.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.design.tune_tables import TuneTable
+from drillctl.linear.operating_point import at_speed
+
+Array = NDArray[np.float64]
+
+PRICE = 1000.0
+"""Of a requirement missed by all of itself, in seconds of J1."""
+
+KERNEL = 0.02
+"""Half width of the kernel of a smooth quantile, as a share of the realizations."""
+
+
+def rank_weights(kind: str, quantile: float, count: int) -> Array:
+    """Weights of sorted values, lowest first.
+
+    Parameters
+    ----------
+    kind : {'mean', 'quantile', 'cvar', 'worst'}
+        Statistic.
+    quantile : float
+        Of the quantile and of CVaR.
+    count : int
+        How many values.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+        They sum to one. A quantile is interpolated as `numpy.quantile` does.
+    """
+    weights = np.zeros(count)
+    if kind == "mean":
+        weights[:] = 1.0 / count
+    elif kind == "worst":
+        weights[-1] = 1.0
+    elif kind == "cvar":
+        # The last `beyond` values, the first of them in part.
+        beyond = (1.0 - quantile) * count
+        held = np.arange(count, 0, -1) - 1.0  # values above each
+        weights = np.clip(beyond - held, 0.0, 1.0) / beyond
+    else:
+        place = quantile * (count - 1)
+        low = min(math.floor(place), count - 2) if count > 1 else 0
+        weights[low] = 1.0 - (place - low)
+        weights[min(low + 1, count - 1)] += place - low
+    return weights
+
+
+def smooth_weights(kind: str, quantile: float, count: int) -> Array:
+    """The same for a model: of a quantile those of a triangular kernel on the ranks."""
+    if kind != "quantile":
+        return rank_weights(kind, quantile, count)
+    reach = min(KERNEL, 0.5 * quantile, 0.5 * (1.0 - quantile)) * count
+    away = np.abs(np.arange(count) - quantile * (count - 1))
+    weights = np.maximum(1.0 - away / max(reach, 1.0), 0.0)
+    return np.asarray(weights / weights.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """Statistic of J1, weights of other measures, and limits of the runs.
+
+    Attributes
+    ----------
+    table : TuneTable
+        As the design has it.
+    static : float
+        Static torque of the bit (N m), the measure of torques.
+    nominal : float
+        Nominal weight on bit (N), the measure of weights.
+    """
+
+    table: TuneTable
+    static: float
+    nominal: float
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Measures that it reads."""
+        weights, asked = self.table.weights, self.table.constraints
+        names = ["j1"]
+        if weights.effort > 0.0:
+            names.append("effort")
+        if weights.peak_top_torque > 0.0 or asked.peak_top_torque is not None:
+            names.append("peak_top_torque")
+        if weights.lost_weight > 0.0 or asked.mean_weight_on_bit is not None:
+            names.append("mean_weight_on_bit")
+        return tuple(names)
+
+    def value(self, measures: Mapping[str, Array], smooth: bool = False) -> Array:
+        """The objective (s), over the last axis of the measures, the realizations.
+
+        A realization without an answer has an infinite J1.
+        """
+        table = self.table
+        found = self._statistic(measures["j1"], smooth)
+        weights = table.weights
+        if weights.effort > 0.0:
+            found = found + weights.effort * measures["effort"].mean(axis=-1) / self.static
+        if weights.peak_top_torque > 0.0:
+            peak = measures["peak_top_torque"].mean(axis=-1)
+            found = found + weights.peak_top_torque * peak / self.static
+        if weights.lost_weight > 0.0:
+            lost = 1.0 - measures["mean_weight_on_bit"].mean(axis=-1) / self.nominal
+            found = found + weights.lost_weight * np.maximum(lost, 0.0)
+        return np.asarray(found)
+
+    def violations(self, measures: Mapping[str, Array], smooth: bool = False) -> dict[str, Array]:
+        """By how much each limit of the runs is missed, over the limit; not negative."""
+        asked, found = self.table.constraints, {}
+        if asked.peak_top_torque is not None:
+            count = measures["peak_top_torque"].shape[-1]
+            make = smooth_weights if smooth else rank_weights
+            weights = make("quantile", self.table.quantile, count)
+            peak = np.sort(measures["peak_top_torque"], axis=-1) @ weights
+            found["peak_top_torque"] = np.maximum(peak / asked.peak_top_torque - 1.0, 0.0)
+        if asked.mean_weight_on_bit is not None:
+            mean = measures["mean_weight_on_bit"].mean(axis=-1)
+            found["mean_weight_on_bit"] = np.maximum(1.0 - mean / asked.mean_weight_on_bit, 0.0)
+        return found
+
+    def merit(self, measures: Mapping[str, Array], smooth: bool = False) -> Array:
+        """The objective with what limits are missed by (s): what a search compares."""
+        missed = self.violations(measures, smooth)
+        return np.asarray(self.value(measures, smooth) + PRICE * sum(missed.values()))
+
+    def share(self, measures: Mapping[str, Array]) -> Array:
+        """Share of the realizations with J1 at or under the level."""
+        return np.asarray((measures["j1"] <= self.table.level).mean(axis=-1))
+
+    def _statistic(self, j1: Array, smooth: bool) -> Array:
+        make = smooth_weights if smooth else rank_weights
+        weights = make(self.table.objective, self.table.quantile, j1.shape[-1])
+        ordered = np.sort(j1, axis=-1)
+        used = weights > 0.0  # no weight on what is infinite
+        return np.asarray(ordered[..., used] @ weights[used])
+
+
+def objective_of(design: Design) -> Objective:
+    """The objective of a design's `[tune]` table."""
+    weight = design.tables.operating_point.weight_on_bit
+    point = at_speed(design, design.speed)
+    static = float(design.bit_rock.static_torque(weight)) or abs(point.bit_torque) or 1.0
+    return Objective(design.tables.tune, static, weight or 1.0)
