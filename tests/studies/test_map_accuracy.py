@@ -65,6 +65,16 @@ def test_the_whole_map(accuracy):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("accuracy", PROMISES)
+@pytest.mark.parametrize("level", [20.0, 30.0, 40.0, 50.0])
+def test_no_cell_in_a_wrong_region(accuracy, level):
+    """Unless its J1 lies within 1 % of the level."""
+    found, truth = map_j1(accuracy=accuracy), map_j1(step="0.5 ms", modes=999)
+    wrong = (found <= level) != (truth <= level)
+    assert not np.any(wrong & (np.abs(truth / level - 1.0) > 0.01))
+
+
+@pytest.mark.slow
 def test_the_finest_run_is_as_good_as_the_truth():
     errors = np.abs(map_j1(step="0.5 ms", modes=999)[CELLS] / EXACT - 1.0)
     assert errors.max() < 1e-6
