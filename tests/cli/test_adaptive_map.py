@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from strict_json import strict
 
 import drillctl
-from drillctl.cli import run
 
 DESIGN = "monteiro-trindade-140kn"
 # One worker: the kernels of these runs are compiled once.
@@ -18,33 +17,6 @@ pytestmark = pytest.mark.xdist_group("adaptive")
 SHORT = ["--set", "simulation.duration=10 s", "--set", "map.levels=[8.8, 9]", "--audit", "0"]
 GAINS = ["--axis", "controller.kp=0:1000:101", "--axis", "controller.ki=0:500:91"]
 ADAPTIVE = ["map", DESIGN, "--adaptive", *GAINS, *SHORT]
-
-
-@pytest.fixture(autouse=True)
-def _own_folder(tmp_path, monkeypatch):
-    """Runs go to a folder of their own; pictures are not rendered."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
-
-
-@pytest.fixture
-def call(capsys):
-    """Run a command line in this process: exit code, stdout, stderr."""
-
-    def _call(*arguments):
-        capsys.readouterr()
-        code = run([str(a) for a in arguments])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return _call
-
-
-def strict(text):
-    def refuse(constant):
-        raise ValueError(f"{constant} is not JSON")
-
-    return json.loads(text, parse_constant=refuse)
 
 
 def test_json_has_the_keys_of_a_map_and_its_own(call):

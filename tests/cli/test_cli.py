@@ -16,7 +16,6 @@ import pytest
 
 import drillctl
 from drillctl import catalog
-from drillctl.cli import run
 from drillctl.errors import SimulationError
 
 DESIGN = "monteiro-trindade-140kn"
@@ -27,10 +26,7 @@ SMALL = [*GAINS, "--audit", "0", *SHORT]
 
 
 @pytest.fixture(autouse=True)
-def _own_folder(tmp_path, monkeypatch):
-    """Runs go to a folder of their own; pictures are not rendered; threads are given back."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
+def _threads_given_back():
     yield
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
 
@@ -39,19 +35,6 @@ def _own_folder(tmp_path, monkeypatch):
 def _pictures(_own_folder, monkeypatch):
     """Coarse pictures are rendered after all."""
     monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: figure.savefig(path, dpi=30))
-
-
-@pytest.fixture
-def call(capsys):
-    """Run a command line in this process: exit code, stdout, stderr."""
-
-    def _call(*arguments):
-        capsys.readouterr()
-        code = run([str(a) for a in arguments])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return _call
 
 
 def refuse(constant):

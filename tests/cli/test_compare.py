@@ -3,44 +3,16 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
 import pytest
+from strict_json import strict
 
 import drillctl
-from drillctl.cli import run
 
 SHIPPED = "pi-vs-dynamic-wob-140kn"
 ALONE = "monteiro-trindade-140kn"
 SHORT = ["--set", "simulation.duration=10 s", "--realizations", "5"]
-
-
-@pytest.fixture(autouse=True)
-def _own_folder(tmp_path, monkeypatch):
-    """Runs go to a folder of their own; pictures are not rendered."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
-
-
-@pytest.fixture
-def call(capsys):
-    """Run a command line in this process: exit code, stdout, stderr."""
-
-    def _call(*arguments):
-        capsys.readouterr()
-        code = run([str(a) for a in arguments])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return _call
-
-
-def strict(text):
-    def refuse(constant):
-        raise ValueError(f"{constant} is not JSON")
-
-    return json.loads(text, parse_constant=refuse)
 
 
 def test_json_has_the_keys_of_the_contract(call):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
 import pytest
+from strict_json import strict
 
 import drillctl
-from drillctl.cli import run
 
 SHIPPED = "dynamic-wob-delay-140kn"
 # One worker: the kernels of these runs are compiled once.
@@ -19,33 +18,6 @@ SMALL = [
     "--set", "weight_delay.gains=['0 kN*s/rad', '6 kN*s/rad']",
     "--set", "weight_delay.delays=['0 s', '0.2 s', '1 s']",
 ]  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _own_folder(tmp_path, monkeypatch):
-    """Runs go to a folder of their own; pictures are not rendered."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
-
-
-@pytest.fixture
-def call(capsys):
-    """Run a command line in this process: exit code, stdout, stderr."""
-
-    def _call(*arguments):
-        capsys.readouterr()
-        code = run([str(a) for a in arguments])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return _call
-
-
-def strict(text):
-    def refuse(constant):
-        raise ValueError(f"{constant} is not JSON")
-
-    return json.loads(text, parse_constant=refuse)
 
 
 def test_json_tells_limits_and_every_point(call):

@@ -5,31 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import pytest
-
-from drillctl.cli import run
-
 DESIGN = "monteiro-trindade-140kn"
 SMALL = [
     "--axis", "controller.kp=0:1000:5", "--axis", "controller.ki=0:500:4",
     "--set", "simulation.duration=10 s", "--audit", "1",
 ]  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def in_its_own_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-@pytest.fixture
-def call(capsys):
-    def _call(*arguments):
-        capsys.readouterr()
-        code = run([str(a) for a in arguments])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return _call
 
 
 def test_json_and_folder(call):

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zarr
+from strict_json import strict
 
 import drillctl
-from drillctl.cli import run
 from drillctl.design.reading import parse_axis, parse_setting
 from drillctl.errors import InputError
 from drillctl.studies.uncertainty import cluster as cluster_module
@@ -32,31 +32,9 @@ FEW = [*SHORT, "--realizations", "12"]
 
 
 @pytest.fixture(autouse=True)
-def _own_folder(tmp_path, monkeypatch):
-    """Runs go to a folder of their own; pictures are not rendered; blocks are of 4 draws."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
+def _small_blocks(monkeypatch):
+    """Blocks are of 4 draws."""
     monkeypatch.setattr(keeping_module, "LANES", 24)
-
-
-@pytest.fixture
-def call(capsys):
-    """Run a command line in this process: exit code, stdout, stderr."""
-
-    def _call(*arguments):
-        capsys.readouterr()
-        code = run([str(a) for a in arguments])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return _call
-
-
-def strict(text):
-    def refuse(constant):
-        raise ValueError(f"{constant} is not JSON")
-
-    return json.loads(text, parse_constant=refuse)
 
 
 def table(path):
