@@ -212,7 +212,7 @@ def folder_of(call, name, realizations):
 @pytest.mark.parametrize("after", [0, 1, 2])
 def test_an_interrupted_run_goes_on_to_the_same_bits(call, monkeypatch, after):
     whole = drillctl.open(folder_of(call, "whole", 12))
-    from drillctl.store_realizations import StoredRealizations
+    from drillctl.store.realizations import StoredRealizations
 
     keep, kept = StoredRealizations.keep, []
 
@@ -280,7 +280,7 @@ def test_there_must_be_something_to_go_on_with(call, arguments, message):
 
 def begun(call, monkeypatch, *options):
     """A folder with one finished block of three."""
-    from drillctl.store_realizations import StoredRealizations
+    from drillctl.store.realizations import StoredRealizations
 
     keep, kept = StoredRealizations.keep, []
 

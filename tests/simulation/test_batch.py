@@ -267,7 +267,7 @@ def test_who_is_given_up_does_not_depend_on_company():
 
 
 def test_a_string_kept_for_resumed_runs_comes_back_whole(tmp_path):
-    from drillctl.store_blocks import FolderBlocks
+    from drillctl.store.blocks import FolderBlocks
 
     sampled = {"controller.drive": {"sampling_period": "20 ms", "torque_limit": "30 kN*m"}}
     for number, values in enumerate(({}, sampled, {"bha.damping": "50 N*m*s"})):

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from drillctl.errors import StoreError
 from drillctl.simulation.batch import Prepared
 from drillctl.simulation.measures import STATUSES
-from drillctl.store_blocks import FolderBlocks
-from drillctl.store_reading import stored_name
+from drillctl.store.blocks import FolderBlocks
+from drillctl.store.names import stored_name
 from drillctl.studies.grid import shape_of
 from drillctl.studies.sweeps import UNITS
 from drillctl.studies.uncertainty import Uncertainty

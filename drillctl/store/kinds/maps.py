@@ -1,0 +1,164 @@
+"""Maps over a grid: J1, adaptive, smoothed, of the loop, three regions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drillctl.design import Design
+from drillctl.simulation.batch import FLOATS
+from drillctl.store.kind import Kind
+from drillctl.store.names import asked_axes, axis_of
+from drillctl.studies.adaptive import AdaptiveMap, banded
+from drillctl.studies.adaptive_checks import CHECK_CELLS, SelfCheck, full_audit
+from drillctl.studies.audit import Audit, choose_cells
+from drillctl.studies.contour_search import INTERVALS
+from drillctl.studies.loop_maps import QUANTITIES, LoopMap
+from drillctl.studies.regularisation import WIDTHS, Regularisation
+from drillctl.studies.sweeps import Sweep
+from drillctl.studies.three_regions import FIELDS, MASKS, PAPER_LEVEL, ThreeRegions
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def read_sweep(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> Sweep:
+    """A `Sweep` as it was saved."""
+    axes = tuple(axis_of(path, data) for path in summary["axes"])
+    cells = data["audited_cell"].values.astype(np.int64)
+    j1 = data["j1"].values
+    return Sweep(
+        design=design,
+        axes=axes,
+        levels=design.tables.map.levels,
+        measures={name: data[name].values for name in FLOATS if name in data},
+        status=data["status"].values.astype(np.int8),
+        audit=Audit(cells, j1.ravel()[cells], data["audited_j1"].values),
+        step=summary["step"],
+        modes=summary["modes"],
+        seconds=summary["seconds"],
+        total_seconds=summary["total_seconds"],
+        provenance={key: str(value) for key, value in data.attrs.items()},
+    )
+
+
+def read_adaptive_map(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> AdaptiveMap:
+    """An `AdaptiveMap` as it was saved."""
+    axes = tuple(axis_of(path, data) for path in summary["axes"])
+    cells, j1 = data["cell"].values.astype(np.int64), data["j1"].values
+    audited = data["audited_cell"].values.astype(np.int64)
+    over_grid = np.full(len(axes[0]) * len(axes[1]), np.nan)
+    over_grid[cells] = j1
+    bands, levels = data["band"].values.astype(np.int8), design.tables.map.levels
+    check = SelfCheck(
+        data["checked_cell"].values.astype(np.int64),
+        data["said_band"].values.astype(np.int8),
+        data["found_band"].values.astype(np.int8),
+        summary["self_check"]["followed"],
+    )
+    full = None
+    if summary["full_audit"] is not None:
+        values = banded(bands, levels, cells, j1)
+        count = summary["full_audit"]["trajectories"]
+        full = full_audit(values, data["full_j1"].values, levels, count)
+    return AdaptiveMap(
+        design=design,
+        axes=axes,
+        levels=levels,
+        cells=cells,
+        measures={name: data[name].values for name in FLOATS},
+        status=data["status"].values.astype(np.int8),
+        bands=bands,
+        audit=Audit(audited, over_grid[audited], data["audited_j1"].values),
+        self_check=check,
+        full_audit=full,
+        **{n: summary[n] for n in ("intervals", "step", "modes", "seconds", "total_seconds")},
+        provenance={key: str(value) for key, value in data.attrs.items()},
+    )
+
+
+def read_loop_map(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> LoopMap:
+    """A `LoopMap` as it was saved."""
+    axes = tuple(axis_of(path, data) for path in summary["axes"])
+    values = {name: data[name].values for name in QUANTITIES if name in data}
+    return LoopMap(design, axes, values, summary["total_seconds"])
+
+
+def read_three_regions(
+    design: Design, data: xarray.Dataset, summary: dict[str, Any]
+) -> ThreeRegions:
+    """`ThreeRegions` as they were saved."""
+    told = ("level", "horizon", "band", "window", "total_seconds")
+    values: dict[str, Any] = {name: summary[name] for name in told}
+    values |= {name: data[name].values for name in FIELDS}
+    values |= {name: data[name].values.astype(bool) for name in MASKS}
+    axes = tuple(axis_of(path, data) for path in summary["axes"])
+    return ThreeRegions(design=design, axes=axes, **values)
+
+
+def read_regularisation(
+    design: Design, data: xarray.Dataset, summary: dict[str, Any]
+) -> Regularisation:
+    """A `Regularisation` as it was saved."""
+    return Regularisation(
+        design=design,
+        axes=tuple(axis_of(path, data) for path in summary["axes"]),
+        levels=design.tables.map.levels,
+        widths=data["width"].values,
+        j1=data["j1"].values,
+        smoothed=data["smoothed_j1"].values,
+        total_seconds=summary["total_seconds"],
+    )
+
+
+def asked_measures(kept: tuple[str, ...]) -> dict[str, Any]:
+    """What a map that keeps some measures alone was asked for, for `claim`."""
+    return {} if kept == FLOATS else {"measures": list(kept)}
+
+
+def _asked_of_sweep(result: Sweep) -> tuple[Design, dict[str, Any]]:
+    settings = asked_axes(result)
+    count = result.design.tables.map.audit_cells
+    if not np.array_equal(choose_cells(result.j1, result.levels, count), result.audit.cells):
+        settings["audited"] = result.audit.cells.tolist()
+    return result.design, settings | asked_measures(tuple(result.measures))
+
+
+def _asked_of_adaptive(result: AdaptiveMap) -> tuple[Design, dict[str, Any]]:
+    settings: dict[str, Any] = {"full_grid": result.full_audit is not None}
+    settings |= asked_axes(result)
+    if result.intervals != INTERVALS:
+        settings["intervals"] = result.intervals
+    check = result.self_check
+    left = result.bands.size - result.trajectories + len(check.cells) + check.followed
+    if len(check.cells) != min(CHECK_CELLS, left):
+        settings["checked"] = len(check.cells)
+    count = result.design.tables.map.audit_cells
+    cells = choose_cells(result.j1.filled(np.nan), result.levels, count)
+    if not np.array_equal(cells, result.audit.cells):
+        settings["audited"] = result.audit.cells.tolist()
+    return result.design, settings
+
+
+def _asked_of_loop_map(result: LoopMap) -> tuple[Design, dict[str, Any]]:
+    return result.design, {"quantities": list(result.values)} | asked_axes(result)
+
+
+def _asked_of_three_regions(result: ThreeRegions) -> tuple[Design, dict[str, Any]]:
+    level = {} if result.level == PAPER_LEVEL else {"level": result.level}
+    return result.design, asked_axes(result) | level
+
+
+def _asked_of_regularisation(result: Regularisation) -> tuple[Design, dict[str, Any]]:
+    widths = {} if tuple(result.widths) == WIDTHS else {"widths": result.widths.tolist()}
+    return result.design, asked_axes(result) | widths
+
+
+KINDS = (
+    Kind("map", Sweep, read_sweep, _asked_of_sweep),
+    Kind("adaptive-map", AdaptiveMap, read_adaptive_map, _asked_of_adaptive),
+    Kind("loop-map", LoopMap, read_loop_map, _asked_of_loop_map),
+    Kind("regions", ThreeRegions, read_three_regions, _asked_of_three_regions),
+    Kind("regularisation", Regularisation, read_regularisation, _asked_of_regularisation),
+)
