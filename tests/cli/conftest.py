@@ -9,7 +9,7 @@ from drillctl.cli import run
 def _own_folder(tmp_path, monkeypatch):
     """Runs go to a folder of their own; pictures are not rendered."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: path.touch())
+    monkeypatch.setattr("drillctl.cli.running.draw", lambda figure, path: path.touch())
 
 
 @pytest.fixture

@@ -34,7 +34,9 @@ def _threads_given_back():
 @pytest.fixture
 def _pictures(_own_folder, monkeypatch):
     """Coarse pictures are rendered after all."""
-    monkeypatch.setattr("drillctl.verbs._draw", lambda figure, path: figure.savefig(path, dpi=30))
+    monkeypatch.setattr(
+        "drillctl.cli.running.draw", lambda figure, path: figure.savefig(path, dpi=30)
+    )
 
 
 def refuse(constant):

@@ -139,7 +139,7 @@ def test_tables_for_people(call):
 
 
 def test_an_index_whose_error_is_not_known_says_so():
-    from drillctl.printing_uncertainty import _index
+    from drillctl.printing.uncertainty import _index
 
     assert _index(0.5, 0.1) == "0.500 +- 0.100"
     assert _index(0.5, float("nan")) == "0.500 (error not known)"
@@ -369,8 +369,8 @@ SCRIPT = """
 import sys
 from drillctl.studies.uncertainty import keeping
 keeping.LANES = 24
-from drillctl import verbs
-verbs._draw = lambda figure, path: path.touch()
+from drillctl.cli import running
+running.draw = lambda figure, path: path.touch()
 from drillctl.cli import run
 from drillctl.design.reading import parse_axis, parse_setting
 sys.exit(run(sys.argv[1:]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from drillctl.console import line, table
+from drillctl.printing.words import title_of
 from drillctl.simulation.scheme_reasons import FORMS
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ _VERDICTS = {
 
 def doctor(result: Doctor) -> None:
     """Scheme and reasons, errors, speed, verdict."""
-    title = result.design.tables.title or result.design.name
+    title = title_of(result)
     said = result.summary()
     if said["scheme"] is None:
         line(f"{title}: {result.refused}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from drillctl import units
 from drillctl.console import line, sized, table
 from drillctl.errors import InputError
+from drillctl.printing.words import place_of, title_of
 
 if TYPE_CHECKING:
     from drillctl.studies import Uncertainty
@@ -62,7 +63,7 @@ def _areas(result: Uncertainty) -> None:
         rows.append(
             [f"J1 <= {level:g} s", f"{nominal:.2%}", *(_area(one) for one in areas.values())]
         )
-    title = result.design.tables.title or result.design.name
+    title = title_of(result)
     heads = ["region", "nominal", "P >= 95 %", "P >= 50 %", "P >= 5 %"]
     table(f"{title}: share of the map by probability (95 % interval)", heads, rows)
 
@@ -80,13 +81,10 @@ def _best(result: Uncertainty, system: units.System) -> None:
         except InputError as error:
             rows.append([name, "-", "-", error.problem, "-"])
             continue
-        places = []
-        for axis in result.axes:
-            value, unit = units.displayed(result.at(found.cell)[axis.path], axis.unit, system)
-            places.append(f"{axis.path} = {value:g} {unit}".rstrip())
+        place = place_of(result.at(found.cell), result.axes, system)
         low, high = (sized(end, 4) for end in found.interval)
         alike = "-" if found.alike is None else str(int(found.alike.sum()))
-        rows.append([name, f"{found.value:.4g}", f"{low} to {high}", ", ".join(places), alike])
+        rows.append([name, f"{found.value:.4g}", f"{low} to {high}", place, alike])
     heads = ["best by", "value", "95 % interval", "at", "cells alike"]
     table("best cells over the draws (J1 in s)", heads, rows)
 

@@ -1,0 +1,36 @@
+"""The command line: one function a verb, no numerics.
+
+`app.py` holds the program and its exit codes, `options.py` what verbs have in common, `running.py`
+a run in its folder; the verbs are in files by subject. Every verb takes a design by path or
+shipped name. Exit codes: 0 done, 2 the input is wrong, 130 interrupted, 1 anything else.
+"""
+
+from collections.abc import Callable
+
+from drillctl.cli import comparisons, files, linear, maps, runs, uncertain
+from drillctl.cli.app import app, run
+
+VERBS: dict[str, Callable[..., None]] = {
+    "models": files.models,
+    "designs": files.designs,
+    "new": files.new,
+    "show": files.show,
+    "validate": files.validate,
+    "modes": linear.modes,
+    "loop": linear.loop,
+    "cycle": linear.cycle,
+    "simulate": runs.simulate,
+    "map": maps.stability_map,
+    "regions": maps.regions,
+    "regularisation": maps.regularisation,
+    "doctor": maps.doctor,
+    "compare": comparisons.compare,
+    "delay": comparisons.delay,
+    "uncertainty": uncertain.uncertainty,
+}
+"""Every verb, in the order of the help."""
+
+for name, verb in VERBS.items():
+    app.command(name=name)(verb)
+
+__all__ = ["VERBS", "app", "run"]

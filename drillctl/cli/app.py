@@ -1,0 +1,66 @@
+"""The program: its options without a verb, and how errors become messages and exit codes."""
+
+from __future__ import annotations
+
+import traceback
+from typing import Annotated, Any
+
+import typer
+
+from drillctl import __version__
+from drillctl.errors import DrillctlError, InputError
+
+app = typer.Typer(
+    name="drillctl",
+    help="Control design against torsional stick-slip of oil-well drillstrings.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # plain help: rich would double the time it takes to appear
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def run(arguments: list[str]) -> int:
+    """Run a command line and return its exit code; errors are told in one message."""
+    usage_error: Any = typer.BadParameter.__mro__[1]
+    try:
+        code = app(arguments or ["--help"], prog_name="drillctl", standalone_mode=False)
+        # Some versions of typer return 130 on an interruption, others raise Abort.
+        return _told("interrupted", 130) if code == 130 else int(code or 0)
+    except typer.Exit as stop:
+        return int(stop.exit_code)
+    except (KeyboardInterrupt, typer.Abort):
+        return _told("interrupted", 130)
+    except usage_error as error:
+        return _told(error.format_message(), 2)
+    except Exception as error:
+        if "--debug" in arguments:
+            traceback.print_exc()
+        if isinstance(error, DrillctlError):
+            return _told(str(error), 2 if isinstance(error, InputError) else 1)
+        return _told(f"{type(error).__name__}: {error} (--debug shows where)", 1)
+
+
+def _told(message: str, code: int) -> int:
+    from drillctl import console
+
+    console.note(f"drillctl: {message}")
+    return code
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from drillctl import console
+
+        console.line(f"drillctl {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print version.")
+    ] = False,
+) -> None:
+    """Control design against torsional stick-slip of oil-well drillstrings."""

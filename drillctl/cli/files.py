@@ -1,0 +1,69 @@
+"""Verbs about files: what is shipped, one design in full, checked, or begun."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from drillctl.cli.options import Debug, DesignName, Json, Sets, loaded
+
+
+def _shelf(shelf: Literal["models", "designs"], as_json: bool) -> None:
+    from drillctl import catalog, console
+
+    found = catalog.entries(shelf)
+    if as_json:
+        keys = [{"name": e.name, "title": e.title, "path": str(e.path)} for e in found]
+        console.emit({shelf: keys})
+    else:
+        console.table(shelf, ["name", "title"], [[e.name, e.title] for e in found])
+
+
+def models(json: Json = False, debug: Debug = False) -> None:
+    """List the shipped models (rigs)."""
+    _shelf("models", json)
+
+
+def designs(json: Json = False, debug: Debug = False) -> None:
+    """List the shipped designs (cases to run)."""
+    _shelf("designs", json)
+
+
+def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False) -> None:
+    """Print a design with its model and all defaults put in."""
+    from drillctl import console
+    from drillctl.design import to_toml
+    from drillctl.design.writing import to_tree
+
+    found = loaded(design, sets)
+    if json:
+        console.emit(to_tree(found.tables))
+    else:
+        console.line(to_toml(found).rstrip())
+
+
+def validate(
+    design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False
+) -> None:
+    """Check a design: every key, unit and range, its axes, draws and cases."""
+    from drillctl import console
+    from drillctl.studies.checking import refuse_what_studies_would
+
+    found = loaded(design, sets)
+    refuse_what_studies_would(found)
+    if json:
+        console.emit({"valid": True, "name": found.name, "path": found.origin})
+    else:
+        console.line(f"{found.origin}: valid")
+
+
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name or path of the new file.")],
+    debug: Debug = False,
+) -> None:
+    """Write a commented design file to start from."""
+    from drillctl import console
+    from drillctl.design.starter import write_starter
+
+    console.line(f"written: {write_starter(name)}")

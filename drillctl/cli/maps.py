@@ -1,0 +1,190 @@
+"""Verbs about maps over parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from drillctl import console
+from drillctl.cli import running
+from drillctl.cli.options import (
+    Axes,
+    Options,
+    computing,
+    with_axes,
+    with_values,
+)
+from drillctl.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctl import studies
+    from drillctl.design import Design
+
+
+@computing
+def stability_map(
+    design: Design,
+    options: Options,
+    axis: Axes = None,
+    audit: Annotated[
+        int | None, typer.Option("--audit", help="Cells to audit with the reference solver.")
+    ] = None,
+    adaptive: Annotated[
+        bool, typer.Option("--adaptive", help="Simulate the cells near the contours alone.")
+    ] = False,
+    full_audit: Annotated[
+        bool, typer.Option("--full-audit", help="Set an adaptive map beside the full grid.")
+    ] = False,
+    measure: Annotated[
+        list[str] | None,
+        typer.Option("--measure", metavar="NAME", help="Keep this one and J1 alone; repeatable."),
+    ] = None,
+) -> None:
+    """J1 over one or more parameters, with regions, audit and figures."""
+    design = with_values(with_axes(design, axis), {"map.audit_cells": audit})
+    if adaptive and measure:
+        raise InputError("goes with the full grid, not with --adaptive", "--measure")
+    if adaptive:
+        _adaptive_map(design, full_audit, options)
+    elif full_audit:
+        raise InputError("goes with --adaptive: any other map is the full grid", "--full-audit")
+    else:
+        _full_map(design, measure or None, options)
+
+
+def _full_map(design: Design, measures: list[str] | None, options: Options) -> None:
+    """A sweep with its map, regions, audit and responses."""
+    from drillctl import plots, printing, store, studies
+    from drillctl.studies.sweeps import kept_measures
+
+    try:
+        kept = kept_measures(measures)
+    except InputError as error:
+        raise InputError(error.problem, "--measure") from None
+    folder = store.claim("map", design, options.out, **store.asked_measures(kept))
+    if running.shown_again(
+        folder, options, lambda: printing.sweep(store.open(folder.path), options.units)
+    ):
+        return
+    with running.guarded(folder), console.progress() as bar:
+        result = studies.sweep(design, progress=bar, blocks=folder.blocks(), measures=kept)
+    if result.minimum is None:
+        console.note("warning: no cell gives a finite answer; see the statuses")
+    store.write_data(result, folder.path)
+    studies.write_tables(result, folder.path)
+    if len(result.axes) == 2:
+        running.draw(plots.stability_map(result, system=options.units), folder.path / "map.png")
+        runs = studies.responses(result)
+        paths = [axis.path for axis in result.axes]
+        running.draw(plots.time_response(runs, paths=paths), folder.path / "responses.png")
+    elif len(result.axes) == 1:
+        running.draw(plots.sweep_line(result, system=options.units), folder.path / "map.png")
+    summary = result.summary()
+    if not options.json:
+        printing.sweep(result, options.units)
+    if result.audit.verdict == "look":
+        console.note("audit: look: the engines differ by more than 1 % in J1 in some cell")
+    running.conclude(folder, summary, options)
+
+
+def _adaptive_map(design: Design, full_grid: bool, options: Options) -> None:
+    """The regions of a map from the cells near their contours, with checks, figure and tables."""
+    from drillctl import plots, printing, store, studies
+
+    def told(result: studies.AdaptiveMap) -> None:
+        printing.adaptive_map(result, options.units)
+
+    folder = store.claim("adaptive-map", design, options.out, full_grid=full_grid)
+    if running.shown_again(folder, options, lambda: told(store.open(folder.path))):
+        return
+    with running.guarded(folder), console.progress() as bar:
+        blocks = folder.blocks()
+        result = studies.adaptive_map(design, full_grid=full_grid, progress=bar, blocks=blocks)
+    if result.minimum is None:
+        console.note("warning: no cell gives a finite answer; see the statuses")
+    store.write_data(result, folder.path)
+    studies.write_adaptive_tables(result, folder.path)
+    running.draw(plots.adaptive_map(result, system=options.units), folder.path / "map.png")
+    if not options.json:
+        told(result)
+    if result.share == 1.0:
+        console.note("every cell was simulated: cells are left out on axes of 81 points or more")
+    for name, check, reason in (
+        ("self-check", result.self_check, "a cell left out was in another band than said"),
+        ("full audit", result.full_audit, "a region is not that of the full grid to one cell"),
+        ("audit", result.audit, "the engines differ by more than 1 % in J1 in some cell"),
+    ):
+        if check is not None and check.verdict == "look":
+            console.note(f"{name}: look: {reason}")
+    running.conclude(folder, result.summary(), options)
+
+
+@computing
+def regions(design: Design, options: Options, axis: Axes = None) -> None:
+    """Locally stable, J1 under a level, attracted: three regions over two parameters."""
+    from drillctl import plots, printing, store, studies
+
+    design = with_axes(design, axis)
+    folder = store.claim("regions", design, options.out)
+    if running.shown_again(folder, options, lambda: printing.regions(store.open(folder.path))):
+        return
+    with running.guarded(folder), console.progress() as bar:
+        if len(design.tables.map.axes) != 2:
+            count = len(design.tables.map.axes)
+            raise InputError(f"regions are shown over 2 parameters, got {count}", "map.axes")
+        result = studies.three_regions(design, progress=bar)
+    store.write_data(result, folder.path)
+    running.draw(
+        plots.three_regions(result, system=options.units), folder.path / "three-regions.png"
+    )
+    if not options.json:
+        printing.regions(result)
+    running.conclude(folder, result.summary(), options)
+
+
+@computing
+def regularisation(design: Design, options: Options, axis: Axes = None) -> None:
+    """The same map with friction smoothed by tanh: what regularising costs."""
+    from drillctl import plots, printing, store, studies
+
+    design = with_axes(design, axis)
+    folder = store.claim("regularisation", design, options.out)
+    if running.shown_again(
+        folder, options, lambda: printing.regularisation(store.open(folder.path))
+    ):
+        return
+    with running.guarded(folder), console.progress() as bar:
+        result = studies.regularisation(design, progress=bar)
+    store.write_data(result, folder.path)
+    running.draw(plots.regularisation(result), folder.path / "regularisation.png")
+    if not options.json:
+        printing.regularisation(result)
+    running.conclude(folder, result.summary(), options)
+
+
+@computing
+def doctor(
+    design: Design,
+    options: Options,
+    axis: Axes = None,
+    audit: Annotated[
+        int, typer.Option("--audit", min=0, help="Lanes to audit with the reference solver.")
+    ] = 4,
+) -> None:
+    """Step and modes of the batch engine and why; its estimated and audited error; its speed."""
+    import drillctl
+    from drillctl import plots, printing, store
+
+    design = with_axes(design, axis)
+    folder = store.claim("doctor", design, options.out, audited=audit)
+    if running.shown_again(folder, options, lambda: printing.doctor(store.open(folder.path))):
+        return
+    with running.guarded(folder), console.progress() as bar:
+        result = drillctl.doctor(design, audit, progress=bar)
+    store.write_data(result, folder.path)
+    if len(result.cells):
+        running.draw(plots.error_estimate(result), folder.path / "errors.png")
+    if not options.json:
+        printing.doctor(result)
+    running.conclude(folder, result.summary(), options)

@@ -1,0 +1,137 @@
+"""What verbs have in common: the design with its changed values, how to compute and tell."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from drillctl.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctl.design import Design
+
+DesignName = Annotated[str, typer.Argument(metavar="DESIGN", help="Path or shipped name.")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="PATH=VALUE", help="Set a value, e.g. controller.kp=300."),
+]
+Axes = Annotated[
+    list[str] | None,
+    typer.Option("--axis", metavar="PATH=MIN:MAX:POINTS", help="Axis of a map; repeat for more."),
+]
+Draws = Annotated[int | None, typer.Option("--realizations", help="Draws of what is uncertain.")]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the draws.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results.")]
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, nothing else.")]
+Threads = Annotated[int | None, typer.Option("--threads", min=1, help="Threads to use.")]
+Units = Annotated[
+    Literal["si", "field"], typer.Option("--units", help="kN, kN m, m or klbf, klbf ft, ft.")
+]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more on stderr.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a verb that computes is to do it and to tell of it."""
+
+    out: Path | None
+    json: bool
+    units: Literal["si", "field"]
+    verbose: bool
+
+
+def _asked_of_all(
+    out: Out = None,
+    json: Json = False,
+    threads: Threads = None,
+    units: Units = "si",
+    verbose: Verbose = False,
+    debug: Debug = False,
+) -> Options:
+    """The options of every verb that computes; `debug` is read where errors are told."""
+    if threads is not None:
+        _use(threads)
+    return Options(out, json, units, verbose)
+
+
+def computing(verb: Callable[..., None]) -> Callable[..., None]:
+    """A verb as the command line sees it.
+
+    Parameters
+    ----------
+    verb : callable
+        Takes `design` and `options`; on the command line these two stand for the name of a
+        design with `--set`, and for the options of every verb that computes. Its other
+        parameters are its own.
+
+    Returns
+    -------
+    callable
+        With the signature that typer reads.
+    """
+    shared = inspect.signature(_asked_of_all, eval_str=True).parameters
+    own = [
+        parameter.replace(annotation=eval(parameter.annotation, verb.__globals__))
+        for parameter in inspect.signature(verb).parameters.values()
+        if parameter.name not in ("design", "options")
+    ]
+
+    def command(**given: Any) -> None:
+        asked = {name: given.pop(name) for name in shared}
+        design = loaded(given.pop("design"), given.pop("sets"))
+        verb(design=design, options=_asked_of_all(**asked), **given)
+
+    kind = inspect.Parameter.KEYWORD_ONLY
+    parameters = [
+        inspect.Parameter("design", kind, annotation=DesignName),
+        inspect.Parameter("sets", kind, default=None, annotation=Sets),
+        *(parameter.replace(kind=kind) for parameter in (*own, *shared.values())),
+    ]
+    command.__name__, command.__doc__ = verb.__name__, verb.__doc__
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in parameters}
+    return command
+
+
+def loaded(name: str, sets: list[str] | None) -> Design:
+    """The design of a name or path with its changed values; its warnings are told."""
+    from drillctl import console
+    from drillctl.design import load, parse_setting
+
+    found = load(name, **dict(parse_setting(text) for text in sets or []))
+    for warning in found.warnings:
+        console.note(f"warning: {warning}")
+    return found
+
+
+def with_axes(design: Design, axes: list[str] | None) -> Design:
+    """The design with the axes of the command line, if there are any."""
+    from drillctl.design.reading import parse_axis
+
+    return design.replace({"map.axes": [parse_axis(text) for text in axes]}) if axes else design
+
+
+def with_values(design: Design, given: dict[str, Any]) -> Design:
+    """The design with the values of options that were given; None stands for not given."""
+    asked = {path: value for path, value in given.items() if value is not None}
+    return design.replace(asked) if asked else design
+
+
+def with_draws(design: Design, realizations: int | None, seed: int | None) -> Design:
+    """The design with the draws of the command line, if they are given."""
+    return with_values(design, {"uncertainty.realizations": realizations, "uncertainty.seed": seed})
+
+
+def _use(threads: int) -> None:
+    import numba
+
+    most = numba.config.NUMBA_NUM_THREADS
+    if threads > most:
+        raise InputError(f"{threads} is more than this machine's {most}", "--threads")
+    numba.set_num_threads(threads)

@@ -1,0 +1,24 @@
+"""Results as tables for people."""
+
+from drillctl.printing.comparison import comparison
+from drillctl.printing.doctor import doctor
+from drillctl.printing.linear import loop, modes
+from drillctl.printing.maps import adaptive_map, regions, regularisation, sweep
+from drillctl.printing.runs import cycle, simulation
+from drillctl.printing.uncertainty import uncertainty
+from drillctl.printing.weight_delay import weight_delay
+
+__all__ = [
+    "adaptive_map",
+    "comparison",
+    "cycle",
+    "doctor",
+    "loop",
+    "modes",
+    "regions",
+    "regularisation",
+    "simulation",
+    "sweep",
+    "uncertainty",
+    "weight_delay",
+]

@@ -1,0 +1,91 @@
+"""Single runs and limit cycles as tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from drillctl import units
+from drillctl.console import line, sized, table
+from drillctl.printing.words import title_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from drillctl.simulation import Simulation
+    from drillctl.simulation.limit_cycle import LimitCycle
+
+
+_MEASURES = {
+    "j1": "s", "stuck_time": "s", "sticks": "", "stick_slip_index": "",
+    "mean_bit_speed": "rad/s", "min_bit_speed": "rad/s", "peak_bit_speed": "rad/s",
+    "peak_pipe_torque": "N*m", "peak_top_torque": "N*m", "settling_time": "s",
+    "settling_time_wide": "s", "mean_weight_on_bit": "N", "rop_proxy": "",
+    "work_per_turn": "J",
+}  # fmt: skip
+
+
+def simulation(result: Simulation, system: units.System) -> None:
+    """Measures of one run."""
+    rows = []
+    for name, unit in _MEASURES.items():
+        value = getattr(result.measures, name)
+        if value is None:
+            rows.append([name, sized(None), ""])
+        else:
+            shown, label = units.displayed(value, unit, system)
+            rows.append([name, sized(shown), label])
+    if result.share_of_yield is not None:
+        rows.append(["share of torsional yield", f"{result.share_of_yield:.1%}", ""])
+    if result.energy is not None:
+        rows.append(["energy balance", f"{result.energy.relative_residual:.0e}", "of the work"])
+    rows.append(["status", result.status, ""])
+    engine = result.engine
+    if result.step is not None:
+        engine = f"{engine}, step {result.step * 1e3:g} ms, {result.modes} modes"
+    table(f"{title_of(result)} ({engine})", ["measure", "value", "unit"], rows)
+
+
+def cycle(result: LimitCycle, system: units.System) -> None:
+    """What each method says of the limit cycle, side by side."""
+    orbit, predicted, run = result.orbit, result.predicted, result.simulated.summary()
+
+    def speed(value: float | None) -> str:
+        return "-" if value is None else f"{units.displayed(value, 'rad/s', system)[0]:.2f}"
+
+    def spread(values: list[float] | None, shown: Callable[[float], str]) -> str:
+        return "-" if values is None else " to ".join(dict.fromkeys(map(shown, values)))
+
+    rows = [
+        [
+            "period (s)",
+            "-" if predicted is None else f"{predicted.period:.3f}",
+            "-" if orbit is None else f"{orbit.period:.6f}",
+            spread(run["period_spread"], lambda x: f"{x:.4f}"),
+        ],
+        [
+            "peak bit speed (rpm)",
+            speed(None if predicted is None else predicted.peak_speed),
+            speed(None if orbit is None else orbit.peak_bit_speed),
+            spread(run["peak_spread"], speed),
+        ],
+        [
+            "stuck in a period (s)",
+            "-",
+            "-" if orbit is None else f"{orbit.stuck_time:.4f}",
+            spread(run["stuck_time_spread"], lambda x: f"{x:.4f}"),
+        ],
+        [
+            "largest multiplier",
+            "-",
+            "-" if orbit is None else f"{abs(orbit.multipliers[0]):.4f}",
+            "-",
+        ],
+    ]
+    heads = ["figure", "one harmonic", "exact (shooting)", "last ten returns of a long run"]
+    table(f"{title_of(result)}: {result.status}", heads, rows)
+    for unstable in (x for x in result.harmonic if not x.stable):
+        line(
+            f"unstable cycle by one harmonic: {unstable.period:.3f} s, "
+            f"{speed(unstable.least_speed)} to {speed(unstable.peak_speed)} rpm"
+        )
+    line(f"status: {result.status} (wound up, {result.simulated.duration:.0f} s)")

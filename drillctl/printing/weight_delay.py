@@ -1,0 +1,87 @@
+"""A weight law over its delay as tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from drillctl import units
+from drillctl.console import line, sized, table
+from drillctl.printing.words import title_of
+
+if TYPE_CHECKING:
+    from drillctl.studies import WeightDelay
+    from drillctl.studies.delay_limits import EndedShare, EndsUpTo, HarmfulFrom
+    from drillctl.studies.weight_delay import DelayedBenefit
+
+
+def weight_delay(result: WeightDelay, system: units.System) -> None:
+    """J1 and the end of stick-slip by gain and delay, and how much delay each gain bears."""
+    force, unit = units.displayed(1.0, "N", system)
+    names = [f"{gain * force:g} {unit} s/rad" for gain in result.gains]
+    moving = [i for i, gain in enumerate(result.gains) if gain > 0.0]
+    rows = [
+        [f"{delay:g} s", *(_less_j1(result.benefits[i][k]) for i in moving)]
+        for k, delay in enumerate(result.delays)
+    ]
+    heads = ["delay", *(names[i] for i in moving)]
+    table(
+        f"{title_of(result)}: J1 less that of a constant weight, mean (95 % interval), s",
+        heads,
+        rows,
+    )
+    rows = [
+        [f"{delay:g} s", *(_ended(result.benefits[i][k]) for i in moving)]
+        for k, delay in enumerate(result.delays)
+    ]
+    table("stick-slip has ended, share of the draws (95 % interval)", heads, rows)
+    longest = float(result.delays[-1])
+    rows = [
+        [names[i], *_ends(found.ends_up_to), *_harm(found.harmful_from, longest)]
+        for i, found in ((i, result.limits[i]) for i in moving)
+    ]
+    heads = ["gain", "stick-slip ends up to", "share there", "share at the next delay",
+             "harmful from", "95 % interval"]  # fmt: skip
+    table("delay that each gain bears", heads, rows)
+    constant = result.baseline
+    line(
+        f"constant weight: J1 {sized(constant.j1, 4)} s, stick-slip ended in {_ended(constant)} "
+        f"of the draws"
+    )
+    for failure in result.failures:
+        line(
+            f"{failure.count} of {result.realizations} draws failed; {failure.reason}: "
+            f"{failure.example}"
+        )
+    line(f"{result.realizations} draws: {', '.join(result.drawn)}; seed {result.seed}")
+
+
+def _less_j1(one: DelayedBenefit) -> str:
+    if one.difference is None:
+        return "-"
+    if one.difference_interval is None:
+        return f"{one.difference:+.1f}"
+    low, high = one.difference_interval
+    return f"{one.difference:+.1f} ({low:.1f} to {high:.1f})"
+
+
+def _ended(one: DelayedBenefit) -> str:
+    return _share_told(one.ended_share)
+
+
+def _ends(found: EndsUpTo) -> list[str]:
+    shares = ["-" if one is None else _share_told(one) for one in (found.at, found.next)]
+    return ["at no delay" if found.at is None else f"{found.at.delay:g} s", *shares]
+
+
+def _share_told(one: EndedShare) -> str:
+    low, high = (f"{100.0 * end:.1f}" for end in one.interval_95)
+    return f"{one.share:.1%} ({low} to {high})"
+
+
+def _harm(found: HarmfulFrom, longest: float) -> list[str]:
+    """Where it turns harmful, and the interval; nothing is known beyond the longest delay."""
+    beyond = f"beyond {longest:g} s"
+    low, high = (beyond if end is None else f"{end:.2f} s" for end in found.interval_95)
+    if found.interval_95 == (None, None):
+        return [beyond, "-"]
+    return [beyond if found.delay is None else f"{found.delay:.2f} s", f"{low} to {high}"]

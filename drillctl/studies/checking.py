@@ -1,0 +1,30 @@
+"""What a design asks of the studies, checked without running any."""
+
+from __future__ import annotations
+
+from drillctl.design import Design
+from drillctl.studies.cases import case_designs, refuse_unequal
+from drillctl.studies.delayed_lanes import following_design
+from drillctl.studies.draws import uncertain_parameters
+from drillctl.studies.grid import axes_of
+from drillctl.studies.uncertainty.study import map_axes, refuse_impossible
+
+
+def refuse_what_studies_would(design: Design) -> None:
+    """Refuse (`InputError`) axes, draws, cases and delays that a study would refuse.
+
+    Parameters
+    ----------
+    design : Design
+        What its own tables say is checked; defaults need not fit every law.
+    """
+    if "axes" in design.tree.get("map", {}):
+        axes_of(design, design.tables.map.axes)
+    if design.tables.uncertain:
+        uncertain_parameters(design)
+    if "uncertainty" in design.tree:
+        refuse_impossible(design, map_axes(design))
+    if design.tables.compare.cases:
+        refuse_unequal(case_designs(design))
+    if "weight_delay" in design.tree:
+        following_design(design)
