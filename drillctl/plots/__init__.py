@@ -4,7 +4,9 @@
 - `frequency.py`: `bode`, response of any signals to one other, of one system or several.
 - `mobility.py`: `mobility` at bit and top; `impedance.py`: `drive_impedance` and reflection.
 - `loop_shape.py`: `nyquist`, `nichols` and `sensitivity` of the loop at the top torque.
-- `loop_map.py`: `loop_map`, figures of the loop over two parameters; `gain_boundary`.
+- `loop_map.py`: `loop_map`, figures of the loop over two parameters; `gain_boundary.py`: the
+  boundary of the stable gains.
+- `plane.py`: the plane that maps are drawn on; `colour_bars.py`.
 - `root_locus.py`: `root_locus`, poles of the loop against a parameter.
 - `friction.py`: `friction_curves`, bit torque against bit speed at each weight on bit.
 - `map.py`: `stability_map` with regions and audit; `sweep_line` for a single parameter.
@@ -30,9 +32,10 @@ from drillctl.plots.comparison import j1_against_weight, j1_distributions, paire
 from drillctl.plots.errors import error_estimate
 from drillctl.plots.frequency import bode
 from drillctl.plots.friction import friction_curves
+from drillctl.plots.gain_boundary import gain_boundary
 from drillctl.plots.impedance import drive_impedance
 from drillctl.plots.limit_cycle import limit_cycle
-from drillctl.plots.loop_map import gain_boundary, loop_map
+from drillctl.plots.loop_map import loop_map
 from drillctl.plots.loop_shape import nichols, nyquist, sensitivity
 from drillctl.plots.map import stability_map, sweep_line
 from drillctl.plots.mobility import mobility

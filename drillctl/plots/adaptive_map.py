@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from drillctl import units
-from drillctl.plots.map import axis_label
-from drillctl.plots.style import BLACK, LINE, SMALL, VERMILLION, axes_or_new, dress
+from drillctl.plots.plane import legend_under, origin_of, plane
+from drillctl.plots.style import BLACK, LINE, SMALL, VERMILLION
 from drillctl.simulation.measures import STATUSES
 
 if TYPE_CHECKING:
@@ -48,18 +48,11 @@ def adaptive_map(
     Figure
         A fill between two levels is a band, not a value: most of its cells were not simulated.
     """
-    figure, ax = axes_or_new(ax, 8.0, 6.0)
-    x, x_label = axis_label(result.axes[0], system)
-    y, y_label = axis_label(result.axes[1], system)
+    figure, ax, x, y = plane(result, ax, 6.0, system)
     handles = [*_regions(result, ax, x, y), *_dots(result, ax, x, y), *_marks(result, ax, x, y)]
     ax.set_xlim(x[0], x[-1])
     ax.set_ylim(y[0], y[-1])
-    dress(ax, x_label, y_label, result.design.tables.title or result.design.name)
-    ax.grid(visible=False)
-    ax.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3,
-        fontsize=SMALL, frameon=False,
-    )  # fmt: skip
+    legend_under(ax, 3, handles)
     figure.supxlabel(_caption(result), fontsize=SMALL)
     return figure
 
@@ -116,8 +109,9 @@ def _marks(result: AdaptiveMap, ax: Axes, x: np.ndarray, y: np.ndarray) -> list[
 
 def _caption(result: AdaptiveMap) -> str:
     check, audit = result.self_check, result.audit
-    origin = "string reconstructed; " if result.design.tables.status == "reconstructed" else ""
-    first = f"{origin}{result.share:.2%} of the full grid's cells; audit: {audit.verdict}"
+    first = (
+        f"{origin_of(result)}{result.share:.2%} of the full grid's cells; audit: {audit.verdict}"
+    )
     if result.full_audit is not None:
         first += f"; full audit: {result.full_audit.verdict}"
     if check.interval is None:

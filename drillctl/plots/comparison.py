@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.errors import InputError
+from drillctl.plots.plane import title_of
 from drillctl.plots.style import BLACK, COLOURS, DASHES, LINE, SMALL, TITLE, axes_or_new, dress
 from drillctl.studies.intervals import mean_interval
 
@@ -242,11 +243,6 @@ def _unbeaten(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]
 def case_colour(number: int) -> str:
     """Colour of a case by its place; the same in every picture of a comparison."""
     return COLOURS[number % len(COLOURS)]
-
-
-def title_of(result: Comparison) -> str:
-    """Title of a picture: that of the design, or its name."""
-    return result.design.tables.title or result.design.name
 
 
 def legend_below(ax: Axes, entries: int) -> None:

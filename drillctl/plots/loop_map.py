@@ -1,20 +1,15 @@
-"""Figures of the loop over two parameters, and the boundary of the stable gains."""
+"""Figures of the loop over two parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.colorbar import Colorbar
-from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
+from matplotlib.colors import Colormap, LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path
-from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from drillctl import units
@@ -22,19 +17,17 @@ from drillctl.design import parameter
 from drillctl.errors import InputError, nearest
 from drillctl.linear.boundary import GainBoundary
 from drillctl.plots import style
-from drillctl.plots.frequency import listed
-from drillctl.plots.map import axis_label
+from drillctl.plots.colour_bars import beyond, colours, plain_ticks
+from drillctl.plots.gain_boundary import DIAMOND, GAINS, rings_of, shown_gains
+from drillctl.plots.plane import legend_under, plane
 
 if TYPE_CHECKING:
     from drillctl.studies.loop_maps import LoopMap
 
 Array = NDArray[np.float64]
 
-GAINS = ("controller.kp", "controller.ki")
 EMPTY = "#D9D9D9"
 """Cells without a value."""
-STABLE = "#D5E8DF"
-"""Stable gains."""
 NAMES = {
     "slope_margin": "slope margin D*",
     "deciding_frequency": "deciding frequency",
@@ -93,107 +86,23 @@ def loop_map(
         Another number of parameters than two, a quantity that was not mapped, or a boundary
         over parameters that are not the gains.
     """
-    if len(result.axes) != 2:
-        raise InputError(f"a map shows 2 parameters, the result has {len(result.axes)}")
     if quantity not in result.values:
         raise InputError(f"no {quantity!r} in this map; {nearest(quantity, result.values)}")
     paths = tuple(axis.path for axis in result.axes)
     if boundary is not None and set(paths) != set(GAINS):
         raise InputError(f"a boundary of gains does not fit {' and '.join(paths)}", "boundary")
-    figure, ax = style.axes_or_new(ax, 8.0, 6.2)
-    (x, x_label), (y, y_label) = (axis_label(axis, system) for axis in result.axes)
+    figure, ax, x, y = plane(result, ax, 6.2, system)
     _colour(figure, ax, result, quantity, x, y, system)
     _stability(ax, result, x, y)
     if boundary is not None:
         _outline(ax, boundary, paths, system)
     _marks(ax, result, quantity, system)
-    style.dress(ax, x_label, y_label, result.design.tables.title or result.design.name)
-    ax.grid(visible=False)
     ax.set_xlim(_edges(x))
     ax.set_ylim(_edges(y))
     if ax.get_legend_handles_labels()[0]:
-        ax.legend(
-            loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, fontsize=style.SMALL,
-            frameon=False,
-        )  # fmt: skip
+        legend_under(ax, 2)
     figure.supxlabel(_caption(result, quantity), fontsize=style.SMALL)
     return figure
-
-
-def gain_boundary(
-    result: GainBoundary | Sequence[GainBoundary],
-    ax: Axes | None = None,
-    system: units.System = "si",
-) -> Figure:
-    """Draw the curve of poles on the imaginary axis and the stable gains it bounds.
-
-    Parameters
-    ----------
-    result : GainBoundary or sequence of GainBoundary
-        From `drillctl.linear.gain_boundary`. The first is coloured by frequency, its region
-        filled; of others, such as the continuum, curve and outline are dashed.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the gains.
-
-    Returns
-    -------
-    Figure
-        Each mode brings a branch; those of high modes are thin.
-
-    Raises
-    ------
-    InputError
-        Nothing to draw.
-    """
-    boundaries = listed(result)
-    first = boundaries[0]
-    figure, ax = style.axes_or_new(ax, 7.8, 5.8)
-    sides = [
-        named_values(path, _GAIN_UNITS[path], np.array(span), system)
-        for path, span in zip(GAINS, first.window, strict=True)
-    ]
-    _fill(ax, first, system)
-    _coloured(figure, ax, first, system)
-    for number, other in enumerate(boundaries[1:]):
-        _dashed(ax, other, number, system)
-    own = first.design.top_drive.gains()
-    kp, ki = _gains(own[0], own[1], system)
-    if kp > 0.0 or ki > 0.0:
-        ax.plot(kp, ki, "D", **_DIAMOND, label="gains of the design")
-    style.dress(ax, sides[0][1], sides[1][1], first.design.tables.title or first.design.name)
-    ax.set_xlim(*sides[0][0])
-    ax.set_ylim(*sides[1][0])
-    ax.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, fontsize=style.SMALL,
-        frameon=False,
-    )  # fmt: skip
-    figure.supxlabel(f"falling slope of the rock {first.slope:.4g} N m s", fontsize=style.SMALL)
-    return figure
-
-
-_GAIN_UNITS = {"controller.kp": "N*m*s/rad", "controller.ki": "N*m/rad"}
-_DIAMOND: dict[str, Any] = {
-    "color": "white", "markeredgecolor": style.BLACK, "markersize": 8, "markeredgewidth": 1.4,
-    "linestyle": "none", "zorder": 6,
-}  # fmt: skip
-
-
-def colours(low: float, high: float) -> Colormap:
-    """A part of viridis: 0.2 to 1 under black lines, 0 to 0.88 for lines on white."""
-    from matplotlib import colormaps
-
-    return ListedColormap(colormaps["viridis"](np.linspace(low, high, 256)))
-
-
-def named_values(
-    path: str, unit: str, values: Array, system: units.System
-) -> tuple[np.ndarray, str]:
-    """Values of a parameter in the units people read, and the label of their axis."""
-    from drillctl.studies.grid import Axis
-
-    return axis_label(Axis(path, unit, values), system)
 
 
 def _diverging() -> Colormap:
@@ -226,23 +135,6 @@ def _look(quantity: str, values: Array) -> _Look:
     return _Look(Normalize(low, high), plain, _round_levels(low, high))
 
 
-def _extend(values: Array, norm: Normalize) -> Literal["neither", "both", "min", "max"]:
-    """On which side values go beyond the limits of the colours."""
-    finite = values[np.isfinite(values)]
-    low, high = norm.vmin, norm.vmax
-    below = low is not None and bool((finite < low).any())
-    above = high is not None and bool((finite > high).any())
-    if below and above:
-        return "both"
-    return "min" if below else "max" if above else "neither"
-
-
-def _plain_ticks(bar: Colorbar) -> None:
-    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    bar.ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-    bar.ax.yaxis.set_minor_formatter(NullFormatter())
-
-
 def _round_levels(low: float, high: float) -> tuple[float, ...]:
     ticks = MaxNLocator(7).tick_values(low, high)
     return tuple(float(v) for v in ticks if low < v < high)
@@ -261,9 +153,9 @@ def _colour(
         x, y, np.ma.masked_invalid(values.T), cmap=look.colours, norm=look.norm,
         shading="nearest", rasterized=True,
     )  # fmt: skip
-    bar = figure.colorbar(mesh, ax=ax, extend=_extend(values, look.norm), pad=0.02)
+    bar = figure.colorbar(mesh, ax=ax, extend=beyond(values, look.norm), pad=0.02)
     if isinstance(look.norm, LogNorm):
-        _plain_ticks(bar)
+        plain_ticks(bar)
     name = NAMES.get(quantity, quantity)
     bar.set_label(name if unit in ("", "1") else f"{name} ({unit})", fontsize=style.LABEL)
     bar.ax.tick_params(labelsize=style.SMALL)
@@ -285,8 +177,8 @@ def _stability(ax: Axes, result: LoopMap, x: Array, y: Array) -> None:
 def _outline(
     ax: Axes, boundary: GainBoundary, paths: tuple[str, ...], system: units.System
 ) -> None:
-    for number, ring in enumerate(_rings(boundary)):
-        kp, ki = _gains(ring[:, 0], ring[:, 1], system)
+    for number, ring in enumerate(rings_of(boundary)):
+        kp, ki = shown_gains(ring[:, 0], ring[:, 1], system)
         x, y = (kp, ki) if paths == GAINS else (ki, kp)
         label = "stable gains, closed form" if number == 0 else "_"
         ax.plot(x, y, color=style.VERMILLION, linewidth=1.4, linestyle="--", label=label)
@@ -309,7 +201,7 @@ def _marks(ax: Axes, result: LoopMap, quantity: str, system: units.System) -> No
         x, y = (
             _shown(value, axis.unit, system) for axis, value in zip(result.axes, own, strict=True)
         )
-        ax.plot(x, y, "D", **_DIAMOND, label="the design")
+        ax.plot(x, y, "D", **DIAMOND, label="the design")
 
 
 def _own(result: LoopMap, path: str) -> float:
@@ -330,14 +222,6 @@ def _text(margin: float, system: units.System) -> str:
 
 def _shown(value: float, unit: str, system: units.System) -> float:
     return float(units.displayed(value, unit, system)[0])
-
-
-def _gains(kp: Any, ki: Any, system: units.System) -> tuple[Any, Any]:
-    """Gains in the units of the axes."""
-    return (
-        units.displayed(kp, _GAIN_UNITS["controller.kp"], system)[0],
-        units.displayed(ki, _GAIN_UNITS["controller.ki"], system)[0],
-    )
 
 
 def _edges(values: Array) -> tuple[float, float]:
@@ -362,64 +246,3 @@ def _caption(result: LoopMap, quantity: str) -> str:
         if -1e-3 * most < least < 0.0:
             notes.append(f"none under {least:.1e}/s: some mode hardly decays")
     return "; ".join(notes)
-
-
-def _rings(boundary: GainBoundary) -> list[Array]:
-    """Outer and inner rings of the region, Kp and Ki by rows."""
-    return [
-        np.asarray(ring.coords)
-        for part in boundary.region.geoms
-        for ring in (part.exterior, *part.interiors)
-    ]
-
-
-def _fill(ax: Axes, boundary: GainBoundary, system: units.System) -> None:
-    rings = _rings(boundary)
-    if not rings:
-        ax.fill([], [], facecolor=STABLE, label="no stable gains within the picture")
-        return
-    paths = [Path(np.column_stack(_gains(r[:, 0], r[:, 1], system)), closed=True) for r in rings]
-    ax.add_patch(
-        PathPatch(
-            Path.make_compound_path(*paths), facecolor=STABLE, edgecolor="none", zorder=0.5,
-            label="stable gains",
-        )
-    )  # fmt: skip
-
-
-def _coloured(figure: Figure, ax: Axes, boundary: GainBoundary, system: units.System) -> None:
-    """Branches coloured by frequency, the lower the heavier."""
-    if not boundary.branches:
-        return
-    pieces, middle = [], []
-    for branch in boundary.branches:
-        points = np.column_stack(_gains(branch.kp, branch.ki, system))
-        pieces.append(np.stack([points[:-1], points[1:]], axis=1))
-        middle.append(np.sqrt(branch.omega[:-1] * branch.omega[1:]) / (2.0 * np.pi))
-    frequency = np.concatenate(middle)
-    # Towards Ki = 0 a branch goes to no frequency at all; the modes are to be told apart.
-    high = float(frequency.max())
-    low = min(max(float(frequency.min()), 1e-3 * high), 0.99 * high)
-    norm = LogNorm(low, high)
-    share = np.log(np.maximum(frequency, low) / low) / np.log(high / low)
-    lines = LineCollection(
-        list(np.concatenate(pieces)), cmap=colours(0.0, 0.88),
-        norm=norm, linewidths=4.0 - 3.3 * share,
-        capstyle="round", zorder=3,
-    )  # fmt: skip
-    lines.set_array(frequency)
-    ax.add_collection(lines)
-    bar = figure.colorbar(lines, ax=ax, extend=_extend(frequency, norm), pad=0.02)
-    _plain_ticks(bar)
-    bar.set_label("frequency of the poles on the axis (Hz)", fontsize=style.LABEL)
-    bar.ax.tick_params(labelsize=style.SMALL)
-
-
-def _dashed(ax: Axes, boundary: GainBoundary, number: int, system: units.System) -> None:
-    dashes = style.DASHES[1 + number % (len(style.DASHES) - 1)]
-    name = "continuum" if boundary.model == "wave" else boundary.model.replace("-", " ")
-    for place, branch in enumerate(boundary.branches):
-        ax.plot(
-            *_gains(branch.kp, branch.ki, system), color=style.BLACK, linewidth=0.9,
-            linestyle=dashes, zorder=4, label=name if place == 0 else "_",
-        )  # fmt: skip

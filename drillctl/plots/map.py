@@ -11,30 +11,15 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.errors import InputError
+from drillctl.plots.plane import axis_label, legend_under, origin_of, plane, title_of
 from drillctl.plots.style import BLACK, LINE, SMALL, VERMILLION, axes_or_new, dress
 from drillctl.simulation.measures import STATUSES
 
 if TYPE_CHECKING:
-    from drillctl.studies import Axis, Sweep
-
-NAMES = {
-    "controller.kp": "Kp",
-    "controller.ki": "Ki",
-    "operating_point.speed": "set speed",
-    "operating_point.weight_on_bit": "weight on bit",
-}
-"""What the usual parameters are called on an axis; others keep their path."""
-
+    from drillctl.studies import Sweep
 
 MOST_COLOURED = 2000
 """Cells along an axis that are coloured: more than a picture has points along it."""
-
-
-def axis_label(axis: Axis, system: units.System) -> tuple[np.ndarray, str]:
-    """Values of an axis in the units people read, and its label."""
-    values, unit = units.displayed(axis.values, axis.unit, system)
-    name = NAMES.get(axis.path, axis.path)
-    return values, f"{name} ({unit})" if unit else name
 
 
 def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = "si") -> Figure:
@@ -59,11 +44,7 @@ def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = 
     InputError
         The result has another number of parameters than two.
     """
-    if len(result.axes) != 2:
-        raise InputError(f"a map shows 2 parameters, the result has {len(result.axes)}")
-    figure, ax = axes_or_new(ax, 8.0, 6.0)
-    x, x_label = axis_label(result.axes[0], system)
-    y, y_label = axis_label(result.axes[1], system)
+    figure, ax, x, y = plane(result, ax, 6.0, system)
     top = 2.0 * result.levels[-1]
     i, j = (slice(None, None, -(-len(a) // MOST_COLOURED)) for a in result.axes)
     mesh = ax.pcolormesh(
@@ -80,11 +61,7 @@ def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = 
         ax.clabel(lines, fmt=lambda level: f"{level:g}", fontsize=SMALL, inline_spacing=2)
         bar.add_lines(lines)
     _mark_cells(result, ax, x, y)
-    dress(ax, x_label, y_label, result.design.tables.title or result.design.name)
-    ax.grid(visible=False)
-    ax.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, fontsize=SMALL, frameon=False
-    )
+    legend_under(ax, 3)
     figure.supxlabel(_caption(result), fontsize=SMALL)
     return figure
 
@@ -123,12 +100,10 @@ def _caption(result: Sweep) -> str:
         worst = "none finished" if audit.worst is None else f"worst {audit.worst:.1e}"
         checked = f"audit: {audit.verdict} ({len(audit.cells)} cells, {worst} relative in J1)"
     table = result.design.tables.simulation
-    status = result.design.tables.status
-    origin = f"string {status}; " if status == "reconstructed" else ""
     scheme = "step and modes by the string"
     if result.step is not None:
         scheme = f"step {result.step * 1e3:g} ms, {result.modes} modes"
-    return f"{origin}{table.duration:g} s, {scheme}; {checked}"
+    return f"{origin_of(result)}{table.duration:g} s, {scheme}; {checked}"
 
 
 def sweep_line(result: Sweep, ax: Axes | None = None, system: units.System = "si") -> Figure:
@@ -164,7 +139,7 @@ def sweep_line(result: Sweep, ax: Axes | None = None, system: units.System = "si
             f"{level:g}", (1.0, level), xycoords=("axes fraction", "data"), fontsize=SMALL,
             xytext=(3, -3), textcoords="offset points",
         )  # fmt: skip
-    dress(ax, label, "J1 (s)", result.design.tables.title or result.design.name)
+    dress(ax, label, "J1 (s)", title_of(result))
     ax.legend(fontsize=SMALL, frameon=False)
     figure.supxlabel(_caption(result), fontsize=SMALL)
     return figure

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import parameter
 from drillctl.errors import InputError, shown
-from drillctl.plots.comparison import WIDEST, case_colour, legend_below, title_of
-from drillctl.plots.map import axis_label
+from drillctl.plots.comparison import WIDEST, case_colour, legend_below
+from drillctl.plots.plane import axis_label, title_of
 from drillctl.plots.style import BLACK, DASHES, SMALL, TITLE, axes_or_new, dress, grid_or_new
 
 if TYPE_CHECKING:

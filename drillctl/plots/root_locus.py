@@ -15,7 +15,8 @@ from drillctl import units
 from drillctl.errors import InputError
 from drillctl.linear.root_loci import RootLocus
 from drillctl.plots import style
-from drillctl.plots.loop_map import colours, named_values
+from drillctl.plots.colour_bars import colours
+from drillctl.plots.plane import named_values
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]

@@ -11,9 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from drillctl import units
-from drillctl.errors import InputError
-from drillctl.plots.map import axis_label
-from drillctl.plots.style import BLACK, BLUE, SMALL, VERMILLION, axes_or_new, dress
+from drillctl.plots.plane import legend_under, plane
+from drillctl.plots.style import BLACK, BLUE, SMALL, VERMILLION
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -59,23 +58,14 @@ def three_regions(
     InputError
         The result has another number of parameters than two.
     """
-    if len(result.axes) != 2:
-        raise InputError(f"regions are shown over 2 parameters, the result has {len(result.axes)}")
-    figure, ax = axes_or_new(ax, 8.0, 7.2)
-    x, x_label = axis_label(result.axes[0], system)
-    y, y_label = axis_label(result.axes[1], system)
+    figure, ax, x, y = plane(result, ax, 7.2, system, "regions are shown over")
     handles = [
         *_regions(result, ax, x, y),
         *(h for name in _MARKS for h in _marked(result, name, ax, x, y)),
     ]
     ax.set_xlim(*_edges(x)[[0, -1]])
     ax.set_ylim(*_edges(y)[[0, -1]])
-    dress(ax, x_label, y_label, result.design.tables.title or result.design.name)
-    ax.grid(visible=False)
-    ax.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2,
-        fontsize=SMALL, frameon=False,
-    )  # fmt: skip
+    legend_under(ax, 2, handles, drop=0.1)
     figure.supxlabel(_caption(result), fontsize=SMALL)
     return figure
 

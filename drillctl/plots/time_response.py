@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.design import parameter
-from drillctl.plots.map import NAMES
+from drillctl.plots.plane import NAMES
 from drillctl.plots.style import BLUE, SMALL, VERMILLION, dress, grid_or_new
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.errors import InputError
-from drillctl.plots.map import NAMES
+from drillctl.plots.plane import NAMES
 from drillctl.plots.style import COLOURS, DASHES, LINE, SMALL, axes_or_new, dress, grid_or_new
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from drillctl import units
 from drillctl.errors import InputError
-from drillctl.plots.map import axis_label
+from drillctl.plots.plane import axis_label
 from drillctl.plots.style import BLACK, BLUE, LINE, SMALL, VERMILLION, dress, grid_or_new
 from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER, needed
 
