@@ -92,7 +92,18 @@ def _read(design: Design, path: str, entry: RangeTable) -> Tuned:
     if path.startswith("simulation.") or target.whole:
         raise InputError("is not a number of the rig that can be tuned", where)
     if not low < high:
-        raise InputError(f"min {entry.min} must be less than max {entry.max}", where)
+        raise InputError(
+            f"min {entry.min} must be less than max {entry.max}: the bounds are "
+            + ("reversed" if high < low else "equal"),
+            where,
+        )
+    if path in design.tables.uncertain:
+        raise InputError("is drawn in [uncertain], and cannot be tuned as well", where)
+    for key, end in (("min", low), ("max", high)):
+        try:
+            design.replace({path: units.SI(end)})
+        except InputError as error:
+            raise InputError(f"no design has it: {error.problem}", f"{where}.{key}") from None
     return Tuned(path, target.si_unit, low, high)
 
 
