@@ -11,7 +11,6 @@ from drillctl.design.base import Table, number_or_quantity
 from drillctl.design.uncertain_tables import flattened
 from drillctl.errors import InputError
 
-
 FRESH = 1_000_003
 """From the seed of a search to that of its certificate, where none is given."""
 

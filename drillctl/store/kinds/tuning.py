@@ -17,8 +17,8 @@ from drillctl.studies.robust.certificate import Certificate
 from drillctl.studies.robust.fresh import FreshRuns
 from drillctl.studies.robust.search import Tuning
 from drillctl.studies.robust.tolerance import Neighbourhood, Tolerance
-from drillctl.studies.robust.tune import Tune
 from drillctl.studies.robust.tune_data import drawn_name
+from drillctl.studies.robust.tune_study import Tune
 from drillctl.studies.robust.tuned import put, tuned_parameters
 
 if TYPE_CHECKING:

@@ -113,6 +113,18 @@ class Certificate:
         return int(np.count_nonzero(((audit.batch <= level) != (audit.reference <= level))[known]))
 
     @property
+    def audit_verdict(self) -> str:
+        """`ok` if both solvers put every audited draw on the same side of the level.
+
+        `look` if they do not, or if the reference solver failed; `none` without audited draws.
+        How far two solvers are apart on a draw that sticks to the end says little here.
+        """
+        if not len(self.audit.cells):
+            return "none"
+        fine = np.isfinite(self.audit.reference).all() and self.other_side == 0
+        return "ok" if fine else "look"
+
+    @property
     def message(self) -> str:
         """The verdict in a sentence."""
         low, high = self.runs.interval
@@ -145,7 +157,12 @@ class Certificate:
             "margins": self.margins or None,
             "no_margins": self.no_margins or None,
             "worst": self._worst(),
-            "audit": self.audit.summary() | {"other_side_of_level": self.other_side},
+            "audit": {
+                "realizations": len(self.audit.cells),
+                "worst_relative_difference": self.audit.worst,
+                "other_side_of_level": self.other_side,
+                "verdict": self.audit_verdict,
+            },
             "tolerance": {one.path: _of(one) for one in self.tolerances},
             "neighbourhood": {
                 "parameters": [axis.path for axis in self.neighbourhood.axes],
@@ -225,9 +242,7 @@ def _margins(design: Design) -> tuple[dict[str, Any], str]:
     return {key: found[key] for key in MARGINS}, ""
 
 
-def _audit(
-    design: Design, fresh: Fresh, runs: FreshRuns, count: int, progress: Progress
-) -> Audit:
+def _audit(design: Design, fresh: Fresh, runs: FreshRuns, count: int, progress: Progress) -> Audit:
     """Some draws by the reference solver, spread over what lies under the level and beyond."""
     numbers = choose_cells(runs.j1, (runs.level,), count)
     design = beyond_the_table(design, tuple(fresh.drawn))

@@ -1,9 +1,9 @@
-"""How far gains may drift: each alone until too few realizations stay under the level, and two
-together as a map about the optimum.
+"""How far gains may drift: each alone, and two together as a map about the optimum.
 
-All at the draws of the certificate. A line from the optimum to a bound is looked at close by
-first, then ever further apart, so that the nearest place where the probability falls below what
-is required is found and not one behind it; bisection then tells it.
+A gain may drift until too few realizations stay under the level, all at the draws of the
+certificate. A line from the optimum to a bound is looked at close by first, then ever further
+apart, so that the nearest place where the probability falls below what is required is found and
+not one behind it; bisection then tells it.
 """
 
 from __future__ import annotations

@@ -11,12 +11,14 @@ from drillctl.studies.draws import uncertain_parameters
 if TYPE_CHECKING:
     import xarray
 
-    from drillctl.studies.robust.tune import Tune
+    from drillctl.studies.robust.tune_study import Tune
 
 
 def dataset(result: Tune) -> xarray.Dataset:
-    """J1 of the gains and of each baseline at the fresh draws, the drawn values, audited draws,
-    the lines that tolerances were read from, and the probability about the optimum.
+    """J1 of the gains and of each baseline at the fresh draws, and what goes with it.
+
+    That is the drawn values, the audited draws, the lines that tolerances were read from, and
+    the probability about the optimum.
 
     Parameters
     ----------
@@ -41,7 +43,9 @@ def dataset(result: Tune) -> xarray.Dataset:
             for path, column in certificate.drawn.items()
         },
     }
-    coordinates = {"baseline": ("baseline", [one.name for one in run])}
+    # As objects, which zarr keeps as text of any length.
+    names = np.array([one.name for one in run], dtype=object)
+    coordinates = {"baseline": ("baseline", names)}
     for k, one in enumerate(certificate.tolerances):
         made[f"line_{k}_value"] = (f"line_{k}", one.values, {"units": one.unit, "of": one.path})
         made[f"line_{k}_probability"] = (f"line_{k}", one.probability)

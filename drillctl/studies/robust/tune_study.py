@@ -91,8 +91,7 @@ class Tune:
 
     @cached_property
     def data(self) -> xarray.Dataset:
-        """J1 at every fresh realization, of the gains and of each baseline, and the map about
-        the optimum."""
+        """J1 of gains and baselines at the fresh realizations; probability about the optimum."""
         from drillctl.studies.robust.tune_data import dataset
 
         return dataset(self)
