@@ -44,6 +44,8 @@ def _gains(result: Tune, system: units.System) -> None:
     for one, tuned in zip(result.certificate.tolerances, result.tuning.tuned, strict=True):
         factor, label = units.displayed(1.0, one.unit, system)
         low, high = (sized(end * factor, 6) for end in (one.low, one.high))
+        if result.certificate.runs.probability < result.certificate.required:
+            low = high = "-"  # it is below already
         rows.append([
             f"{one.path} ({label})" if label else one.path,
             sized(one.value * factor, 6),

@@ -71,11 +71,23 @@ class Tune:
             return self.tuning.message
         if self.certificate.passed:
             return f"{self.tuning.message}; {self.certificate.message}"
-        found = self.certificate.message
+        found = self.certificate.message + self._nearer
         if self.tuning.share < self.certificate.required:
             return f"{self.tuning.message}; {found}"
         at = ", ".join(f"{path} = {value:.6g}" for path, value in self.gains.items())
         return f"{found}; the closest found is {at}"
+
+    @property
+    def _nearer(self) -> str:
+        """The baseline that keeps the level most often, if it does so more than what was found.
+
+        The least quantile is blind to the probability where no gains reach the level.
+        """
+        run = [one for one in self.baselines if one.runs is not None]
+        best = max(run, key=lambda one: one.runs.hits if one.runs else 0, default=None)
+        if best is None or best.runs is None or best.runs.hits <= self.certificate.runs.hits:
+            return ""
+        return f" (the baseline {best.name!r} has {best.runs.probability:.4f} at the same)"
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI: of the search, with `certificate` and `baselines`."""
