@@ -161,7 +161,7 @@ def test_certificates_of_a_quasi_random_search_are_of_independent_draws():
 
 
 def test_the_seed_of_the_search_certifies_nothing():
-    with pytest.raises(InputError, match="certificate.seed 3 is that of the search"):
+    with pytest.raises(InputError, match=r"certificate\.seed 3 is that of the search"):
         tuning(certificate={"seed": 3})
 
 
