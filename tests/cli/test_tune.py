@@ -64,7 +64,7 @@ def test_folder_holds_a_design_ready_to_run_tables_and_pictures(quick, call):
     result = drillctl.open("r")
     tuned = drillctl.load("r/tuned.toml")
     assert tuned.top_drive.kp == result.gains["controller.kp"]
-    assert result.design.top_drive.kp == 200.0  # as it was asked for
+    assert result.design.top_drive.kp == 625.0  # as it was asked for
     with Path("r/baselines.csv").open(encoding="utf-8") as stream:
         rows = {row["name"]: row for row in csv.DictReader(stream)}
     assert float(rows["tuned"]["probability"]) == result.certificate.runs.probability
