@@ -1,6 +1,7 @@
 """The command `tune`: its answers, files, messages and exit codes."""
 
 import csv
+import ctypes
 import os
 import subprocess
 import sys
@@ -10,6 +11,8 @@ import pytest
 from strict_json import strict
 
 import drillctl
+from drillctl.cli import run
+from drillctl.errors import InputError
 
 SHIPPED = "robust-gains-140kn"
 SMALL = [
@@ -203,3 +206,18 @@ def test_the_solver_speaks_on_stderr_and_only_if_asked():
     assert strict(loud.stdout)["gains"] == strict(quiet.stdout)["gains"]
     assert "Ipopt" in loud.stderr
     assert "Ipopt" not in quiet.stderr
+
+
+def test_what_a_library_prints_by_c_goes_to_stderr_too(capfd, monkeypatch):
+    def loud(*arguments, **options):
+        ctypes.CDLL(None).puts(b"a solver speaks")
+        os.write(1, b"so does another\n")
+        print("and Python")  # noqa: T201
+        raise InputError("enough")
+
+    monkeypatch.setattr(drillctl, "tune", loud, raising=False)
+    assert run(["tune", SHIPPED, "--json"]) == 2
+    said = capfd.readouterr()
+    assert said.out == ""
+    for words in ("a solver speaks", "so does another", "and Python", "enough"):
+        assert words in said.err

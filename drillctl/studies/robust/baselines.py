@@ -103,7 +103,7 @@ def baselines(
         ),
     ]
     if exhaustive is not None:
-        made.append(("exhaustive grid", lambda: _exhaustive(exhaustive, fresh, progress)))
+        made.append(("exhaustive grid", lambda: _exhaustive(exhaustive, fresh)))
     progress.begin("baselines", len(made))
     found = []
     for name, make in made:
@@ -166,7 +166,7 @@ def _lines(tuned: tuple[Tuned, ...]) -> list[Array]:
     return [np.linspace(t.low, t.high, POINTS) for t in tuned]
 
 
-def _exhaustive(judge: Judge, fresh: Fresh, progress: Progress) -> Made:
+def _exhaustive(judge: Judge, fresh: Fresh) -> Made:
     """The best of a grid by the plain objective at all realizations of the search."""
     begin, before = time.perf_counter(), judge.trajectories
     grid = np.meshgrid(*_lines(judge.tuned), indexing="ij")
