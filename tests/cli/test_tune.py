@@ -17,7 +17,7 @@ from drillctl.errors import InputError
 SHIPPED = "robust-gains-140kn"
 SMALL = [
     "--realizations", "24", "--certificate", "150", "--set", "tune.starts=1",
-    "--set", "tune.certificate.audit=1",
+    "--set", "tune.certificate.audit=1", "--set", "simulation.accuracy=fast",
 ]  # fmt: skip
 
 
