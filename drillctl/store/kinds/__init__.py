@@ -1,12 +1,13 @@
 """Kinds of result: what each was asked for, and how it is read back."""
 
-from drillctl.store.kinds import comparisons, doctor, linear, maps, runs, uncertainty
+from drillctl.store.kinds import advantage, comparisons, doctor, linear, maps, runs, uncertainty
 
 KINDS = (
     *linear.KINDS,
     *runs.KINDS,
     *maps.KINDS,
     *comparisons.KINDS,
+    *advantage.KINDS,
     *uncertainty.KINDS,
     *doctor.KINDS,
 )

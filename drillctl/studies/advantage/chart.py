@@ -46,6 +46,14 @@ class Chart:
     policies: tuple[str, ...]
     figures: dict[str, Array]
 
+    def at_speed(self, speed: float) -> Chart | None:
+        """The part at one set speed (rad/s), where it is among the speeds."""
+        j = np.flatnonzero(self.speeds == speed)
+        if not j.size:
+            return None
+        figures = {name: values[:, :, j] for name, values in self.figures.items()}
+        return Chart(self.weights, self.speeds[j], self.policies, figures)
+
     def significant(self, policy: int) -> NDArray[np.bool_]:
         """Where the interval of a policy's advantage excludes zero, shape (weights, speeds)."""
         low, high = (self.figures[f"advantage_{end}"][policy] for end in ("low", "high"))

@@ -52,16 +52,18 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
     compared = policies(design)
     checked(compared)
     table = design.tables.advantage
-    own = design.speed
-    cells = (len(table.speeds) + 1) * len(table.weights) * len(compared)
+    speeds = table.speeds if design.speed in table.speeds else (*table.speeds, design.speed)
+    cells = len(speeds) * len(table.weights) * len(compared)
     progress.begin("comparing", 2 * len(compared) + 2 * len(ALL_TERMS) + cells + len(table.delays))
     fresh = Fresh(design)
     optima = own_optima(compared, progress)
     found = cases(compared, optima, fresh, progress)
     areas = regions(compared, optima, progress)
     curve = delay_curve(compared, optima, fresh, progress)
-    front = chart(compared, table.weights, (own,), fresh, progress)
     over = chart(compared, table.weights, table.speeds, fresh, progress)
+    front = over.at_speed(design.speed) or chart(
+        compared, table.weights, (design.speed,), fresh, progress
+    )
     return Advantage(
         design=design,
         cases=found,
