@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 MARKS = "osD"
 BAND = 0.18
 """How much of its colour fills an interval."""
+HARM = 0.6
+"""Harm that is shown, over the objective of the constant weight."""
 WIDEST = 110
 """Longest line of a caption (characters)."""
 
@@ -121,6 +123,10 @@ def advantage_map(
         dress(axes, f"set speed ({rpm})", f"nominal weight on bit ({unit})",
               result.chart.policies[k])  # fmt: skip
         axes.grid(visible=False)
+        axes.set_xticks(result.chart.speeds * turning)
+        axes.set_yticks(result.chart.weights * factor)
+        for formatted in (axes.xaxis, axes.yaxis):
+            formatted.set_major_formatter("{x:.4g}")
     if mesh is not None:
         bar = figure.colorbar(mesh, ax=panels)
         bar.set_label(f"advantage in the {_objective(result)} (s)", fontsize=SMALL)
@@ -171,17 +177,13 @@ def advantage_delay(
                           markersize=8.0, markeredgecolor=BLACK, capsize=4.0)  # fmt: skip
     axes.axhline(0.0, color=BLACK, linewidth=0.9)
     axes.set_xlim(0.0, max(float(found.delays[-1]), 1e-3) * 1.02)
-    axes.set_yscale("symlog", linthresh=5.0)
-    ticks = [-50.0, -20.0, -10.0, -5.0, 0.0, 5.0, 10.0, 20.0]
-    low, high = axes.get_ylim()
-    axes.set_yticks([t for t in ticks if low <= t <= high], minor=False)
-    axes.set_yticks([], minor=True)
-    axes.yaxis.set_major_formatter("{x:g}")
+    if np.isfinite(found.constant):  # harm goes far below: what matters is where it begins
+        axes.set_ylim(bottom=max(axes.get_ylim()[0], -HARM * found.constant))
     dress(axes, "delay of the bit speed (s)", f"advantage in the {_objective(result)} (s)",
           f"Over the constant weight's {found.constant:.1f} s")  # fmt: skip
     axes.legend(fontsize=SMALL, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13))
     if ax is None:
-        more = "Hoist lag and limits are the same at every delay. Linear within 5 s of zero."
+        more = "Hoist lag and limits are the same at every delay. Harm goes on below the picture."
         figure.supxlabel(_caption(result, more), fontsize=SMALL)
     return figure
 

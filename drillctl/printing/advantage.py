@@ -9,6 +9,7 @@ import numpy as np
 from drillctl import units
 from drillctl.console import line, table
 from drillctl.printing.words import title_of
+from drillctl.studies.drawn_runs import EQUAL_TO
 
 if TYPE_CHECKING:
     from drillctl.studies.advantage import Advantage
@@ -34,6 +35,7 @@ def advantage(result: Advantage, system: units.System) -> None:
     _map(result.chart, system)
     _delay(result)
     _bounds(result)
+    _unequal(result)
     line(
         f"{summary['realizations']} fresh draws, seed {result.seed}; tuned at "
         f"{result.design.tables.tune.realizations}, seed {result.design.tables.tune.seed}"
@@ -147,6 +149,12 @@ def _crossing(found: Crossing, longest: float) -> str:
         f"beyond {longest:g}" if end is None else f"{end:.3f}" for end in found.interval_95
     )
     return f"{found.delay:.3f} s (95 % interval {low} to {high})"
+
+
+def _unequal(result: Advantage) -> None:
+    for case in result.cases:
+        if abs(case.off) > EQUAL_TO:
+            line(f"{case.name}: not equal, off by {case.off:.1%} at the nearest nominal weight")
 
 
 def _bounds(result: Advantage) -> None:

@@ -44,7 +44,7 @@ def read_advantage(design: Design, data: xarray.Dataset, summary: dict[str, Any]
 
 def _case(told: dict[str, Any], data: xarray.Dataset) -> Case:
     return Case(
-        **{key: told[key] for key in ("policy", "terms", "gains", "shift", "tuned_value")},
+        **{key: told[key] for key in ("policy", "terms", "gains", "shift", "off", "tuned_value")},
         at_bounds=tuple(told["at_bounds"]),
         objective=_estimate(told["objective"]),
         objective_less=_estimate(told["objective_difference"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,6 +46,8 @@ class Case:
         Gains that lie on a bound.
     shift : float
         Added to the nominal weight (N).
+    off : float
+        What the terms' mean is off by at that shift, over that of the constant weight.
     tuned_value : float
         Objective at the draws of the tuning (s), which flatters.
     objective : Estimate
@@ -60,6 +63,7 @@ class Case:
     gains: dict[str, float]
     at_bounds: tuple[str, ...]
     shift: float
+    off: float
     tuned_value: float
     objective: Estimate
     objective_less: Estimate
@@ -113,6 +117,7 @@ class Case:
             "gains": self.gains,
             "at_bounds": list(self.at_bounds),
             "shift": self.shift,
+            "off": self.off,
             "tuned_value": self.tuned_value,
             "objective": self.objective.summary(),
             "objective_difference": self.objective_less.summary(),
@@ -144,10 +149,9 @@ def own_optima(compared: Policies, progress: Progress) -> Optima:
     count = compared.constant.design.tables.tune.realizations
     constant = optimum(compared.constant, count)
     progress.advance(1)
-    ideal = optimum(compared.ideal, count, started(compared.ideal, constant))
+    ideal = optimum_beside(compared.ideal, count, constant)
     progress.advance(1)
-    starts = [*started(compared.real, constant), ideal.values]
-    real = optimum(compared.real, count, starts)
+    real = optimum_beside(compared.real, count, constant, [ideal.values])
     progress.advance(1)
     return Optima(constant, ideal, real)
 
@@ -156,11 +160,26 @@ STARTS = (0.0, 500.0, 1500.0)
 """Gains of the weight (N s/rad) that are tried with the constant weight's gains of the drive."""
 
 
-def started(policy: Policy, constant: Optimum) -> list[Array]:
-    """Gains that a policy starts from: those of the constant weight, which it contains."""
+def optimum_beside(
+    policy: Policy, realizations: int, constant: Optimum, starts: Sequence[Array] = ()
+) -> Optimum:
+    """The optimum of a policy that contains the constant weight, whose gains it starts from.
+
+    Parameters
+    ----------
+    policy : Policy
+        One whose weight does not follow is the constant weight itself.
+    realizations : int
+        Draws.
+    constant : Optimum
+        Of the constant weight, at the same weight and speed.
+    starts : sequence of ndarray
+        Further gains that are known to be good somewhere near (SI).
+    """
     if not policy.follows:
-        return [constant.values]
-    return [np.append(constant.values, gain) for gain in STARTS]
+        return constant
+    own = [np.append(constant.values, gain) for gain in STARTS]
+    return optimum(policy, realizations, [*own, *starts])
 
 
 def cases(compared: Policies, optima: Optima, fresh: Fresh, progress: Progress) -> tuple[Case, ...]:
@@ -181,13 +200,14 @@ def cases(compared: Policies, optima: Optima, fresh: Fresh, progress: Progress) 
     ground = fresh.run(baseline)
     below = ground.resampled(fresh)
     zero = Estimate(0.0, (0.0, 0.0))
-    found = [_case(compared.constant, NOMINAL, optima.constant, 0.0, ground, below, zero)]
+    start = (0.0, 0.0)
+    found = [_case(compared.constant, NOMINAL, optima.constant, start, ground, below, zero)]
     for policy, first in ((compared.ideal, optima.ideal), (compared.real, optima.real)):
         for terms in ALL_TERMS:
             on = tuned_on_terms(policy, terms, baseline, first)
             design = policy.with_gains(on.found.values)
-            shift = fresh_shift(policy, on.found.values, terms, fresh.lanes(design), ground)
-            measured = fresh.run(design, shift)
+            shift = fresh_shift(policy, terms, fresh.lanes(design), ground)
+            measured = fresh.run(design, shift[0])
             own = measured.resampled(fresh)
             apart = estimate(
                 float(less(np.array(measured.value), np.array(ground.value))), less(own, below)
@@ -198,8 +218,8 @@ def cases(compared: Policies, optima: Optima, fresh: Fresh, progress: Progress) 
 
 
 def _case(
-    policy: Policy, terms: Terms, found: Optimum, shift: float, measured: Measured,
-    resampled: Array, apart: Estimate,
+    policy: Policy, terms: Terms, found: Optimum, shift: tuple[float, float],
+    measured: Measured, resampled: Array, apart: Estimate,
 ) -> Case:  # fmt: skip
     gains = {t.path: float(v) for t, v in zip(policy.tuned, found.values, strict=True)}
     return Case(
@@ -207,7 +227,8 @@ def _case(
         terms=terms.name,
         gains={path: gains.get(path, 0.0) for path in PATHS},
         at_bounds=found.at_bounds,
-        shift=shift,
+        shift=shift[0],
+        off=shift[1],
         tuned_value=found.value,
         objective=estimate(measured.value, resampled),
         objective_less=apart,

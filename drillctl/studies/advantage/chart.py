@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.progress import Progress
-from drillctl.studies.advantage.cases import started
+from drillctl.studies.advantage.cases import optimum_beside
 from drillctl.studies.advantage.measured import Fresh, Measured, estimate, less
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import SPEED, WEIGHT, Policies
@@ -87,12 +87,13 @@ def chart(
             ground: tuple[Measured, Array] | None = None
             for k, policy in enumerate(here):
                 starts = [known[k, *at].values for at in near if (k, *at) in known]
-                if k > 0:
-                    starts += started(policy, known[0, i, j])
-                if k > 1:
-                    starts.append(known[1, i, j].values)
                 count = policy.design.tables.advantage.sweep_realizations
-                known[k, i, j] = found = optimum(policy, count, starts)
+                if k == 0:
+                    found = optimum(policy, count, starts)
+                else:
+                    starts += [known[1, i, j].values] if k > 1 else []
+                    found = optimum_beside(policy, count, known[0, i, j], starts)
+                known[k, i, j] = found
                 measured = fresh.run(policy.with_gains(found.values))
                 own = (measured, measured.resampled(fresh))
                 ground = own if ground is None else ground

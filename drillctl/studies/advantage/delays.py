@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.progress import Progress
-from drillctl.studies.advantage.cases import Optima, started
+from drillctl.studies.advantage.cases import Optima, optimum_beside
 from drillctl.studies.advantage.measured import Fresh, estimate, less
-from drillctl.studies.advantage.optimum import optimum
 from drillctl.studies.advantage.policies import DELAY, Policies
 from drillctl.studies.delay_limits import first_not_negative
 from drillctl.studies.intervals import CONFIDENCE
@@ -142,8 +141,8 @@ def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Prog
     values: tuple[list[Array], list[Array]] = ([], [])
     for delay in table.delays:
         policy = compared.real.at(DELAY, delay) if compared.real.follows else compared.real
-        starts = [*started(policy, optima.constant), optima.real.values, *gains[1][-1:]]
-        anew = optimum(policy, table.sweep_realizations, starts).values
+        starts = [optima.real.values, *gains[1][-1:]]
+        anew = optimum_beside(policy, table.sweep_realizations, optima.constant, starts).values
         for choice, own in enumerate((optima.ideal.values, anew)):
             measured = fresh.run(policy.with_gains(own))
             gains[choice].append(own)
