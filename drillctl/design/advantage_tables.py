@@ -25,8 +25,8 @@ class AdvantageTable(Table):
     by dotted path for the law that follows, such as limits, delay and hoist lag; a delay of 0.2 s
     and a hoist lag of 0.5 s where no path is given at all. `realizations` and `seed`: fresh
     draws, which everything found is measured at. `weights` and `speeds`: of front and map;
-    `delays`: of the way from the bit. Front, map and delays are tuned at `sweep_realizations`,
-    the table at `tune.realizations`. `region_points` along each axis of the regions over both
+    `delays`: of the way from the bit. Front and map are tuned at `sweep_realizations`, table
+    and delays at `tune.realizations`. `region_points` along each axis of the regions over both
     gains of the drive, at `region_realizations`. `material`: share of the constant weight's
     objective under which an advantage is called none.
     """

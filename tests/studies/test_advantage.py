@@ -13,10 +13,9 @@ from drillctl.errors import InputError
 from drillctl.progress import SILENT
 from drillctl.studies import compare
 from drillctl.studies.advantage import advantage
-from drillctl.studies.advantage.cases import cases, own_optima
 from drillctl.studies.advantage.chart import chart
 from drillctl.studies.advantage.delays import crossing, delay_curve
-from drillctl.studies.advantage.equalities import MEAN, NOMINAL, ROP, shifted_policy
+from drillctl.studies.advantage.equalities import MEAN, NOMINAL, ROP, fresh_shift, shifted_policy
 from drillctl.studies.advantage.measured import Fresh, Measured, estimate
 from drillctl.studies.advantage.optimum import optimum
 from drillctl.studies.advantage.policies import (
@@ -44,7 +43,7 @@ SMALL = {
     "advantage.region_realizations": 40,
     "advantage.weights": ["130 kN", "140 kN"],
     "advantage.speeds": ["100 rpm"],
-    "advantage.delays": ["0 s", "0.1 s", "0.3 s"],
+    "advantage.delays": ["0 s", "0.1 s", "0.5 s"],
 }
 
 # One worker: the kernels of these runs are compiled once.
@@ -270,7 +269,7 @@ def test_kept_gains_turn_to_harm_and_gains_tuned_anew_do_not(result):
     kept, anew = result.delay.kept, result.delay.anew
     assert kept.advantage[0] > 0.0 > kept.high[-1]
     low, high = kept.zero.interval_95
-    assert 0.0 < low <= kept.zero.delay <= high < 0.3
+    assert 0.0 < low <= kept.zero.delay <= high < 0.5
     np.testing.assert_array_equal(kept.gains, np.broadcast_to(kept.gains[0], kept.gains.shape))
     assert (anew.advantage > 0.0).all()
     assert anew.zero.delay is None
@@ -355,13 +354,16 @@ def test_equal_shift_at_the_edge_of_the_table_is_extrapolated(design):
 
 
 def test_terms_that_cannot_be_met_are_told(design):
-    # Gains of the drive that a constant weight stalls with: no weight drills as little.
-    weak = {"tune.parameters.controller.kp.max": 20.0, "tune.realizations": 20,
-            "advantage.realizations": 20}  # fmt: skip
-    compared = policies(design.replace(weak))
-    found = cases(compared, own_optima(compared, SILENT), Fresh(design.replace(weak)), SILENT)
-    off = [case.off for case in found if case.terms == ROP.name]
-    assert max(abs(one) for one in off) > 2e-3
+    # The weight may not go lower by more than half a kilonewton; the terms ask for three.
+    narrow = design.replace({"advantage.set.weight_on_bit.minimum": "139.5 kN"})
+    constant, ideal, _ = policies(narrow)
+    fresh = Fresh(narrow)
+    ground = fresh.run(constant.with_gains(np.array([632.0, 147.0])))
+    lanes = fresh.lanes(ideal.with_gains(np.array([1000.0, 500.0, 10e3])))
+    shift, off = fresh_shift(ideal, ROP, lanes, ground)
+    assert shift == pytest.approx(-500.0)
+    assert off > 2e-3
+    assert fresh_shift(ideal, NOMINAL, lanes, ground) == (0.0, 0.0)
 
 
 @pytest.mark.slow

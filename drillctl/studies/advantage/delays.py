@@ -135,6 +135,7 @@ def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Prog
         Told of delays.
     """
     table = compared.real.design.tables.advantage
+    draws = compared.real.design.tables.tune.realizations
     ground = fresh.run(compared.constant.with_gains(optima.constant.values))
     below = ground.resampled(fresh)
     gains: tuple[list[Array], list[Array]] = ([], [])
@@ -142,7 +143,8 @@ def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Prog
     for delay in table.delays:
         policy = compared.real.at(DELAY, delay) if compared.real.follows else compared.real
         starts = [optima.real.values, *gains[1][-1:]]
-        anew = optimum_beside(policy, table.sweep_realizations, optima.constant, starts).values
+        # As many draws as the constant weight was tuned at: fewer would fit their own draws more.
+        anew = optimum_beside(policy, draws, optima.constant, starts).values
         for choice, own in enumerate((optima.ideal.values, anew)):
             measured = fresh.run(policy.with_gains(own))
             gains[choice].append(own)
