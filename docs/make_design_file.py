@@ -86,6 +86,7 @@ TABLES = (
     ("[tune.weights]", tune_tables.TuneWeightsTable),
     ("[tune.constraints]", tune_tables.TuneConstraintsTable),
     ("[advantage]", advantage_tables.AdvantageTable),
+    ("[tune.certificate]", tune_tables.TuneCertificateTable),
 )
 
 

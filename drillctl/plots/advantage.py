@@ -165,9 +165,9 @@ def advantage_delay(
          share * found.constant, BLUE),
     )  # fmt: skip
     for number, (name, line, crossing, level, colour) in enumerate(lines):
-        axes.fill_between(found.delays, line.low, line.high, color=colour, alpha=BAND, linewidth=0)
-        axes.plot(found.delays, line.advantage, MARKS[number], color=colour, linewidth=LINE,
-                  linestyle=DASHES[number], markersize=5.0,
+        axes.fill_between(line.delays, line.low, line.high, color=colour, alpha=BAND, linewidth=0)
+        axes.plot(line.delays, line.advantage, MARKS[number], color=colour, linewidth=LINE,
+                  linestyle=DASHES[number], markersize=4.0,
                   label=f"{name}: {_vanishes(crossing, level)}")  # fmt: skip
         if crossing.delay is not None:
             longest = float(found.delays[-1])

@@ -126,7 +126,8 @@ def _delay(result: Advantage) -> None:
     for k, delay in enumerate(found.delays):
         row = [f"{delay:g} s"]
         for one in (found.kept, found.anew):
-            row.append(f"{one.advantage[k]:+.2f} ({one.low[k]:.2f} to {one.high[k]:.2f})")
+            at = int(np.searchsorted(one.delays, delay))
+            row.append(f"{one.advantage[at]:+.2f} ({one.low[at]:.2f} to {one.high[at]:.2f})")
         kp, ki, gain = found.anew.gains[k]
         rows.append([*row, f"{kp:.0f}, {ki:.0f}, {gain / 1e3:.2f}"])
     heads = ["delay", "gains of the ideal path (s)", "tuned anew (s)", "its kp, ki, K_w (kN s/rad)"]
@@ -137,7 +138,7 @@ def _delay(result: Advantage) -> None:
         f"gains tuned anew: under {share:.1%} of the constant weight's objective from "
         f"{_crossing(found.anew.material, longest)}"
     )
-    first = found.anew.indistinct_from(found.delays)
+    first = found.anew.indistinct_from
     where = f"at no delay up to {longest:g} s" if first is None else f"from {first:g} s on the grid"
     line(f"gains tuned anew: interval not above zero {where}")
 

@@ -271,6 +271,10 @@ def test_kept_gains_turn_to_harm_and_gains_tuned_anew_do_not(result):
     low, high = kept.zero.interval_95
     assert 0.0 < low <= kept.zero.delay <= high < 0.5
     np.testing.assert_array_equal(kept.gains, np.broadcast_to(kept.gains[0], kept.gains.shape))
+    # Ten steps in the step of the grid where it vanishes.
+    assert np.diff(kept.delays).min() < 0.05
+    assert kept.delays.size == 3 + 9
+    np.testing.assert_array_equal(anew.delays, result.delay.delays)
     assert (anew.advantage > 0.0).all()
     assert anew.zero.delay is None
     assert anew.zero.interval_95[1] is None

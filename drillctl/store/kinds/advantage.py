@@ -32,7 +32,7 @@ def read_advantage(design: Design, data: xarray.Dataset, summary: dict[str, Any]
         front=_chart("front", np.array(summary["front"]["speeds"]), data),
         chart=_chart("map", data["speed"].values, data),
         delay=DelayCurve(
-            data["delay"].values,
+            data["anew_delay"].values,
             summary["delay"]["constant"],
             _line("kept", data, summary["delay"]),
             _line("anew", data, summary["delay"]),
@@ -81,7 +81,8 @@ def _line(prefix: str, data: xarray.Dataset, told: dict[str, Any]) -> DelayLine:
     names = ("gains", "objective", "advantage", "low", "high")
     arrays = {name: data[f"{prefix}_{name}"].values for name in names}
     zero, material = (_crossing(told[prefix][name]) for name in ("zero", "material"))
-    return DelayLine(**arrays, zero=zero, material=material)
+    delays = data[f"{prefix}_delay"].values
+    return DelayLine(delays, **arrays, zero=zero, material=material)
 
 
 def _crossing(told: dict[str, Any]) -> Crossing:

@@ -18,11 +18,14 @@ from numpy.typing import NDArray
 from drillctl.progress import Progress
 from drillctl.studies.advantage.cases import Optima, optimum_beside
 from drillctl.studies.advantage.measured import Fresh, estimate, less
-from drillctl.studies.advantage.policies import DELAY, Policies
+from drillctl.studies.advantage.policies import DELAY, Policies, Policy
 from drillctl.studies.delay_limits import first_not_negative
 from drillctl.studies.intervals import CONFIDENCE
 
 Array = NDArray[np.float64]
+
+STEPS = 10
+"""Into which a step of the grid is divided where kept gains lose their advantage."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,8 @@ class DelayLine:
 
     Attributes
     ----------
+    delays : ndarray, shape (delays,)
+        Increasing (s); of kept gains closer together where their advantage vanishes.
     gains : ndarray, shape (delays, 3)
         kp, ki and the gain of the weight (SI).
     objective : ndarray, shape (delays,)
@@ -66,6 +71,7 @@ class DelayLine:
         Where it first falls under the stated share of the constant weight's objective.
     """
 
+    delays: Array
     gains: Array
     objective: Array
     advantage: Array
@@ -74,10 +80,11 @@ class DelayLine:
     zero: Crossing
     material: Crossing
 
-    def indistinct_from(self, delays: Array) -> float | None:
-        """First delay of the grid (s) at which the interval does not lie above zero."""
+    @property
+    def indistinct_from(self) -> float | None:
+        """First of the delays (s) at which the interval does not lie above zero."""
         found = np.flatnonzero(~(self.low > 0.0))
-        return float(delays[found[0]]) if found.size else None
+        return float(self.delays[found[0]]) if found.size else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,12 +115,13 @@ class DelayCurve:
             "constant": self.constant,
             **{
                 name: {
+                    "delays": line.delays.tolist(),
                     "advantage": _plain(line.advantage),
                     "low": _plain(line.low),
                     "high": _plain(line.high),
                     "zero": line.zero.summary(),
                     "material": line.material.summary(),
-                    "indistinct_from": line.indistinct_from(self.delays),
+                    "indistinct_from": line.indistinct_from,
                 }
                 for name, line in (("kept", self.kept), ("anew", self.anew))
             },
@@ -134,28 +142,55 @@ def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Prog
     progress : Progress
         Told of delays.
     """
-    table = compared.real.design.tables.advantage
-    draws = compared.real.design.tables.tune.realizations
     ground = fresh.run(compared.constant.with_gains(optima.constant.values))
-    below = ground.resampled(fresh)
-    gains: tuple[list[Array], list[Array]] = ([], [])
-    values: tuple[list[Array], list[Array]] = ([], [])
+    constant = np.append(ground.value, ground.resampled(fresh))
+    table = compared.real.design.tables.advantage
+    delays, fixed = np.array(table.delays), optima.ideal.values
+    # As many draws as the constant weight was tuned at: fewer would fit their own draws more.
+    draws = compared.real.design.tables.tune.realizations
+    anew: list[Array] = []
+    found: list[Array] = []
     for delay in table.delays:
-        policy = compared.real.at(DELAY, delay) if compared.real.follows else compared.real
-        starts = [optima.real.values, *gains[1][-1:]]
-        # As many draws as the constant weight was tuned at: fewer would fit their own draws more.
-        anew = optimum_beside(policy, draws, optima.constant, starts).values
-        for choice, own in enumerate((optima.ideal.values, anew)):
-            measured = fresh.run(policy.with_gains(own))
-            gains[choice].append(own)
-            values[choice].append(np.append(measured.value, measured.resampled(fresh)))
+        policy = _late(compared.real, delay)
+        starts = [optima.real.values, *anew[-1:]]
+        anew.append(optimum_beside(policy, draws, optima.constant, starts).values)
+        found.append(_measured(policy, anew[-1], fresh))
         progress.advance(1)
-    delays, constant = np.array(table.delays), np.append(ground.value, below)
-    lines = [
-        _line(delays, np.stack(own), np.stack(found), constant, table.material)
-        for own, found in zip(gains, values, strict=True)
-    ]
-    return DelayCurve(delays, ground.value, *lines)
+    kept = {delay: _measured(_late(compared.real, delay), fixed, fresh) for delay in table.delays}
+    for delay in _between(delays, np.array([ground.value - one[0] for one in kept.values()])):
+        kept[delay] = _measured(_late(compared.real, delay), fixed, fresh)
+    where = np.array(sorted(kept))
+    return DelayCurve(
+        delays,
+        ground.value,
+        _line(where, np.stack([fixed] * len(where)), np.stack([kept[d] for d in where]), constant,
+              table.material),
+        _line(delays, np.stack(anew), np.stack(found), constant, table.material),
+    )  # fmt: skip
+
+
+def _late(policy: Policy, delay: float) -> Policy:
+    return policy.at(DELAY, delay) if policy.follows else policy
+
+
+def _measured(policy: Policy, gains: Array, fresh: Fresh) -> Array:
+    """Objective at the fresh draws, then of every resample, shape (1 + resamples,)."""
+    measured = fresh.run(policy.with_gains(gains))
+    return np.append(measured.value, measured.resampled(fresh))
+
+
+def _between(delays: Array, advantage: Array) -> list[float]:
+    """Delays between the two of the grid where an advantage first vanishes.
+
+    It falls off a cliff there, where draws begin to stick: a straight line over a wide step of the
+    grid would put the crossing next to its upper end, whatever the cliff is.
+    """
+    over = np.flatnonzero(advantage <= 0.0)
+    if not over.size or over[0] == 0:
+        return []
+    k = int(over[0])
+    inside = np.linspace(delays[k - 1], delays[k], STEPS + 1)[1:-1]
+    return [float(delay) for delay in inside]
 
 
 def _line(delays: Array, gains: Array, found: Array, constant: Array, share: float) -> DelayLine:
@@ -165,6 +200,7 @@ def _line(delays: Array, gains: Array, found: Array, constant: Array, share: flo
     padded = np.zeros((len(gains), 3))
     padded[:, : gains.shape[1]] = gains
     return DelayLine(
+        delays=delays,
         gains=padded,
         objective=found[:, 0],
         advantage=apart[:, 0],

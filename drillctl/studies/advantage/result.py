@@ -97,7 +97,8 @@ class Advantage:
             "ki": ("ki", self.regions[0].ki, {"units": "N*m"}),
             "weight": ("weight", self.chart.weights, {"units": "N"}),
             "speed": ("speed", self.chart.speeds, {"units": "rad/s"}),
-            "delay": ("delay", self.delay.delays, {"units": "s"}),
+            "kept_delay": ("kept_delay", self.delay.kept.delays, {"units": "s"}),
+            "anew_delay": ("anew_delay", self.delay.delays, {"units": "s"}),
         }
         variables: dict[str, Any] = {
             f"case_{name}": (
@@ -116,9 +117,11 @@ class Advantage:
                 values = found.figures[name][:, :, 0] if prefix == "front" else found.figures[name]
                 variables[f"{prefix}_{name}"] = (over, values, {"units": unit})
         for prefix, line in (("kept", self.delay.kept), ("anew", self.delay.anew)):
-            variables[f"{prefix}_gains"] = (("delay", "parameter"), line.gains)
+            variables[f"{prefix}_gains"] = ((f"{prefix}_delay", "parameter"), line.gains)
             for name in ("objective", "advantage", "low", "high"):
-                variables[f"{prefix}_{name}"] = ("delay", getattr(line, name), {"units": "s"})
+                variables[f"{prefix}_{name}"] = (
+                    f"{prefix}_delay", getattr(line, name), {"units": "s"},
+                )  # fmt: skip
         return xarray.Dataset(variables, coordinates, dict(self.provenance))
 
     def summary(self) -> dict[str, Any]:

@@ -77,7 +77,7 @@ def _chart(found: Chart) -> Iterable[list[object]]:
 
 def _delays(result: Advantage) -> Iterable[list[object]]:
     for name, line in (("ideal path", result.delay.kept), ("tuned anew", result.delay.anew)):
-        for i, delay in enumerate(result.delay.delays):
+        for i, delay in enumerate(line.delays):
             columns = (line.objective, line.advantage, line.low, line.high)
             numbers = [*line.gains[i], *(column[i] for column in columns)]
             yield [name, float(delay), *map(float, numbers)]
