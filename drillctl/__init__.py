@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from drillctl.studies import doctor as doctor
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
+    from drillctl.studies.advantage import advantage as advantage
     from drillctl.studies.robust import tune as tune
     from drillctl.studies.uncertainty import uncertainty as uncertainty
 
@@ -55,6 +56,7 @@ _HOME = {
     "simulate": "drillctl.simulation",
     "limit_cycle": "drillctl.simulation.limit_cycle",
     "sweep": "drillctl.studies",
+    "advantage": "drillctl.studies.advantage",
     "adaptive_map": "drillctl.studies",
     "compare": "drillctl.studies",
     "doctor": "drillctl.studies",

@@ -13,6 +13,8 @@
 - `adaptive_map.py`: `adaptive_map`, regions with the cells simulated to find them.
 - `comparison.py`: `j1_distributions`, `paired_differences`, `j1_against_weight` of cases.
 - `nominal_cases.py`: `compared_regions` and `compared_responses` of cases at their own values.
+- `advantage.py`: `advantage_cases`, `advantage_front`, `advantage_map` and `advantage_delay` of a
+  weight that follows the bit speed against a constant one.
 - `limit_cycle.py`: `limit_cycle`, one period by each method.
 - `three_regions.py`: `three_regions` over the same two parameters.
 - `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
@@ -30,6 +32,12 @@ the rig floor: rpm, kN, kN m, m.
 """
 
 from drillctl.plots.adaptive_map import adaptive_map
+from drillctl.plots.advantage import (
+    advantage_cases,
+    advantage_delay,
+    advantage_front,
+    advantage_map,
+)
 from drillctl.plots.comparison import j1_against_weight, j1_distributions, paired_differences
 from drillctl.plots.errors import error_estimate
 from drillctl.plots.frequency import bode
@@ -59,6 +67,10 @@ from drillctl.plots.weight_delay import weight_delay
 
 __all__ = [
     "adaptive_map",
+    "advantage_cases",
+    "advantage_delay",
+    "advantage_front",
+    "advantage_map",
     "area_convergence",
     "bode",
     "cell_distributions",

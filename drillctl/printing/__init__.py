@@ -1,5 +1,6 @@
 """Results as tables for people."""
 
+from drillctl.printing.advantage import advantage
 from drillctl.printing.comparison import comparison
 from drillctl.printing.doctor import doctor
 from drillctl.printing.linear import loop, modes
@@ -11,6 +12,7 @@ from drillctl.printing.weight_delay import weight_delay
 
 __all__ = [
     "adaptive_map",
+    "advantage",
     "comparison",
     "cycle",
     "doctor",
