@@ -18,12 +18,12 @@ class Text:
     ----------
     text : str
         Plain; nothing in it is markup.
-    kind : {'plain', 'note', 'warning'}
+    kind : {'plain', 'note', 'open', 'warning'}
         How it stands out.
     """
 
     text: str
-    kind: Literal["plain", "note", "warning"] = "plain"
+    kind: Literal["plain", "note", "open", "warning"] = "plain"
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ from typing import Any
 from drillctl.reporting.blocks import Document, Figure
 from drillctl.reporting.pictures import Album, themed
 
+_UNIT = re.compile(r"(?<=[\d∞]) (?=(?:%|s|Hz|ms|rpm|kN|klbf|ft|m|N|kg|dB|in|mm|kJ|J)\b)|(?<=\bN) (?=m\b)"
+                   r"|(?<=\bN m) (?=s\b)|(?<=\bklbf) (?=ft\b)|(?<=\bkN) (?=m\b)")  # fmt: skip
 _NUMBER = re.compile(r"^[−-]?[\d.]+( × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?( [%°]| s| Hz| ms)?$|^–$|^∞$")
 
 
@@ -50,9 +52,15 @@ def _environment() -> Any:
     )  # fmt: skip
     environment.globals["kind"] = lambda block: type(block).__name__
     environment.filters["figures"] = _figures
+    environment.filters["kept"] = _kept
     return environment
 
 
 def _figures(rows: tuple[tuple[str, ...], ...], column: int) -> bool:
     """Whether a column holds numbers alone, which are set to the right."""
     return column > 0 and all(_NUMBER.match(row[column]) for row in rows)
+
+
+def _kept(text: str) -> str:
+    """Text whose numbers are not parted from their units at the end of a line."""
+    return _UNIT.sub("\u00a0", text)

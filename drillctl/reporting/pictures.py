@@ -13,7 +13,9 @@ from drillctl.reporting.blocks import Figure
 from drillctl.reporting.gather import Gathered
 
 DPI = 110
-"""Of pictures as PNG."""
+"""Of pictures as PNG, and of what is a bitmap within an SVG."""
+MOST_SHAPES = 500
+"""Shapes of one kind that an SVG holds as such; more of them make it slow and large."""
 INDEX = "index.json"
 _PATHS = re.compile(r' d="([^"]*)"', re.DOTALL)
 _DIGITS = re.compile(r"(\.\d\d)\d+")
@@ -94,11 +96,14 @@ class Album:
         from matplotlib import rc_context
 
         drawn = figure.draw()
+        for ax in drawn.axes:
+            for crowd in ax.collections:
+                crowd.set_rasterized(crowd.get_rasterized() or len(crowd.get_paths()) > MOST_SHAPES)
         svg = self._folder / f"{figure.name}.svg"
         part = svg.with_suffix(".part")
         # A fixed salt: the same picture is the same file.
         with rc_context({"svg.hashsalt": figure.name, "svg.fonttype": "path"}):
-            drawn.savefig(part, format="svg", metadata={"Date": None})
+            drawn.savefig(part, format="svg", dpi=DPI, metadata={"Date": None})
         write_text(svg, _small(part.read_text(encoding="utf-8")))
         part.unlink(missing_ok=True)
         place = drawn.axes[0].get_position()

@@ -21,14 +21,16 @@ class Profile:
     points : int or None
         Most points along an axis of the map; None for those of the design.
     audited : int or None
-        Cells of the map, and lanes under uncertainty, that are simulated again with the reference
-        solver; None for as many as the design says.
+        Cells of the map that are simulated again with the reference solver; None for as many as
+        the design says.
     realizations : int or None
         Most draws over the map; None for those of the design.
     lanes : int
         Most lanes over the map and all draws.
     setting : int
         Draws at the design's own setting alone.
+    drawn_audit : int or None
+        Lanes under uncertainty that are simulated again; None for as many as cells.
     sensitivity : bool
         Whether Sobol indices are computed where the design asks for them.
     compared, tuned : bool
@@ -42,6 +44,7 @@ class Profile:
     realizations: int | None
     lanes: int
     setting: int
+    drawn_audit: int | None
     sensitivity: bool
     compared: bool
     tuned: bool
@@ -94,18 +97,18 @@ class Profile:
 
 QUICK = Profile(
     name="quick", told="a look: a map of 21 x 21 cells, 200 draws, no comparison, no tuning",
-    points=21, audited=4, realizations=200, lanes=1_000_000, setting=2000, sensitivity=False,
-    compared=False, tuned=False,
+    points=21, audited=4, realizations=200, lanes=1_000_000, setting=2000, drawn_audit=0,
+    sensitivity=False, compared=False, tuned=False,
 )  # fmt: skip
 STANDARD = Profile(
     name="standard", told="the design's own map; its draws up to four million lanes",
     points=None, audited=None, realizations=None, lanes=4_000_000, setting=10_000,
-    sensitivity=True, compared=False, tuned=False,
+    drawn_audit=None, sensitivity=True, compared=False, tuned=False,
 )  # fmt: skip
 FULL = Profile(
     name="full", told="everything the design asks for, comparison and tuning included",
     points=None, audited=None, realizations=None, lanes=1_000_000_000, setting=10_000,
-    sensitivity=True, compared=True, tuned=True,
+    drawn_audit=None, sensitivity=True, compared=True, tuned=True,
 )  # fmt: skip
 
 PROFILES = {profile.name: profile for profile in (QUICK, STANDARD, FULL)}

@@ -148,6 +148,13 @@ def _uncertain(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return studies.uncertainty(design, progress=progress, shelf=folder.shelf())
 
 
+def _under_uncertainty(asked: Asked) -> Design:
+    """The design with as many audited lanes as the profile spends."""
+    if asked.profile.drawn_audit is None:
+        return asked.design
+    return asked.design.replace({"map.audit_cells": asked.profile.drawn_audit})
+
+
 def _setting(design: Design, folder: RunFolder, progress: Progress) -> Any:
     from drillctl import studies
 
@@ -300,7 +307,7 @@ ALL = (
     Recipe("slope-margin", "the slope margin over the map", "loop-map", _loop_map, _two_axes),
     Recipe("regions", "the three regions", "regions", _regions, _both(_in_batch, _two_axes)),
     Recipe("uncertainty", "the map under uncertainty", "uncertainty", _uncertain,
-           _both(_in_batch, _fitting_map), growing=True),
+           _both(_in_batch, _fitting_map), _under_uncertainty, growing=True),
     Recipe("compare", "the comparison", "compare", _compared, _both(_no_cases, _in_batch)),
     Recipe("tune", "the tuning of the gains", "tune", _by_name("tune"),
            _both(_not_tuned, _in_batch)),

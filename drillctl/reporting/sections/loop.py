@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from drillctl import plots
+from drillctl.loop_pictures import loop_drawings
 from drillctl.reporting.blocks import Block, Figure, Table, Text
 from drillctl.reporting.gather import Gathered
 from drillctl.reporting.words import NOTHING, number, percent
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawn
 
 TOLD = {
     "mobility": (
@@ -36,12 +31,14 @@ TOLD = {
         "Boundary of the stable gains in the plane of Kp and Ki, with the current gains.",
     ),
     "impedance": (
-        "Impedance of the drive and what it reflects; the dashed line is the stick-slip frequency.",
+        "Impedance of the drive and what it reflects; the vertical line is the stick-slip frequency.",
         "Drive impedance and reflection coefficient over frequency, the stick-slip frequency "
         "marked.",
     ),
 }
 """Caption and text of each picture that is shown."""
+ON_PAPER = ("boundary",)
+"""Pictures with dark colours of their own."""
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
@@ -51,21 +48,10 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     blocks: list[Block] = [_margins(gathered), _poles(gathered)]
     if found["margins"] is None:
         blocks.append(Text("The loop is not stable: it has no margins at the top.", "warning"))
-    drawn: dict[str, Drawn] = {}
-
-    def picture(name: str) -> Callable[[], Drawn]:
-        def draw() -> Drawn:
-            if not drawn:
-                from drillctl.loop_pictures import loop_figures
-
-                drawn.update(loop_figures(study.result))
-            return drawn[name]
-
-        return draw
-
-    for name in _names(gathered):
-        caption, alt = TOLD[name]
-        blocks.append(Figure(name, caption, alt, picture(name), ("loop",)))
+    for name, draw in loop_drawings(study.result).items():
+        if name in TOLD:
+            caption, alt = TOLD[name]
+            blocks.append(Figure(name, caption, alt, draw, ("loop",), name in ON_PAPER))
     plane = gathered.have("slope-margin")
     if plane is not None:
         best = plane.summary["largest_slope_margin"]
@@ -82,21 +68,6 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
             )
         )  # fmt: skip
     return tuple(blocks)
-
-
-def _names(gathered: Gathered) -> list[str]:
-    """Pictures that this loop has, by the same rules as `loop_figures`."""
-    design = gathered.design
-    result_bit = gathered.need("loop").result.bit_side
-    names = ["mobility"]
-    if any(design.top_drive.gains()):
-        if result_bit.path is None or result_bit.path.observer is None:
-            names += ["closed-loop", "nyquist", "sensitivity"]
-        if design.simple_drive and result_bit.path is None:
-            names.append("boundary")
-    if design.string.parts.sections[0].inertia > 0.0:
-        names.append("impedance")
-    return names
 
 
 def _margins(gathered: Gathered) -> Table:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any, Literal
+
+from drillctl.design import parameter
 from drillctl.reporting.blocks import Block, Checks, Table, Text
 from drillctl.reporting.gather import Gathered
-from drillctl.reporting.verdict import PASSES, STATUS, verdict
-from drillctl.reporting.words import NOTHING, between, chance, number, percent
+from drillctl.reporting.verdict import FAILS, OPEN, PASSES, STATUS, verdict
+from drillctl.reporting.words import NOTHING, between, number, percent
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
@@ -24,8 +27,9 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _kind(word: str) -> str:
-    return "note" if word == PASSES else "warning"
+def _kind(word: str) -> Literal["note", "open", "warning"]:
+    kinds: dict[str, Literal["note", "open", "warning"]] = {PASSES: "note", FAILS: "warning"}
+    return kinds.get(word, "open")
 
 
 def setting(gathered: Gathered) -> str:
@@ -47,7 +51,11 @@ def setting(gathered: Gathered) -> str:
 
 def _sentence(gathered: Gathered, word: str) -> str:
     """The verdict in a sentence or two."""
-    text = f"The current setting ({setting(gathered)}) {word}."
+    held = f"the current setting ({setting(gathered)})"
+    if word == OPEN:
+        text = f"Whether {held} passes is not decided: see the open question below."
+    else:
+        text = f"{held[0].upper()}{held[1:]} {word}."
     study = gathered.have("simulate")
     if study is not None and study.summary["measures"]["j1"] is not None:
         measures = study.summary["measures"]
@@ -87,26 +95,16 @@ MEANINGS = {
 }
 
 
-def _best_of_draws(
-    gathered: Gathered, name: str, told: dict[str, object]
-) -> tuple[str, str, str, str]:
-    place = gathered.words.place(gathered.design, told["at"])  # type: ignore[arg-type]
-    value, (low, high) = told["value"], told["interval_95"]  # type: ignore[misc]
+def _best_of_draws(gathered: Gathered, name: str, told: dict[str, Any]) -> tuple[str, ...]:
+    place = gathered.words.place(gathered.design, told["at"])
+    value, (low, high) = told["value"], told["interval_95"]
     if name.startswith("probability_"):
         level = name.removeprefix("probability_")
-        # The objective is the share of draws over the level.
-        inside = 1.0 - value  # type: ignore[operator]
-        ends = (None if high is None else 1.0 - high, None if low is None else 1.0 - low)
-        shown = chance(inside, ends)
-        return f"largest P(J1 ≤ {level} s)", place, percent(inside), _within(shown)
-    return (
-        MEANINGS.get(name, name), place, f"{number(value)} s", f"{between(low, high)} s",  # type: ignore[arg-type]
-    )  # fmt: skip
-
-
-def _within(text: str) -> str:
-    """The interval alone."""
-    return text.partition("(")[2].rstrip(")") or NOTHING
+        ends = f"{between(100.0 * low, 100.0 * high, 3)} %"
+        return f"largest P(J1 ≤ {level} s)", place, percent(value), ends
+    # Runs that were stopped early leave an interval open above.
+    ends = f"at least {number(low)} s" if high is None else f"{between(low, high)} s"
+    return MEANINGS.get(name, name), place, f"{number(value)} s", ends
 
 
 def regions_table(gathered: Gathered) -> Table | None:
@@ -121,7 +119,7 @@ def regions_table(gathered: Gathered) -> Table | None:
         spans = []
         for path in paths:
             bounds = one["bounds"].get(path)
-            unit = _unit_of(gathered, path)
+            unit = parameter(design, path).si_unit
             spans.append(
                 NOTHING if bounds is None else between(*(words.scaled(b, unit) for b in bounds))
             )
@@ -131,9 +129,3 @@ def regions_table(gathered: Gathered) -> Table | None:
     heads = ("region", "cells", "share of the map", *(words.head(design, path) for path in paths))
     caption = "Regions of the map: bounds between the centres of their outermost cells"
     return Table("regions", caption, heads, tuple(rows))
-
-
-def _unit_of(gathered: Gathered, path: str) -> str:
-    from drillctl.design import parameter
-
-    return parameter(gathered.design, path).si_unit

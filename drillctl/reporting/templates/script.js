@@ -111,7 +111,7 @@
   }
 
   function draw(place, held, row, title) {
-    const width = 640, height = 260, left = 52, right = 12, top = 40, bottom = 42;
+    const width = 640, height = 260, left = 52, right = 24, top = 40, bottom = 42;
     const bit = held.bit[row], motor = held.top[row], count = bit.length;
     const known = [...bit, ...motor].filter((v) => v !== null).map((v) => v / held.part);
     const high = Math.max(1.05 * held.set_speed, ...known), low = Math.min(0, ...known);
@@ -122,11 +122,13 @@
     svg.setAttribute("role", "img");
     svg.setAttribute("aria-label", title);
     const still = 0.5 * held.part;
-    for (let k = 0; k < count; k++) {
-      if (bit[k] !== null && Math.abs(bit[k]) < still) {
-        shape("rect", { x: x(k - 0.5), y: top, width: x(1) - x(0), height: height - top - bottom,
-          fill: "var(--shade)" }, svg);
+    for (let k = 0, first = 0; k <= count; k++) {
+      if (k < count && bit[k] !== null && Math.abs(bit[k]) < still) continue;
+      if (k > first) {
+        shape("rect", { x: x(first), y: top, width: x(k) - x(first),
+          height: height - top - bottom, fill: "var(--shade)" }, svg);
       }
+      first = k + 1;
     }
     for (const v of ticks(low, high)) {
       shape("line", { x1: left, x2: width - right, y1: y(v), y2: y(v), stroke: "var(--line)" }, svg);
