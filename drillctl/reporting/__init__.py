@@ -12,7 +12,17 @@ A thin reader of results: it computes nothing itself beyond calling the studies.
 """
 
 from drillctl.reporting.making import FORMATS, Report, report
-from drillctl.reporting.profiles import PROFILES, Profile
+from drillctl.reporting.profiles import FULL, PROFILES, QUICK, STANDARD, Profile
 from drillctl.reporting.sections import SECTIONS
 
-__all__ = ["FORMATS", "PROFILES", "SECTIONS", "Profile", "Report", "report"]
+__all__ = [
+    "FORMATS",
+    "FULL",
+    "PROFILES",
+    "QUICK",
+    "SECTIONS",
+    "STANDARD",
+    "Profile",
+    "Report",
+    "report",
+]

@@ -242,5 +242,3 @@ def _study(recipe: Recipe, asked: Asked, place: Path, progress: Progress) -> Stu
         run.discard()
         return ended("failed", str(error) or type(error).__name__)
     return ended("done")
-
-

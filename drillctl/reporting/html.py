@@ -10,9 +10,14 @@ from typing import Any
 from drillctl.reporting.blocks import Document, Figure
 from drillctl.reporting.pictures import Album, themed
 
-_UNIT = re.compile(r"(?<=[\d∞]) (?=(?:%|s|Hz|ms|rpm|kN|klbf|ft|m|N|kg|dB|in|mm|kJ|J)\b)|(?<=\bN) (?=m\b)"
-                   r"|(?<=\bN m) (?=s\b)|(?<=\bklbf) (?=ft\b)|(?<=\bkN) (?=m\b)")  # fmt: skip
+_UNIT = re.compile(
+    r"(?<=[\d∞]) (?=%|(?:s|Hz|ms|rpm|kN|klbf|ft|m|N|kg|dB|in|mm|kJ)\b)"
+    r"|(?<=\bN) (?=m\b)|(?<=\bN m) (?=s\b)|(?<=\bklbf) (?=ft\b)|(?<=\bkN) (?=m\b)"
+)
 _NUMBER = re.compile(r"^[−-]?[\d.]+( × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?( [%°]| s| Hz| ms)?$|^–$|^∞$")
+
+SHORT = 26
+"""Longest text (characters) of a cell that stays on one line."""
 
 
 def page(document: Document, album: Album) -> str:
@@ -53,6 +58,7 @@ def _environment() -> Any:
     environment.globals["kind"] = lambda block: type(block).__name__
     environment.filters["figures"] = _figures
     environment.filters["kept"] = _kept
+    environment.filters["short"] = _short
     return environment
 
 
@@ -64,3 +70,8 @@ def _figures(rows: tuple[tuple[str, ...], ...], column: int) -> bool:
 def _kept(text: str) -> str:
     """Text whose numbers are not parted from their units at the end of a line."""
     return _UNIT.sub("\u00a0", text)
+
+
+def _short(rows: tuple[tuple[str, ...], ...], column: int) -> bool:
+    """Whether the cells of a column are better left on one line."""
+    return all(len(row[column]) <= SHORT for row in rows)

@@ -111,8 +111,9 @@ class Album:
         drawn.savefig(part, format="png", dpi=DPI)
         part.replace(svg.with_suffix(".png"))
         width, height = (72.0 * float(inches) for inches in drawn.get_size_inches())
-        box = (place.x0, 1.0 - place.y1, place.width, place.height)
-        return Picture(figure.name, width, height, tuple(map(float, box)), self._folder)
+        left, up = float(place.x0), 1.0 - float(place.y1)
+        box = (left, up, float(place.width), float(place.height))
+        return Picture(figure.name, width, height, box, self._folder)
 
 
 def _small(svg: str) -> str:

@@ -235,6 +235,10 @@ def _lumped(asked: Asked) -> str:
     return ""
 
 
+def _moded(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    return drillctl.modes(design)
+
+
 def _looped(design: Design, folder: RunFolder, progress: Progress) -> Any:
     progress.begin("analysing the loop", 1)
     return drillctl.loop(design)
@@ -292,7 +296,7 @@ def _examined(design: Design, folder: RunFolder, progress: Progress) -> Any:
 
 
 ALL = (
-    Recipe("modes", "the modes", "modes", lambda d, f, p: drillctl.modes(d), settings={"count": 10}),
+    Recipe("modes", "the modes", "modes", _moded, settings={"count": 10}),
     Recipe("loop", "the loop", "loop", _looped),
     Recipe("simulate", "the run at the current setting", "simulate", _simulated),
     Recipe("setting", "the draws at the current setting", "uncertainty", _setting, _in_batch,

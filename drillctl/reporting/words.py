@@ -77,15 +77,18 @@ class Words:
         """A value in SI with the unit that people read."""
         if value is None:
             return NOTHING
-        shown, unit = units.displayed(value, si_unit, self.system)
-        return f"{number(shown, digits)} {_unit(unit)}".rstrip()
+        return f"{number(self.scaled(value, si_unit), digits)} {self.unit(si_unit)}".rstrip()
 
     def unit(self, si_unit: str) -> str:
         """The unit that people read for one of SI."""
+        if si_unit == "J":
+            return "kJ"
         return _unit(units.displayed(1.0, si_unit, self.system)[1])
 
     def scaled(self, value: float, si_unit: str) -> float:
         """A value in the unit that people read."""
+        if si_unit == "J":
+            return value / 1e3
         return float(units.displayed(value, si_unit, self.system)[0])
 
     def diameter(self, value: float | None) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from drillctl import plots
 from drillctl.design import to_toml
 from drillctl.provenance import provenance
@@ -98,7 +100,7 @@ def _convergence(gathered: Gathered) -> Table | None:
     return Table("convergence-of-this-run", caption, heads, tuple(rows))
 
 
-def _row(told: str, found: dict, base: dict) -> tuple[str, ...]:  # type: ignore[type-arg]
+def _row(told: str, found: dict[str, Any], base: dict[str, Any]) -> tuple[str, ...]:
     j1, own = found["measures"]["j1"], base["measures"]["j1"]
     apart = NOTHING if not own or j1 is None or found is base else percent(j1 / own - 1.0, 2)
     step = NOTHING if found["step"] is None else number(1e3 * found["step"])

@@ -103,7 +103,8 @@ def _differences(gathered: Gathered, paired: dict[str, Any]) -> Table:
             ends = told["interval_95"]
             text = number(value, 3)
             if ends is not None:
-                text += f" ({between(*(_scaled(gathered, e, unit) for e in ends), digits=3)})"
+                low, high = (_scaled(gathered, end, unit) for end in ends)
+                text += f" ({between(low, high, 3)})"
             row.append(text)
         rows.append(tuple(row))
     return Table("differences", "Mean paired difference to the first case (95 % interval)",

@@ -31,7 +31,7 @@ def entries(words: Words) -> tuple[tuple[str, str, str], ...]:
         ("twist", "top angle less bit angle", "rad"),
         ("D = −dT/dω", "falling slope of the bit torque at the operating speed", slope),
         ("D*", "slope margin: the falling slope at which steady drilling becomes unstable", slope),
-        ("S", "sensitivity at the top torque; its largest value tells how near to instability", "1"),
+        ("S", "sensitivity at the top torque; its peak tells how near to instability", "1"),
         ("disk margin", "change of gain and phase at the top torque that the loop bears at once",
          "dB, °"),
         ("ζ", "impedance of the pipe, J √(G ρ): torque per speed of a travelling wave", slope),

@@ -31,7 +31,7 @@ TOLD = {
         "Boundary of the stable gains in the plane of Kp and Ki, with the current gains.",
     ),
     "impedance": (
-        "Impedance of the drive and what it reflects; the vertical line is the stick-slip frequency.",
+        "Impedance of the drive and what it reflects; vertical line: the stick-slip frequency.",
         "Drive impedance and reflection coefficient over frequency, the stick-slip frequency "
         "marked.",
     ),

@@ -29,7 +29,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     return (
         Table("operating-point", "Steady drilling", ("quantity", "value"), tuple(rows)),
         Figure(
-            "friction", "Bit torque against bit speed, at each weight on bit of the friction table.",
+            "friction", "Bit torque against bit speed, at each weight of the friction table.",
             "Curves of bit torque over bit speed: the torque is largest at rest and falls as the "
             "bit turns faster, which is what drives stick-slip.",
             lambda: _curves(gathered),

@@ -19,7 +19,7 @@ MEASURES = (
     ("peak top torque", "peak_top_torque", "N*m"),
     ("mean weight on bit", "mean_weight_on_bit", "N"),
     ("ROP proxy", "rop_proxy", ""),
-    ("work per turn (J)", "work_per_turn", ""),
+    ("work per turn", "work_per_turn", "J"),
 )
 
 
@@ -33,8 +33,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     rows = [["engine", *(study.summary["engine"] for study in runs.values())]]
     rows.append(["status", *(s.summary["status"].replace("_", " ") for s in runs.values())])
     for title, key, unit in MEASURES:
-        label = gathered.words.unit(unit) if unit else ""
-        head = f"{title} ({label})" if label else title
+        head = _head(title, unit, gathered.words)
         rows.append([head, *(_value(s, key, unit, gathered.words) for s in runs.values())])
     rows += _places(gathered, runs)
     table = Table("responses", "Measures of the runs", tuple(heads), tuple(map(tuple, rows)))
@@ -54,6 +53,10 @@ def _value(study: Study, key: str, unit: str, words: Words) -> str:
     if value is None:
         return NOTHING
     return number(words.scaled(value, unit) if unit else value)
+
+
+def _head(title: str, unit: str, words: Words) -> str:
+    return f"{title} ({words.unit(unit)})" if unit else title
 
 
 def _places(gathered: Gathered, runs: dict[str, Study]) -> list[list[str]]:

@@ -17,7 +17,8 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     tables = design.tables.drillstring.sections
     rows = tuple(
         (
-            table.name, _kind(table), words.quantity(table.length, "m") if table.length else NOTHING,
+            table.name, _kind(table),
+            words.quantity(table.length, "m") if table.length else NOTHING,
             words.diameter(_diameters(table)[0]), words.diameter(_diameters(table)[1]),
             f"{number(part.stiffness)}", f"{number(part.inertia + part.end_inertia)}",
             str(part.elements),

@@ -66,7 +66,7 @@ def _sentence(gathered: Gathered, word: str) -> str:
 
 def _best(gathered: Gathered) -> Table | None:
     """Best settings by several measures."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     study = gathered.have("map")
     if study is not None and study.summary["minimum"] is not None:
         minimum = study.summary["minimum"]
@@ -120,9 +120,11 @@ def regions_table(gathered: Gathered) -> Table | None:
         for path in paths:
             bounds = one["bounds"].get(path)
             unit = parameter(design, path).si_unit
-            spans.append(
-                NOTHING if bounds is None else between(*(words.scaled(b, unit) for b in bounds))
-            )
+            if bounds is None:
+                spans.append(NOTHING)
+                continue
+            low, high = (words.scaled(bound, unit) for bound in bounds)
+            spans.append(between(low, high))
         rows.append(
             (f"J1 ≤ {level} s", str(one["cells"]), percent(one["area_fraction"]), *spans)
         )  # fmt: skip
