@@ -69,8 +69,7 @@ class Profile:
         if self.audited is not None:
             values["map.audit_cells"] = min(self.audited, design.tables.map.audit_cells)
         if not self.sensitivity and design.tables.uncertainty.sensitivity is not None:
-            table = design.tree["uncertainty"]
-            values["uncertainty"] = {k: v for k, v in table.items() if k != "sensitivity"}
+            values["uncertainty.sensitivity"] = None
         changed = design.replace(values) if values else design
         draws = self._draws(changed)
         if draws != changed.tables.uncertainty.realizations:

@@ -180,16 +180,14 @@ def _at_setting(asked: Asked) -> Design:
     """The design with more draws at its own gains, and its level among those that are counted."""
     design, level = asked.design, level_of(asked.design)
     levels = sorted({*design.tables.map.levels, level})
+    # Nothing that a map under uncertainty has beyond its draws.
     values: dict[str, Any] = {
         "map.levels": levels, "uncertainty.sampling": "monte-carlo",
-        "uncertainty.realizations": asked.profile.setting,
+        "uncertainty.realizations": asked.profile.setting, "uncertainty.sensitivity": None,
+        "uncertainty.until": None, "uncertainty.axes": [], "uncertainty.contours": False,
+        "uncertainty.keep": [],
     }  # fmt: skip
-    table = {
-        key: value
-        for key, value in design.tree.get("uncertainty", {}).items()
-        if key not in ("axes", "until", "sensitivity", "keep", "contours", "full")
-    }
-    return design.replace({"uncertainty": table}).replace(values)
+    return design.replace(values)
 
 
 def _cell(which: str) -> Callable[[Asked], Design]:

@@ -253,3 +253,14 @@ def test_every_shipped_design_has_a_report(name, tmp_path):
     made = drillctl.report(drillctl.load(name), tmp_path / "r", QUICK)
     assert made.problems == ()
     assert made.files["html"].stat().st_size < 10e6
+
+
+def test_indices_are_for_the_longer_profiles(tmp_path):
+    design = drillctl.load("uncertain-string-140kn")
+    assert design.tables.uncertainty.sensitivity is not None
+    assert QUICK.applied(design).tables.uncertainty.sensitivity is None
+    assert STANDARD.applied(design).tables.uncertainty.sensitivity is not None
+    made = drillctl.report(design, tmp_path / "r", TINY, sections=["operating-point"])
+    assert made.problems == ()
+    few = drillctl.report(design, tmp_path / "s", replace(TINY, points=3), sections=["sensitivity"])
+    assert "--profile standard" in few.content["left_out"]["Sensitivity"]
