@@ -89,9 +89,9 @@ def page(found: dict[str, Any]) -> str:
         "Monteiro, H.L.S. & Trindade, M.A., *Effect of Bit-Rock Interaction Uncertainties on the",
         "Torsional Stability Regions of an Oil-Well Drilling System* (2012). The paper prints its",
         "friction, set speed, weights, gains and levels, but **not the string, the inertias and",
-        "the damping: these are reconstructed** ([how](../docs/paper.md)), and its printed start of",
-        "70 rad/s is read as 70 rpm. Numbers here are of that reconstruction; they are not proven",
-        "to be the authors' own.", "", "## Statements", "",
+        "the damping: these are reconstructed** ([how](../docs/paper.md)), and its printed start",
+        "of 70 rad/s is read as 70 rpm. Numbers here are of that reconstruction; they are not",
+        "proven to be the authors' own.", "", "## Statements", "",
         "| the paper says | here | agrees |", "|---|---|---|",
     ]  # fmt: skip
     lines += [f"| {said} | {told} | {agrees} |" for said, told, agrees in _statements(found)]
@@ -133,8 +133,8 @@ def _statements(found: dict[str, Any]) -> list[tuple[str, str, str]]:
             "J1 grows with stick-slip; above 33 operation is undesirable.",
             f"{found['sticking_up_to_33']} cells with J1 ≤ 33 s stick in the last 20 s; of those "
             f"over 60 s {found['share_sticking_over_60']:.0%} do. So do "
-            f"{found['sticking_up_to_50']} of those up to 50 s: 33 marks poor settling here, not yet "
-            "stick-slip that lasts.",
+            f"{found['sticking_up_to_50']} of those up to 50 s: 33 marks poor settling here, not "
+            "yet stick-slip that lasts.",
             f"{_yes(found['sticking_up_to_33'] == 0)}, with that qualification",
         ),
         (

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drillctl
 from drillctl import units
@@ -44,8 +45,19 @@ class Asked:
     found: Found
 
 
-@dataclass(frozen=True)
-class Recipe:
+def _applies(asked: Asked) -> str:
+    return ""
+
+
+def _as_asked(asked: Asked) -> Design:
+    return asked.design
+
+
+def _summary(result: Any) -> dict[str, Any]:
+    return dict(result.summary())
+
+
+class Recipe(NamedTuple):
     """One study of a report.
 
     Attributes
@@ -78,13 +90,13 @@ class Recipe:
     title: str
     verb: str
     compute: Callable[[Design, RunFolder, Progress], Any]
-    missing: Callable[[Asked], str] = lambda asked: ""
-    variant: Callable[[Asked], Design] = lambda asked: asked.design
+    missing: Callable[[Asked], str] = _applies
+    variant: Callable[[Asked], Design] = _as_asked
     needs: tuple[str, ...] = ()
-    settings: dict[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = MappingProxyType({})
     growing: bool = False
     write: bool = True
-    told: Callable[[Any], dict[str, Any]] = lambda result: dict(result.summary())
+    told: Callable[[Any], dict[str, Any]] = _summary
 
 
 def level_of(design: Design) -> float:
