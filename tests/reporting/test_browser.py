@@ -131,20 +131,21 @@ def test_it_opens_from_disk_in_silence(seen, small):
     assert outside == [small.files["html"].resolve().as_uri()]
 
 
-def place(seen: Seen, i: int, j: int) -> tuple[float, float]:
-    """Middle of a cell of the 5 x 4 map on the screen."""
+def place(seen: Seen, i: int, j: int, within: float = 0.5) -> tuple[float, float]:
+    """A point of a cell of the 5 x 4 map on the screen, its middle by default."""
     over = seen.page.locator(".over")
     over.scroll_into_view_if_needed()
     box = over.bounding_box()
-    return box["x"] + (i + 0.5) / 5 * box["width"], box["y"] + (1 - (j + 0.5) / 4) * box["height"]
+    across, up = (i + within) / 5, (j + within) / 4
+    return box["x"] + across * box["width"], box["y"] + (1.0 - up) * box["height"]
 
 
 def test_pointing_at_a_cell_tells_its_values(seen, small):
     import drillctl
 
     swept = drillctl.open(small.folder / "studies" / "map")
-    for i, j in ((0, 0), (4, 3), (2, 1)):
-        seen.page.mouse.move(*place(seen, i, j))
+    for i, j, within in ((0, 0, 0.5), (4, 3, 0.04), (2, 1, 0.5), (1, 1, 0.96), (3, 2, 0.04)):
+        seen.page.mouse.move(*place(seen, i, j, within))
         kp, ki = swept.axes[0].values[i], swept.axes[1].values[j]
         told = re.fullmatch(r"Kp (\S+) N m s, Ki (\S+) N m: J1 (\S+) s, (.*)", seen.values())
         assert float(told[1]) == kp

@@ -158,7 +158,9 @@ def test_an_interrupted_report_is_written_and_goes_on(tmp_path, monkeypatch, cap
     assert "The J1 map is not finished: the report was interrupted" in page
     assert page.index("is not finished") < page.index("<nav")
     assert 'id="modes"' in page
+    assert not json.loads((tmp_path / "r" / "run.json").read_text())["finished"]
     assert run([*asked, "--json"]) == 0
+    assert json.loads((tmp_path / "r" / "run.json").read_text())["finished"]
     told = json.loads(capsys.readouterr().out)
     assert told["complete"]
     assert told["problems"] == []
