@@ -57,7 +57,7 @@ def rig_drawing(design: Design, words: Words) -> Figure:
             shown = words.quantity(depth, "m")
             ax.text(-0.22, part.bottom, shown, ha="right", va="center", fontsize=style.SMALL)
             ax.plot([-0.2, -part.half], [part.bottom] * 2, color="#888888", linewidth=0.6)
-    _ends(ax, design, parts, words)
+    _ends(ax, design, words)
     ax.set_title(design.tables.title or design.name, fontsize=style.TITLE, loc="left", wrap=True)
     return figure
 
@@ -102,12 +102,12 @@ def _section(ax: Axes, part: _Part, order: int, words: Words) -> None:
         )  # fmt: skip
         told = f"{table.name}: {words.quantity(table.length, 'm')}"
         if table.pipe is not None:
-            told += f"\n{table.pipe}"
+            told += f", {table.pipe}"
         elif table.outer_diameter is not None:
-            told += f"\n{words.diameter(table.outer_diameter)} x "
+            told += f", {words.diameter(table.outer_diameter)} x "
             told += words.diameter(table.inner_diameter)
     middle = 0.5 * (part.top + part.bottom)
-    ax.text(WIDEST + 0.06, middle, told, va="center", fontsize=style.LABEL)
+    ax.text(WIDEST + 0.06, middle, told, va="center", fontsize=style.SMALL)
 
 
 def _spring(ax: Axes, part: _Part) -> None:
@@ -117,12 +117,11 @@ def _spring(ax: Axes, part: _Part) -> None:
     ax.plot(sides, heights, color="black", linewidth=style.LINE)
 
 
-def _ends(ax: Axes, design: Design, parts: list[_Part], words: Words) -> None:
+def _ends(ax: Axes, design: Design, words: Words) -> None:
     tables = design.tables
     ax.add_patch(Rectangle((-0.24, -0.09), 0.48, 0.085, facecolor=style.SKY, edgecolor="black"))
     told = f"top drive: {number(tables.top_drive.inertia)} kg m²\n{tables.controller.law}"
-    ax.text(0.28, -0.05, told, va="center", fontsize=style.LABEL)
-    half = parts[-1].half
+    ax.text(0.28, -0.05, told, va="center", fontsize=style.SMALL)
     ax.add_patch(Rectangle((-0.1, 1.0), 0.2, 0.035, facecolor="#888888", edgecolor="black"))
     bit = [(-0.1, 1.035), (0.1, 1.035), (0.05, 1.075), (-0.05, 1.075)]
     ax.add_patch(Polygon(bit, facecolor=style.ORANGE, edgecolor="black"))
@@ -131,5 +130,5 @@ def _ends(ax: Axes, design: Design, parts: list[_Part], words: Words) -> None:
                   alpha=0.7)
     )  # fmt: skip
     weight = words.quantity(tables.operating_point.weight_on_bit, "N")
-    told = f"BHA: {number(tables.bha.inertia)} kg m²\n{weight} on bit"
-    ax.text(max(half, 0.1) + 0.12, 1.03, told, va="center", fontsize=style.LABEL)
+    told = f"BHA: {number(tables.bha.inertia)} kg m², {weight} on bit"
+    ax.text(WIDEST + 0.06, 1.045, told, va="center", fontsize=style.SMALL)
