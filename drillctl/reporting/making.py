@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -113,15 +113,17 @@ def report(
     progress.begin("writing the report", 1)
     document = compose(gathered, wanted, title)
     album = Album(run.path / "figures", gathered)
+    problems = (*gathered.problems, *album.collect(document))
+    document = replace(document, problems=problems)
     written, unwritten = files.write(document, album, run.path, kinds)
     if not written:
         raise DrillctlError("; ".join(unwritten.values()))
     content = _content(gathered, document, written, unwritten)
-    if gathered.problems:
+    if problems:
         files.unfinished(run.path, content)
     else:
         run.finish(content)
-    return Report(run.path, written, gathered.problems, interrupted, unwritten, content)
+    return Report(run.path, written, problems, interrupted, unwritten, content)
 
 
 def _profile(asked: str | Profile) -> Profile:
@@ -151,8 +153,8 @@ def _content(
         "design": design.name,
         "title": document.title,
         "profile": gathered.profile.name,
-        "complete": not gathered.problems,
-        "problems": list(gathered.problems),
+        "complete": not document.problems,
+        "problems": list(document.problems),
         "verdict": told_verdict(verdict(gathered)),
         "sections": [section.name for section in document.sections],
         "left_out": dict(document.left_out),

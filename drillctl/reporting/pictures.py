@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from drillctl.errors import InputError
+from drillctl.errors import DrillctlError, InputError
 from drillctl.json_files import read_json, write_json, write_text
-from drillctl.reporting.blocks import Figure
+from drillctl.plots.style import axes_or_new
+from drillctl.reporting.blocks import Document, Figure, InteractiveMap
 from drillctl.reporting.gather import Gathered
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawn
 
 DPI = 110
 """Of pictures as PNG, and of what is a bitmap within an SVG."""
@@ -69,12 +73,23 @@ class Album:
     def __init__(self, folder: Path, gathered: Gathered) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder, self._gathered = folder, gathered
+        self._problems: list[str] = []
         self._index: dict[str, Any] = {}
         if (folder / INDEX).is_file():
             try:
                 self._index = dict(read_json(folder / INDEX))
             except InputError:  # pictures are drawn anew
                 self._index = {}
+
+    def collect(self, document: Document) -> tuple[str, ...]:
+        """Draw every picture of a document that is not there; tells which could not be drawn."""
+        for section in document.sections:
+            for block in section.blocks:
+                if isinstance(block, Figure):
+                    self.picture(block)
+                elif isinstance(block, InteractiveMap):
+                    self.picture(block.figure)
+        return tuple(self._problems)
 
     def picture(self, figure: Figure) -> Picture:
         """The picture of a figure, drawn if it is not there."""
@@ -83,7 +98,11 @@ class Album:
         there = all((self._folder / f"{figure.name}.{kind}").is_file() for kind in ("svg", "png"))
         if held.get("key") == key and there:
             return self._made(figure.name, held)
-        made = self._draw(figure)
+        try:
+            made = self._draw(figure)
+        except (DrillctlError, ArithmeticError, ValueError, LookupError) as error:
+            self._problems.append(f"The picture {figure.name} could not be drawn: {error}")
+            return self._draw(replace(figure, draw=_blank))
         about = {k: v for k, v in asdict(made).items() if k not in ("name", "folder")}
         self._index[figure.name] = about | {"key": key}
         write_json(self._folder / INDEX, self._index)
@@ -114,6 +133,14 @@ class Album:
         left, up = float(place.x0), 1.0 - float(place.y1)
         box = (left, up, float(place.width), float(place.height))
         return Picture(figure.name, width, height, box, self._folder)
+
+
+def _blank() -> Drawn:
+    """In the place of a picture that could not be drawn."""
+    made, ax = axes_or_new(None, 6.0, 2.0)
+    ax.set_axis_off()
+    ax.text(0.5, 0.5, "could not be drawn: see the first lines", ha="center", va="center")
+    return made
 
 
 def _small(svg: str) -> str:

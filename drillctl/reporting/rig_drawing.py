@@ -58,7 +58,8 @@ def rig_drawing(design: Design, words: Words) -> Figure:
             ax.text(-0.22, part.bottom, shown, ha="right", va="center", fontsize=style.SMALL)
             ax.plot([-0.2, -part.half], [part.bottom] * 2, color="#888888", linewidth=0.6)
     _ends(ax, design, words)
-    ax.set_title(design.tables.title or design.name, fontsize=style.TITLE, loc="left", wrap=True)
+    title = (design.tables.title or design.name).replace("$", r"\$")
+    ax.set_title(title, fontsize=style.TITLE, loc="left", wrap=True)
     return figure
 
 

@@ -167,6 +167,27 @@ def test_an_interrupted_report_is_written_and_goes_on(tmp_path, monkeypatch, cap
     assert {"modes", "map", "regions"} <= set(told["sections"])
 
 
+def test_a_picture_that_cannot_be_drawn_is_told_first(tmp_path, monkeypatch):
+    def fail(*args: object) -> None:
+        raise ValueError("no ink")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("drillctl.reporting.sections.rig.rig_drawing", fail)
+        made = drillctl.report(small_design(), tmp_path / "r", TINY, sections=["rig", "glossary"])
+    told = "The picture rig could not be drawn: no ink"
+    assert made.problems == (told,)
+    page = made.files["html"].read_text(encoding="utf-8")
+    assert page.index("This report is not complete") < page.index(told) < page.index("<nav")
+    again = drillctl.report(small_design(), tmp_path / "r", TINY, sections=["rig", "glossary"])
+    assert again.problems == ()
+
+
+def test_a_title_is_no_formula(tmp_path):
+    design = small_design(title=r"costs $5 and \frac{ $")
+    made = drillctl.report(design, tmp_path / "r", TINY, sections=("rig", "map", "uncertainty"))
+    assert made.problems == ()
+
+
 def test_no_browser_is_told_with_the_way_to_one(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv(pdf.CHOICE, "no-such-browser")
     asked = ["report", "monteiro-trindade-140kn", "--sections", "glossary", "--format", "pdf"]
