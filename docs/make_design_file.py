@@ -84,6 +84,7 @@ TABLES = (
     ('[tune.parameters."dotted.path"]', tune_tables.RangeTable),
     ("[tune.weights]", tune_tables.TuneWeightsTable),
     ("[tune.constraints]", tune_tables.TuneConstraintsTable),
+    ("[tune.certificate]", tune_tables.TuneCertificateTable),
 )
 
 

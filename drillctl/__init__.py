@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from drillctl.studies import doctor as doctor
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
+    from drillctl.studies.robust import tune as tune
     from drillctl.studies.uncertainty import uncertainty as uncertainty
 
 _HOME = {
@@ -61,6 +62,7 @@ _HOME = {
     "doctor": "drillctl.studies",
     "stability_map": "drillctl.studies",
     "uncertainty": "drillctl.studies.uncertainty",
+    "tune": "drillctl.studies.robust",
     "open": "drillctl.store",
     "report": "drillctl.reporting.making",
     "plots": "drillctl",

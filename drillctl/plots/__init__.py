@@ -17,6 +17,8 @@
 - `three_regions.py`: `three_regions` over the same two parameters.
 - `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
 - `weight_delay.py`: `weight_delay`, a weight that follows the bit speed against its delay.
+- `tune_baselines.py`: `tune_baselines`, tuned gains beside others; `tune_neighbourhood.py`:
+  `tune_neighbourhood`, how far they may drift.
 - `uncertain_regions.py`: `uncertain_regions`, `probability_map` and `region_error` of draws.
 - `uncertain_curves.py`: `area_convergence`, `cell_distributions`, `sensitivity_bars`.
 - `time_response.py`: `time_response`, speeds against time with sticks shaded.
@@ -45,6 +47,8 @@ from drillctl.plots.regularisation import regularisation
 from drillctl.plots.root_locus import root_locus
 from drillctl.plots.three_regions import three_regions
 from drillctl.plots.time_response import time_response
+from drillctl.plots.tune_baselines import tune_baselines
+from drillctl.plots.tune_neighbourhood import tune_neighbourhood
 from drillctl.plots.uncertain_curves import (
     area_convergence,
     cell_distributions,
@@ -83,6 +87,8 @@ __all__ = [
     "sweep_line",
     "three_regions",
     "time_response",
+    "tune_baselines",
+    "tune_neighbourhood",
     "uncertain_regions",
     "weight_delay",
 ]

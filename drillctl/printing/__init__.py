@@ -5,6 +5,7 @@ from drillctl.printing.doctor import doctor
 from drillctl.printing.linear import loop, modes
 from drillctl.printing.maps import adaptive_map, regions, regularisation, sweep
 from drillctl.printing.runs import cycle, simulation
+from drillctl.printing.tuning import tune
 from drillctl.printing.uncertainty import uncertainty
 from drillctl.printing.weight_delay import weight_delay
 
@@ -19,6 +20,7 @@ __all__ = [
     "regularisation",
     "simulation",
     "sweep",
+    "tune",
     "uncertainty",
     "weight_delay",
 ]

@@ -1,6 +1,6 @@
 """Kinds of result: what each was asked for, and how it is read back."""
 
-from drillctl.store.kinds import comparisons, doctor, linear, maps, runs, uncertainty
+from drillctl.store.kinds import comparisons, doctor, linear, maps, runs, tuning, uncertainty
 
 KINDS = (
     *linear.KINDS,
@@ -8,6 +8,7 @@ KINDS = (
     *maps.KINDS,
     *comparisons.KINDS,
     *uncertainty.KINDS,
+    *tuning.KINDS,
     *doctor.KINDS,
 )
 """Every kind that is written and read back."""
