@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from drillctl import console
+from drillctl.cli import running
 from drillctl.cli.options import Options, computing
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def report(
     """The whole design decided, drawn and audited: one HTML file, PDF or Markdown."""
     from drillctl.reporting import report as made
 
-    with console.progress() as bar:
+    with console.progress() as bar, running.library_output_on_stderr():
         found = made(
             design,
             options.out,
