@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout, suppress
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -58,7 +54,7 @@ def tune(
     ):
         _end(folder.summary()["passed"], folder.summary()["message"])
         return
-    with running.guarded(folder), console.progress() as bar, _library_output_on_stderr():
+    with running.guarded(folder), console.progress() as bar, running.library_output_on_stderr():
         result = drillctl.tune(design, exhaustive, progress=bar, verbose=options.verbose)
     _write(result, folder.path)
     for name, figure in _pictures(result, options):
@@ -93,21 +89,3 @@ def _pictures(result: Tune, options: Options) -> Iterable[tuple[str, Figure]]:
 
     yield "baselines", plots.tune_baselines(result)
     yield "neighbourhood", plots.tune_neighbourhood(result, system=options.units)
-
-
-@contextmanager
-def _library_output_on_stderr() -> Iterator[None]:
-    """What a library prints by itself goes to stderr, be it by C or by Python: stdout is JSON's."""
-    import ctypes
-
-    sys.stdout.flush()
-    kept = os.dup(1)
-    os.dup2(2, 1)
-    try:
-        with redirect_stdout(sys.stderr):
-            yield
-    finally:
-        with suppress(OSError, TypeError):  # not every system names its C library so
-            ctypes.CDLL(None).fflush(None)  # what C holds back goes where it was meant to
-        os.dup2(kept, 1)
-        os.close(kept)
