@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from drillctl.studies.advantage import Advantage
     from drillctl.studies.advantage.cases import Case
     from drillctl.studies.advantage.chart import Chart
-    from drillctl.studies.advantage.delays import Crossing
+    from drillctl.studies.advantage.delays import Crossing, DelayLine
     from drillctl.studies.advantage.measured import Estimate
 
 
@@ -123,12 +123,12 @@ def _map(found: Chart, system: units.System) -> None:
 def _delay(result: Advantage) -> None:
     found = result.delay
     rows = []
-    for k, delay in enumerate(found.delays):
-        row = [f"{delay:g} s"]
-        for one in (found.kept, found.anew):
-            at = int(np.searchsorted(one.delays, delay))
-            row.append(f"{one.advantage[at]:+.2f} ({one.low[at]:.2f} to {one.high[at]:.2f})")
-        kp, ki, gain = found.anew.gains[k]
+    for delay in np.union1d(found.kept.delays, found.anew.delays):
+        row = [f"{delay:g} s", *(_at(one, float(delay)) for one in (found.kept, found.anew))]
+        if delay not in found.anew.delays:
+            rows.append([*row, "-"])
+            continue
+        kp, ki, gain = found.anew.gains[np.searchsorted(found.anew.delays, delay)]
         rows.append([*row, f"{kp:.0f}, {ki:.0f}, {gain / 1e3:.2f}"])
     heads = ["delay", "gains of the ideal path (s)", "tuned anew (s)", "its kp, ki, K_w (kN s/rad)"]
     table("advantage of the real path against its delay", heads, rows)
@@ -141,6 +141,14 @@ def _delay(result: Advantage) -> None:
     first = found.anew.indistinct_from
     where = f"at no delay up to {longest:g} s" if first is None else f"from {first:g} s on the grid"
     line(f"gains tuned anew: interval not above zero {where}")
+
+
+def _at(line: DelayLine, delay: float) -> str:
+    """Advantage at a delay, with its interval, if that delay was looked at."""
+    if delay not in line.delays:
+        return "-"
+    at = int(np.searchsorted(line.delays, delay))
+    return f"{line.advantage[at]:+.2f} ({line.low[at]:.2f} to {line.high[at]:.2f})"
 
 
 def _crossing(found: Crossing, longest: float) -> str:

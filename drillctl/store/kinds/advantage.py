@@ -32,7 +32,7 @@ def read_advantage(design: Design, data: xarray.Dataset, summary: dict[str, Any]
         front=_chart("front", np.array(summary["front"]["speeds"]), data),
         chart=_chart("map", data["speed"].values, data),
         delay=DelayCurve(
-            data["anew_delay"].values,
+            np.array(summary["delay"]["delays"]),
             summary["delay"]["constant"],
             _line("kept", data, summary["delay"]),
             _line("anew", data, summary["delay"]),

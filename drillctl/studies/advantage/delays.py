@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 STEPS = 10
 """Into which a step of the grid is divided where kept gains lose their advantage."""
+STEPS_ANEW = 5
+"""The same where gains tuned anew do, each of which is a search."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class DelayLine:
     Attributes
     ----------
     delays : ndarray, shape (delays,)
-        Increasing (s); of kept gains closer together where their advantage vanishes.
+        Increasing (s), closer together where the advantage vanishes.
     gains : ndarray, shape (delays, 3)
         kp, ki and the gain of the weight (SI).
     objective : ndarray, shape (delays,)
@@ -148,25 +150,39 @@ def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Prog
     delays, fixed = np.array(table.delays), optima.ideal.values
     # As many draws as the constant weight was tuned at: fewer would fit their own draws more.
     draws = compared.real.design.tables.tune.realizations
-    anew: list[Array] = []
-    found: list[Array] = []
+    anew: Points = {}
+    last = optima.real.values
     for delay in table.delays:
         policy = _late(compared.real, delay)
-        starts = [optima.real.values, *anew[-1:]]
-        anew.append(optimum_beside(policy, draws, optima.constant, starts).values)
-        found.append(_measured(policy, anew[-1], fresh))
+        last = optimum_beside(policy, draws, optima.constant, [optima.real.values, last]).values
+        anew[delay] = last, _measured(policy, last, fresh)
         progress.advance(1)
-    kept = {delay: _measured(_late(compared.real, delay), fixed, fresh) for delay in table.delays}
-    for delay in _between(delays, np.array([ground.value - one[0] for one in kept.values()])):
-        kept[delay] = _measured(_late(compared.real, delay), fixed, fresh)
-    where = np.array(sorted(kept))
+    none = table.material * ground.value
+    for delay in _between(delays, _advantages(ground.value, anew) - none, STEPS_ANEW):
+        policy, beside = _late(compared.real, delay), anew[max(d for d in anew if d < delay)][0]
+        gains = optimum_beside(policy, draws, optima.constant, [optima.real.values, beside]).values
+        anew[delay] = gains, _measured(policy, gains, fresh)
+    kept: Points = {
+        delay: (fixed, _measured(_late(compared.real, delay), fixed, fresh))
+        for delay in table.delays
+    }
+    for delay in _between(delays, _advantages(ground.value, kept), STEPS):
+        kept[delay] = fixed, _measured(_late(compared.real, delay), fixed, fresh)
     return DelayCurve(
         delays,
         ground.value,
-        _line(where, np.stack([fixed] * len(where)), np.stack([kept[d] for d in where]), constant,
-              table.material),
-        _line(delays, np.stack(anew), np.stack(found), constant, table.material),
-    )  # fmt: skip
+        _line(kept, constant, table.material),
+        _line(anew, constant, table.material),
+    )
+
+
+Points = dict[float, tuple[Array, Array]]
+"""Gains, and what was measured with them, by delay (s)."""
+
+
+def _advantages(constant: float, points: Points) -> Array:
+    """Over increasing delays (s)."""
+    return np.array([constant - points[delay][1][0] for delay in sorted(points)])
 
 
 def _late(policy: Policy, delay: float) -> Policy:
@@ -179,7 +195,7 @@ def _measured(policy: Policy, gains: Array, fresh: Fresh) -> Array:
     return np.append(measured.value, measured.resampled(fresh))
 
 
-def _between(delays: Array, advantage: Array) -> list[float]:
+def _between(delays: Array, advantage: Array, steps: int) -> list[float]:
     """Delays between the two of the grid where an advantage first vanishes.
 
     It falls off a cliff there, where draws begin to stick: a straight line over a wide step of the
@@ -189,12 +205,15 @@ def _between(delays: Array, advantage: Array) -> list[float]:
     if not over.size or over[0] == 0:
         return []
     k = int(over[0])
-    inside = np.linspace(delays[k - 1], delays[k], STEPS + 1)[1:-1]
+    inside = np.linspace(delays[k - 1], delays[k], steps + 1)[1:-1]
     return [float(delay) for delay in inside]
 
 
-def _line(delays: Array, gains: Array, found: Array, constant: Array, share: float) -> DelayLine:
-    """A line from objectives, shape (delays, 1 + resamples), those of the draws first."""
+def _line(points: Points, constant: Array, share: float) -> DelayLine:
+    """A line from what was measured: objectives of the draws, then of every resample."""
+    delays = np.array(sorted(points))
+    gains = np.stack([points[delay][0] for delay in delays.tolist()])
+    found = np.stack([points[delay][1] for delay in delays.tolist()])
     apart = less(constant, found)
     ends = [estimate(float(row[0]), row[1:]).interval or (np.nan, np.nan) for row in apart]
     padded = np.zeros((len(gains), 3))

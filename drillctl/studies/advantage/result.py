@@ -98,7 +98,7 @@ class Advantage:
             "weight": ("weight", self.chart.weights, {"units": "N"}),
             "speed": ("speed", self.chart.speeds, {"units": "rad/s"}),
             "kept_delay": ("kept_delay", self.delay.kept.delays, {"units": "s"}),
-            "anew_delay": ("anew_delay", self.delay.delays, {"units": "s"}),
+            "anew_delay": ("anew_delay", self.delay.anew.delays, {"units": "s"}),
         }
         variables: dict[str, Any] = {
             f"case_{name}": (
