@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO := runs/demo
 
-.PHONY: demo test test-all test-lowest lint format bench reports clean
+.PHONY: demo test test-all test-lowest lint format docs bench reports clean
 
 $(BIN)/drillctl: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -41,6 +41,12 @@ lint: $(BIN)/drillctl
 format: $(BIN)/drillctl
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# The documentation site, in build/docs; warnings and broken links are errors.
+docs: $(BIN)/drillctl
+	$(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
+	$(BIN)/python docs/check_links.py build/docs
+	@echo "site: $(CURDIR)/build/docs/index.html"
 
 # The table, the JSON file and the picture of benchmarks/README.md. A peer that cannot be installed
 # is told there as missing. `make bench BENCH=--quick` for a look.

@@ -45,7 +45,7 @@ class Regularisation:
         Speeds over which tanh changes the sign of the friction (rad/s), widest first.
     j1 : ndarray, shape of the map
         J1 of the set-valued law (s).
-    smoothed : ndarray, shape (widths, *shape of the map)
+    smoothed : ndarray, shape (widths, axes of the map)
         J1 of the regularised law (s).
     total_seconds : float
         From call to return (s).

@@ -65,9 +65,9 @@ class Uncertainty:
         Levels of J1 (s).
     drawn : dict of ndarray, shape (realizations,)
         Values (SI) of what is uncertain, by path.
-    measures : dict of ndarray, shape (realizations, *map)
+    measures : dict of ndarray, shape (realizations, axes of the map)
         `j1` and what else was kept; NaN where undefined.
-    status : ndarray of int8, shape (realizations, *map)
+    status : ndarray of int8, shape (realizations, axes of the map)
         Index into `simulation.measures.STATUSES`.
     nominal : ndarray, shape of the map
         J1 of the design itself (s).

@@ -1,0 +1,34 @@
+"""The Python surface on one page: each object once, where a user would import it from."""
+
+from typing import Any
+
+from sphinx.application import Sphinx
+from sphinx.util.typing import ExtensionMetadata
+
+import drillctl
+
+
+def leave_out(
+    app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: Any
+) -> bool | None:
+    """Skip in a package what the front door shows, and what is a module."""
+    if what != "module":
+        return None
+    here = app.env.current_document.autodoc_module
+    at_the_door = here != "drillctl" and name in drillctl.__all__
+    return True if at_the_door and getattr(drillctl, name) is thing else None
+
+
+def without_map(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
+) -> None:
+    """Leave out the map of files that a package begins with: it is for those who work in it."""
+    if what == "module":
+        lines.clear()
+
+
+def setup(app: Sphinx) -> ExtensionMetadata:
+    """Listen to what autodoc finds."""
+    app.connect("autodoc-skip-member", leave_out)
+    app.connect("autodoc-process-docstring", without_map)
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
