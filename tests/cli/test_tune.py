@@ -14,6 +14,14 @@ import drillctl
 from drillctl.cli import run
 from drillctl.errors import InputError
 
+HOLDS = (
+    (
+        "the command `tune`",
+        "messages and exit codes; the tuned design in `simulate` and `map`; IPOPT in a "
+        "process of its own",
+    ),
+)
+
 SHIPPED = "robust-gains-140kn"
 SMALL = [
     "--realizations", "24", "--certificate", "150", "--set", "tune.starts=1",

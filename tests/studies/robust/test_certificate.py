@@ -21,6 +21,14 @@ from drillctl.studies.robust.fresh import Fresh, FreshRuns
 from drillctl.studies.robust.tolerance import HALVINGS, LOOKED_AT
 from drillctl.studies.robust.tuned import put, tuned_parameters
 
+HOLDS = (
+    (
+        "certificate of gains",
+        "runs of `compare` at the same draws, to the last bit; tolerances by their ends; 40 "
+        "tunes against 20,000 further draws each (slow)",
+    ),
+)
+
 PAPER = "monteiro-trindade-140kn"
 WINDOW = {"controller.kp": {"min": 400, "max": 800}, "controller.ki": {"min": 0, "max": 200}}
 
