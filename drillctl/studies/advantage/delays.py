@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from drillctl.progress import Progress
 from drillctl.studies.advantage.cases import Optima, optimum_beside
 from drillctl.studies.advantage.measured import Fresh, estimate, less
+from drillctl.studies.advantage.optimum import Optimum
 from drillctl.studies.advantage.policies import DELAY, Policies, Policy
 from drillctl.studies.delay_limits import first_not_negative
 from drillctl.studies.intervals import CONFIDENCE
@@ -148,25 +149,12 @@ def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Prog
     constant = np.append(ground.value, ground.resampled(fresh))
     table = compared.real.design.tables.advantage
     delays, fixed = np.array(table.delays), optima.ideal.values
-    # As many draws as the constant weight was tuned at: fewer would fit their own draws more.
-    draws = compared.real.design.tables.tune.realizations
-    anew: Points = {}
-    last = optima.real.values
-    for delay in table.delays:
-        policy = _late(compared.real, delay)
-        last = optimum_beside(policy, draws, optima.constant, [optima.real.values, last]).values
-        anew[delay] = last, _measured(policy, last, fresh)
-        progress.advance(1)
-    none = table.material * ground.value
-    for delay in _between(delays, _advantages(ground.value, anew) - none, STEPS_ANEW):
-        policy, beside = _late(compared.real, delay), anew[max(d for d in anew if d < delay)][0]
-        gains = optimum_beside(policy, draws, optima.constant, [optima.real.values, beside]).values
-        anew[delay] = gains, _measured(policy, gains, fresh)
+    anew = _tuned_anew(compared.real, optima, fresh, ground.value, progress)
     kept: Points = {
         delay: (fixed, _measured(_late(compared.real, delay), fixed, fresh))
         for delay in table.delays
     }
-    for delay in _between(delays, _advantages(ground.value, kept), STEPS):
+    for delay in _between(delays, _advantages(ground.value, kept)):
         kept[delay] = fixed, _measured(_late(compared.real, delay), fixed, fresh)
     return DelayCurve(
         delays,
@@ -174,6 +162,51 @@ def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Prog
         _line(kept, constant, table.material),
         _line(anew, constant, table.material),
     )
+
+
+def _tuned_anew(
+    policy: Policy, optima: Optima, fresh: Fresh, constant: float, progress: Progress
+) -> Points:
+    """Gains tuned at each delay of the grid, and closer where the advantage vanishes.
+
+    What is best at one delay is a start for the next. Where the grid has lost the advantage in a
+    step, the small steps into it may carry it over the end: then it is looked for in the next.
+    """
+    table, tune = policy.design.tables.advantage, policy.design.tables.tune
+    found: dict[float, Optimum] = {}
+
+    def tuned(delay: float, start: Array) -> Optimum:
+        # As many draws as the constant weight was tuned at: fewer would fit their own draws more.
+        return optimum_beside(
+            _late(policy, delay), tune.realizations, optima.constant, [optima.real.values, start]
+        )
+
+    def points() -> Points:
+        return {
+            delay: (one.values, _measured(_late(policy, delay), one.values, fresh))
+            for delay, one in sorted(found.items())
+        }
+
+    last = optima.real.values
+    for delay in table.delays:
+        found[delay] = tuned(delay, last)
+        last = found[delay].values
+        progress.advance(1)
+    none = table.material * constant
+    while True:
+        measured = points()
+        over = [d for d in table.delays if constant - measured[d][1][0] <= none]
+        before = [d for d in table.delays if over and d < over[0]]
+        if not before:
+            return measured
+        last = found[before[-1]].values
+        for delay in np.linspace(before[-1], over[0], STEPS_ANEW + 1)[1:-1].tolist():
+            found[delay] = tuned(delay, last)
+            last = found[delay].values
+        again = tuned(over[0], last)
+        if not again.value < found[over[0]].value:
+            return points()
+        found[over[0]] = again
 
 
 Points = dict[float, tuple[Array, Array]]
@@ -195,7 +228,7 @@ def _measured(policy: Policy, gains: Array, fresh: Fresh) -> Array:
     return np.append(measured.value, measured.resampled(fresh))
 
 
-def _between(delays: Array, advantage: Array, steps: int) -> list[float]:
+def _between(delays: Array, advantage: Array) -> list[float]:
     """Delays between the two of the grid where an advantage first vanishes.
 
     It falls off a cliff there, where draws begin to stick: a straight line over a wide step of the
@@ -205,7 +238,7 @@ def _between(delays: Array, advantage: Array, steps: int) -> list[float]:
     if not over.size or over[0] == 0:
         return []
     k = int(over[0])
-    inside = np.linspace(delays[k - 1], delays[k], steps + 1)[1:-1]
+    inside = np.linspace(delays[k - 1], delays[k], STEPS + 1)[1:-1]
     return [float(delay) for delay in inside]
 
 
