@@ -58,19 +58,7 @@ clean:
 	rm -rf runs build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -not -path "./$(VENV)*" -prune -exec rm -rf {} +
 
-# The committed figures and summaries, made again.
-REPORT := reports/monteiro-trindade-140kn
+# Everything under reports/, made again; the HTML of each report under runs/reports/.
 reports: $(BIN)/drillctl
-	rm -rf runs/reports
-	$(BIN)/drillctl modes monteiro-trindade-140kn --out runs/reports/modes
-	$(BIN)/drillctl loop monteiro-trindade-140kn --out runs/reports/loop
-	$(BIN)/drillctl regions monteiro-trindade-140kn --out runs/reports/regions
-	$(BIN)/drillctl regularisation monteiro-trindade-140kn --out runs/reports/regularisation
-	$(BIN)/drillctl simulate monteiro-trindade-140kn --out runs/reports/simulate
-	$(BIN)/drillctl map monteiro-trindade-140kn --out runs/reports/map
+	$(BIN)/python reports/make.py
 	$(BIN)/python docs/make_weight_on_bit.py
-	mkdir -p $(REPORT)
-	cp runs/reports/*/*.png $(REPORT)/
-	cp runs/reports/map/summary.json runs/reports/map/regions.csv $(REPORT)/
-	cp runs/reports/loop/summary.json $(REPORT)/loop.json
-	cp runs/reports/regions/summary.json $(REPORT)/three-regions.json

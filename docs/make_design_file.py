@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from drillctl.design import (
+    advantage_tables,
     bit_rock_tables,
     compare_tables,
     controller_tables,
@@ -84,6 +85,8 @@ TABLES = (
     ('[tune.parameters."dotted.path"]', tune_tables.RangeTable),
     ("[tune.weights]", tune_tables.TuneWeightsTable),
     ("[tune.constraints]", tune_tables.TuneConstraintsTable),
+    ("[advantage]", advantage_tables.AdvantageTable),
+    ("[tune.certificate]", tune_tables.TuneCertificateTable),
 )
 
 

@@ -14,6 +14,7 @@ A design flows one way: file -> `Design` -> plant -> simulation -> map -> region
 `studies`               sweeps, regions, comparisons, audits
 `plots`                 a result in, a figure out
 `store`                 results on disk
+`reporting`             a design's results as HTML, PDF or Markdown
 `units`, `errors`       quantities at the edge; exceptions
 ======================  ==========================================================
 
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from drillctl.errors import InputError as InputError
     from drillctl.linear import loop as loop
     from drillctl.linear import modes as modes
+    from drillctl.reporting.making import report as report
     from drillctl.simulation import simulate as simulate
     from drillctl.simulation.limit_cycle import limit_cycle as limit_cycle
     from drillctl.store import open as open
@@ -43,6 +45,8 @@ if TYPE_CHECKING:
     from drillctl.studies import doctor as doctor
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
+    from drillctl.studies.advantage import advantage as advantage
+    from drillctl.studies.robust import tune as tune
     from drillctl.studies.uncertainty import uncertainty as uncertainty
 
 _HOME = {
@@ -54,12 +58,15 @@ _HOME = {
     "simulate": "drillctl.simulation",
     "limit_cycle": "drillctl.simulation.limit_cycle",
     "sweep": "drillctl.studies",
+    "advantage": "drillctl.studies.advantage",
     "adaptive_map": "drillctl.studies",
     "compare": "drillctl.studies",
     "doctor": "drillctl.studies",
     "stability_map": "drillctl.studies",
     "uncertainty": "drillctl.studies.uncertainty",
+    "tune": "drillctl.studies.robust",
     "open": "drillctl.store",
+    "report": "drillctl.reporting.making",
     "plots": "drillctl",
 }
 

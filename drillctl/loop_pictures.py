@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from drillctl.design import Design
+    from drillctl.linear.response import FrequencyResponse
     from drillctl.studies import Axis
 
 Array = NDArray[np.float64]
@@ -41,7 +44,18 @@ def over_gains(axes: tuple[Axis, ...]) -> bool:
 
 
 def loop_figures(result: LoopAnalysis) -> dict[str, Figure]:
-    """Figures of a loop by the name of their file.
+    """Figures of a loop by the name of their file; see `loop_drawings`.
+
+    Parameters
+    ----------
+    result : LoopAnalysis
+        Of one design.
+    """
+    return {name: draw() for name, draw in loop_drawings(result).items()}
+
+
+def loop_drawings(result: LoopAnalysis) -> dict[str, Callable[[], Figure]]:
+    """What draws each figure of a loop, by the name of its file.
 
     Parameters
     ----------
@@ -54,57 +68,79 @@ def loop_figures(result: LoopAnalysis) -> dict[str, Figure]:
         Mobility at bit and top, of the elements and of the continuum; with a speed controller
         Bode plot from the set speed, Nyquist, Nichols, sensitivities, root locus and boundary
         in the plane of the gains; on a distributed string impedance and reflection of the drive.
+        Responses are computed when one of them is drawn.
     """
+    design, bit = result.design, result.bit_side
+    drawings: dict[str, Callable[[], Figure]] = {"mobility": partial(_mobility, design)}
+    if any(design.top_drive.gains()):
+        if bit.path is None or bit.path.observer is None:
+            drawings |= _of_loop(result, bit)
+        if design.simple_drive and bit.path is None:
+            drawings |= _over_gains(design, bit.slope)
+    if design.string.parts.sections[0].inertia > 0.0:
+        drawings["impedance"] = partial(_impedance, design)
+    return drawings
+
+
+def _mobility(design: Design) -> Figure:
     from drillctl import plots
 
-    design = result.design
-    bit = result.bit_side
     frequencies = telling_frequencies(design.string)
     models = ["finite-elements"]
     if design.string.parts.modal_damping == 0.0:
         models.append("wave")
     strings = [frequency_response(design, frequencies, model=m) for m in models]  # type: ignore[arg-type]
     closed = frequency_response(design, frequencies, "closed_loop")
-    figures = {"mobility": plots.mobility([*strings, closed])}
-    if any(design.top_drive.gains()):
-        if bit.path is None or bit.path.observer is None:
-            figures |= _of_loop(result, bit, frequencies)
-        if design.simple_drive and bit.path is None:
-            figures |= _over_gains(design, bit.slope)
-    first = design.string.parts.sections[0]
-    if first.inertia > 0.0:
-        mark = stick_slip_frequency(design.string) / (2.0 * math.pi)
-        figures["impedance"] = plots.drive_impedance(drive_impedance(design), marks=(mark,))
-    return figures
+    return plots.mobility([*strings, closed])
 
 
-def _of_loop(result: LoopAnalysis, bit: BitSide, frequencies: Array) -> dict[str, Figure]:
+def _impedance(design: Design) -> Figure:
+    from drillctl import plots
+
+    mark = stick_slip_frequency(design.string) / (2.0 * math.pi)
+    return plots.drive_impedance(drive_impedance(design), marks=(mark,))
+
+
+def _of_loop(result: LoopAnalysis, bit: BitSide) -> dict[str, Callable[[], Figure]]:
     """Bode plot from the set speed, and what tells the margins at the top."""
     from drillctl import plots
 
-    design, closed = result.design, {"slope": bit.slope, "path": bit.path}
-    drilling = frequency_response(design, frequencies, "closed_loop", **closed)  # type: ignore[arg-type]
-    grid = pole_grid(ends_of(design.string), result.poles) / (2.0 * math.pi)
-    cut = frequency_response(design, grid, "open_loop", **closed)  # type: ignore[arg-type]
+    design = result.design
+
+    def response(frequencies: Array, of: str) -> FrequencyResponse:
+        return frequency_response(design, frequencies, of, slope=bit.slope, path=bit.path)  # type: ignore[arg-type]
+
+    @cache
+    def cut() -> FrequencyResponse:
+        grid = pole_grid(ends_of(design.string), result.poles) / (2.0 * math.pi)
+        return response(grid, "open_loop")
+
+    def drilling() -> FrequencyResponse:
+        return response(telling_frequencies(design.string), "closed_loop")
+
     return {
-        "closed-loop": plots.bode(drilling),
-        "nyquist": plots.nyquist(cut, analysis=result),
-        "nichols": plots.nichols(cut, analysis=result),
-        "sensitivity": plots.sensitivity(cut, analysis=result),
+        "closed-loop": lambda: plots.bode(drilling()),
+        "nyquist": lambda: plots.nyquist(cut(), analysis=result),
+        "nichols": lambda: plots.nichols(cut(), analysis=result),
+        "sensitivity": lambda: plots.sensitivity(cut(), analysis=result),
     }
 
 
-def _over_gains(design: Design, slope: float) -> dict[str, Figure]:
+def _over_gains(design: Design, slope: float) -> dict[str, Callable[[], Figure]]:
     """Root locus over the proportional gain and the boundary of the stable gains."""
     from drillctl import plots
 
-    figures = {"boundary": plots.gain_boundary(gain_boundary(design, _window(design), slope))}
-    kp, _ = design.top_drive.gains()
-    path = GAINS[0]
+    def locus() -> Figure:
+        kp, _ = design.top_drive.gains()
+        values = np.linspace(0.25, 2.0, 141) * (kp or 500.0)
+        return plots.root_locus(root_locus(design, GAINS[0], values))
+
+    drawings: dict[str, Callable[[], Figure]] = {
+        "boundary": lambda: plots.gain_boundary(gain_boundary(design, _window(design), slope))
+    }
     if design.string.nodes <= MOST_NODES and design.tables.controller.law == "pi":
-        locus = root_locus(design, path, np.linspace(0.25, 2.0, 141) * (kp or 500.0))
-        figures["root-locus"] = plots.root_locus(locus)
-    return figures
+        drawings["root-locus"] = locus
+    return drawings
 
 
 def _window(design: Design) -> Window:

@@ -7,6 +7,13 @@ import drillctl
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies import Sweep
 
+HOLDS = (
+    (
+        "the paper's map",
+        "cells and bounds per level, minimum, statements 1-3",
+    ),
+)
+
 CELLS = {20: 10, 30: 49, 33: 59, 40: 78, 50: 94}
 BOUNDS = {
     20: ((600, 650), (125, 175)),

@@ -11,6 +11,13 @@ from scipy import stats
 import drillctl
 from drillctl.studies.uncertainty import uncertainty
 
+HOLDS = (
+    (
+        "the paper's Fig. 6",
+        "statements 4 and 5; independently computed areas and best gains",
+    ),
+)
+
 KP, KI = "controller.kp", "controller.ki"
 
 

@@ -7,7 +7,17 @@ shipped name. Exit codes: 0 done, 2 the input is wrong, 130 interrupted, 1 anyth
 
 from collections.abc import Callable
 
-from drillctl.cli import comparisons, files, linear, maps, runs, uncertain
+from drillctl.cli import (
+    advantage,
+    comparisons,
+    files,
+    linear,
+    maps,
+    reports,
+    runs,
+    tuning,
+    uncertain,
+)
 from drillctl.cli.app import app, run
 
 VERBS: dict[str, Callable[..., None]] = {
@@ -26,7 +36,10 @@ VERBS: dict[str, Callable[..., None]] = {
     "doctor": maps.doctor,
     "compare": comparisons.compare,
     "delay": comparisons.delay,
+    "advantage": advantage.advantage,
     "uncertainty": uncertain.uncertainty,
+    "tune": tuning.tune,
+    "report": reports.report,
 }
 """Every verb, in the order of the help."""
 

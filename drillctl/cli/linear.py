@@ -38,12 +38,12 @@ def modes(
         result = linear.modes(design, count)
     summary = result.summary()
     store.write_data(result, folder.path)
-    running.draw(plots.mode_shapes(result), folder.path / "modes.png")
+    running.draw(plots.mode_shapes(result, system=options.units), folder.path / "modes.png")
     string, frequencies = design.string, linear.telling_frequencies(design.string)
     running.draw(
         plots.bode(linear.frequency_response(string, frequencies)), folder.path / "bode.png"
     )
-    running.draw(plots.friction_curves(design), folder.path / "friction.png")
+    running.draw(plots.friction_curves(design, system=options.units), folder.path / "friction.png")
     if not options.json:
         printing.modes(summary)
     running.conclude(folder, summary, options)

@@ -60,7 +60,9 @@ def _asked_of_all(
     return Options(out, json, units, verbose)
 
 
-def computing(verb: Callable[..., None]) -> Callable[..., None]:
+def computing(
+    verb: Callable[..., None], system: Literal["si", "field"] = "si"
+) -> Callable[..., None]:
     """A verb as the command line sees it.
 
     Parameters
@@ -69,13 +71,16 @@ def computing(verb: Callable[..., None]) -> Callable[..., None]:
         Takes `design` and `options`; on the command line these two stand for the name of a
         design with `--set`, and for the options of every verb that computes. Its other
         parameters are its own.
+    system : {'si', 'field'}
+        Units that it speaks unless others are asked for.
 
     Returns
     -------
     callable
         With the signature that typer reads.
     """
-    shared = inspect.signature(_asked_of_all, eval_str=True).parameters
+    shared = dict(inspect.signature(_asked_of_all, eval_str=True).parameters)
+    shared["units"] = shared["units"].replace(default=system)
     own = [
         parameter.replace(annotation=eval(parameter.annotation, verb.__globals__))
         for parameter in inspect.signature(verb).parameters.values()

@@ -41,15 +41,28 @@ class WeightDelayTable(Table):
     @field_validator("values", mode="before")
     @classmethod
     def _by_path(cls, value: object) -> object:
-        if not isinstance(value, Mapping):
-            return value
-        values = _leaves(value)
-        for path in values:
-            if not path.startswith(LAW):
-                raise InputError(f"{path!r} is not allowed: paths begin with {LAW!r}")
-            if path in VARIED:
-                raise InputError(f"{path!r} is not allowed: it is what the study runs over")
-        return values
+        return paths_of_weight(value, VARIED)
+
+
+def paths_of_weight(value: object, varied: tuple[str, ...]) -> object:
+    """Values of `[weight_on_bit]` by dotted path.
+
+    Parameters
+    ----------
+    value : object
+        As the file gives them.
+    varied : tuple of str
+        Paths that a study runs over itself, and that are refused.
+    """
+    if not isinstance(value, Mapping):
+        return value
+    values = _leaves(value)
+    for path in values:
+        if not path.startswith(LAW):
+            raise InputError(f"{path!r} is not allowed: paths begin with {LAW!r}")
+        if path in varied:
+            raise InputError(f"{path!r} is not allowed: it is what the study runs over")
+    return values
 
 
 def _leaves(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

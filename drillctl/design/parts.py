@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 from drillctl.bit_rock import (
     BitRockLaw,
@@ -49,6 +50,10 @@ MOST_ELEMENTS = 10_000
 """Elements of a whole string: some metres each; beyond, matrices outgrow the memory."""
 
 
+# Thousands of draws of a rock share a string, which nothing changes once it is assembled.
+_assembled = lru_cache(maxsize=4)(assemble)
+
+
 def drillstring(tables: DesignTables) -> Drillstring:
     """Assemble the string of a design.
 
@@ -59,7 +64,7 @@ def drillstring(tables: DesignTables) -> Drillstring:
     """
     table = tables.drillstring
     refuse_impossible_string(tables)
-    return assemble(
+    return _assembled(
         tuple(section(s) for s in table.sections),
         top_inertia=tables.top_drive.inertia,
         bit_inertia=tables.bha.inertia,

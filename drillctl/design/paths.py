@@ -17,7 +17,7 @@ from drillctl.units import Kind
 
 _HIDDEN = (
     "title", "source", "status", "notes", "schema_version", "map", "uncertain", "uncertainty",
-    "compare", "weight_delay", "tune",
+    "compare", "weight_delay", "tune", "advantage",
 )  # fmt: skip
 
 

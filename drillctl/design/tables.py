@@ -12,6 +12,7 @@ from pydantic import Field, field_validator, model_validator
 
 from drillctl import units
 from drillctl.design import quantities as q
+from drillctl.design.advantage_tables import AdvantageTable
 from drillctl.design.axis_table import AxisTable as AxisTable
 from drillctl.design.base import Table as Table
 from drillctl.design.bit_rock_tables import BitRockTable
@@ -257,6 +258,7 @@ class DesignTables(Table):
     compare: CompareTable = CompareTable()
     weight_delay: WeightDelayTable = WeightDelayTable()
     tune: TuneTable = TuneTable()
+    advantage: AdvantageTable = AdvantageTable()
 
     @field_validator("uncertain", mode="before")
     @classmethod

@@ -11,6 +11,9 @@ from drillctl.design.base import Table, number_or_quantity
 from drillctl.design.uncertain_tables import flattened
 from drillctl.errors import InputError
 
+FRESH = 1_000_003
+"""From the seed of a search to that of its certificate, where none is given."""
+
 
 def _inside(value: float) -> float:
     if not 0.0 < value < 1.0:
@@ -73,6 +76,19 @@ class TuneConstraintsTable(Table):
         return None if value is None else _inside(value)
 
 
+class TuneCertificateTable(Table):
+    """How found gains are certified: runs that the search has not seen.
+
+    `realizations` fresh draws, always independent ones (`monte-carlo`), at the accuracy of the
+    design; `seed` of them, by default that of the search and 1000003, never that of the search;
+    `audit`: how many of them the reference solver runs again.
+    """
+
+    realizations: q.Count = 2000
+    seed: q.CountOrZero | None = None
+    audit: q.CountOrZero = 8
+
+
 class TuneTable(Table):
     """What is tuned, to what end.
 
@@ -93,6 +109,7 @@ class TuneTable(Table):
     realizations: q.Count = 1000
     seed: q.CountOrZero = 2012
     starts: q.Count = 3
+    certificate: TuneCertificateTable = TuneCertificateTable()
 
     @field_validator("parameters", mode="before")
     @classmethod
@@ -108,4 +125,15 @@ class TuneTable(Table):
     def _enough(self) -> TuneTable:
         if self.realizations < 2:
             raise InputError("realizations must be 2 or more")
+        if self.certificate.seed == self.seed:
+            raise InputError(
+                f"certificate.seed {self.seed} is that of the search, whose draws certify nothing; "
+                "give another, or none"
+            )
         return self
+
+    @property
+    def fresh_seed(self) -> int:
+        """Seed of the certificate's draws."""
+        given = self.certificate.seed
+        return self.seed + FRESH if given is None else given

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 from drillctl.drillstring import Drillstring
+from drillctl.drillstring.assembly import Parts
 from drillctl.errors import InputError
 from drillctl.linear.counting import natural_frequencies
 
@@ -28,7 +30,12 @@ def pipe_impedance(string: Drillstring) -> float:
 
 def stick_slip_frequency(string: Drillstring) -> float:
     """Lowest angular frequency with the top held (rad/s)."""
-    return float(natural_frequencies(string.parts, "finite-elements", 1, top_held=True)[0])
+    return _lowest_held(string.parts)
+
+
+@lru_cache(maxsize=16)  # thousands of draws of a rock share a string
+def _lowest_held(parts: Parts) -> float:
+    return float(natural_frequencies(parts, "finite-elements", 1, top_held=True)[0])
 
 
 def stiff_speed(

@@ -13,10 +13,14 @@
 - `adaptive_map.py`: `adaptive_map`, regions with the cells simulated to find them.
 - `comparison.py`: `j1_distributions`, `paired_differences`, `j1_against_weight` of cases.
 - `nominal_cases.py`: `compared_regions` and `compared_responses` of cases at their own values.
+- `advantage.py`: `advantage_cases`, `advantage_front`, `advantage_map` and `advantage_delay` of a
+  weight that follows the bit speed against a constant one.
 - `limit_cycle.py`: `limit_cycle`, one period by each method.
 - `three_regions.py`: `three_regions` over the same two parameters.
 - `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
 - `weight_delay.py`: `weight_delay`, a weight that follows the bit speed against its delay.
+- `tune_baselines.py`: `tune_baselines`, tuned gains beside others; `tune_neighbourhood.py`:
+  `tune_neighbourhood`, how far they may drift.
 - `uncertain_regions.py`: `uncertain_regions`, `probability_map` and `region_error` of draws.
 - `uncertain_curves.py`: `area_convergence`, `cell_distributions`, `sensitivity_bars`.
 - `time_response.py`: `time_response`, speeds against time with sticks shaded.
@@ -28,6 +32,12 @@ the rig floor: rpm, kN, kN m, m.
 """
 
 from drillctl.plots.adaptive_map import adaptive_map
+from drillctl.plots.advantage import (
+    advantage_cases,
+    advantage_delay,
+    advantage_front,
+    advantage_map,
+)
 from drillctl.plots.comparison import j1_against_weight, j1_distributions, paired_differences
 from drillctl.plots.errors import error_estimate
 from drillctl.plots.frequency import bode
@@ -45,6 +55,8 @@ from drillctl.plots.regularisation import regularisation
 from drillctl.plots.root_locus import root_locus
 from drillctl.plots.three_regions import three_regions
 from drillctl.plots.time_response import time_response
+from drillctl.plots.tune_baselines import tune_baselines
+from drillctl.plots.tune_neighbourhood import tune_neighbourhood
 from drillctl.plots.uncertain_curves import (
     area_convergence,
     cell_distributions,
@@ -55,6 +67,10 @@ from drillctl.plots.weight_delay import weight_delay
 
 __all__ = [
     "adaptive_map",
+    "advantage_cases",
+    "advantage_delay",
+    "advantage_front",
+    "advantage_map",
     "area_convergence",
     "bode",
     "cell_distributions",
@@ -83,6 +99,8 @@ __all__ = [
     "sweep_line",
     "three_regions",
     "time_response",
+    "tune_baselines",
+    "tune_neighbourhood",
     "uncertain_regions",
     "weight_delay",
 ]

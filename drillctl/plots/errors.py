@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drillctl.errors import InputError
+from drillctl.plots.plane import title_of
 from drillctl.plots.style import BLACK, BLUE, LINE, SMALL, VERMILLION, axes_or_new, dress
 from drillctl.studies.error_estimate import PROMISES, ROUNDING, SMALLEST
 
@@ -56,7 +57,7 @@ def error_estimate(result: Doctor, ax: Axes | None = None) -> Figure:
         if value is not None:
             label = f"'{result.accuracy}' over the paper's map: {name}"
             ax.axhline(value, color=BLACK, linestyle=style, linewidth=0.6 * LINE, label=label)
-    title = result.design.tables.title or result.design.name
+    title = title_of(result)
     dress(ax, "J1 (s)", "relative error of J1", title)
     ax.legend(fontsize=SMALL, frameon=False)
     return figure

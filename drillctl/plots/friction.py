@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from drillctl import units
 from drillctl.bit_rock import BitRockLaw
 from drillctl.design import Design
 from drillctl.plots import style
@@ -23,7 +24,7 @@ WEIGHT = "operating_point.weight_on_bit"
 Array = NDArray[np.float64]
 
 
-def friction_curves(design: Design, ax: Axes | None = None) -> Figure:
+def friction_curves(design: Design, ax: Axes | None = None, system: units.System = "si") -> Figure:
     """Draw the torque on the bit against its speed, for each weight on bit of the table.
 
     Parameters
@@ -32,6 +33,8 @@ def friction_curves(design: Design, ax: Axes | None = None) -> Figure:
         The rig.
     ax : Axes, optional
         Axes to draw on.
+    system : {'si', 'field'}
+        Units of torque and weight.
 
     Returns
     -------
@@ -43,30 +46,38 @@ def friction_curves(design: Design, ax: Axes | None = None) -> Figure:
     figure, ax = style.axes_or_new(ax)
     weight = design.tables.operating_point.weight_on_bit
     last = max(FORWARD, 1.2 * design.speed / RPM)
+    scale, torque_unit = units.displayed(1.0, "N*m", system)
     for number, each in enumerate(_weights(design)):
         law = design.replace({WEIGHT: SI(each)}).bit_rock
+        speeds, torques = _curve(law, each, last)
         ax.plot(
-            *_curve(law, each, last),
+            speeds,
+            scale * torques,
             color=style.COLOURS[number % len(style.COLOURS)],
             linestyle="-" if each == weight else "--",
             linewidth=style.LINE,
-            label=f"{each / 1e3:.4g} kN",
+            label=_weight(each, system),
         )
     torque, _ = design.bit_rock.torque_and_slope(weight, design.speed, math.exp)
     ax.plot(
         design.speed / RPM,
-        torque / 1e3,
+        scale * torque,
         "o",
         color=style.BLACK,
         zorder=5,
-        label=f"operating point: {weight / 1e3:.4g} kN, {design.speed / RPM:.4g} rpm",
+        label=f"operating point: {_weight(weight, system)}, {design.speed / RPM:.4g} rpm",
     )
-    style.dress(ax, "bit speed (rpm)", "bit torque (kN m)", "Bit-rock friction")
+    style.dress(ax, "bit speed (rpm)", f"bit torque ({torque_unit})", "Bit-rock friction")
     for line in (ax.axhline, ax.axvline):
         line(0.0, color="#888888", linewidth=0.8, zorder=1)
     ax.set_xlim(BACKWARD, last)
     ax.legend(fontsize=style.SMALL, frameon=False, loc="lower right")
     return figure
+
+
+def _weight(weight: float, system: units.System) -> str:
+    shown, unit = units.displayed(weight, "N", system)
+    return f"{shown:.4g} {unit}"
 
 
 def _weights(design: Design) -> list[float]:
@@ -77,7 +88,7 @@ def _weights(design: Design) -> list[float]:
 
 
 def _curve(law: BitRockLaw, weight: float, last: float) -> tuple[Array, Array]:
-    """Speed (rpm) and torque (kN m) from `BACKWARD` to `last` (rpm), through rest."""
+    """Speed (rpm) and torque (N m) from `BACKWARD` to `last` (rpm), through rest."""
     forward = np.linspace(0.0, last, 400)
     backward = np.linspace(-BACKWARD, 0.0, 100)
     ahead = _torques(law, weight, forward * RPM)
@@ -85,7 +96,7 @@ def _curve(law: BitRockLaw, weight: float, last: float) -> tuple[Array, Array]:
     static = law.static_torque(weight)
     speed = np.concatenate([-backward, [0.0, 0.0], forward])
     torque = np.concatenate([-behind, [-static, static], ahead])
-    return speed, torque / 1e3
+    return speed, torque
 
 
 def _torques(law: BitRockLaw, weight: float, speeds: Array) -> Array:

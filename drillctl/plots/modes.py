@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from drillctl import units
 from drillctl.linear.modal import Mode, Modes
 from drillctl.plots import style
 
@@ -17,7 +18,9 @@ SHOWN = 4
 """Modes drawn of each boundary condition: more cannot be told apart."""
 
 
-def mode_shapes(result: Modes, ax: Sequence[Axes] | None = None) -> Figure:
+def mode_shapes(
+    result: Modes, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
     """Draw angle and torque of the lowest modes along the string, depth downward.
 
     Parameters
@@ -26,6 +29,8 @@ def mode_shapes(result: Modes, ax: Sequence[Axes] | None = None) -> Figure:
         From `drillctl.modes`.
     ax : sequence of Axes, optional
         Four panels: angle and torque with the top free, then with the top held.
+    system : {'si', 'field'}
+        Units of depth.
 
     Returns
     -------
@@ -33,7 +38,7 @@ def mode_shapes(result: Modes, ax: Sequence[Axes] | None = None) -> Figure:
         A lumped string, which has no length, is drawn over its node numbers.
     """
     figure, panels = style.grid_or_new(ax, 2, 2, 8.5, 8.0, share_y=True)
-    place, label = _places(result)
+    place, label = _places(result, system)
     rows = (("Top free", result.free_free), ("Top held", result.fixed_top))
     for (support, found), (left, right) in zip(rows, (panels[:2], panels[2:]), strict=True):
         for number, mode in enumerate(found[:SHOWN]):
@@ -51,10 +56,11 @@ def mode_shapes(result: Modes, ax: Sequence[Axes] | None = None) -> Figure:
     return figure
 
 
-def _places(result: Modes) -> tuple[NDArray[np.float64], str]:
+def _places(result: Modes, system: units.System) -> tuple[NDArray[np.float64], str]:
     """Where the nodes are drawn, and the label of that axis."""
     if result.node_depth[-1] > 0.0:
-        return result.node_depth, "depth (m)"
+        depth, unit = units.displayed(result.node_depth, "m", system)
+        return depth, f"depth ({unit})"
     return np.arange(len(result.node_depth), dtype=float), "node, 0 = top drive"
 
 

@@ -107,9 +107,9 @@ def named_values(
 
 
 def title_of(result: Any) -> str:
-    """Title of a picture: that of the design, or its name."""
+    """Title of a picture: that of the design, or its name; its dollars are no formulas."""
     title: str = result.design.tables.title or result.design.name
-    return title
+    return title.replace("$", r"\$")
 
 
 def origin_of(result: Any) -> str:

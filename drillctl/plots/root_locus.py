@@ -16,7 +16,7 @@ from drillctl.errors import InputError
 from drillctl.linear.root_loci import RootLocus
 from drillctl.plots import style
 from drillctl.plots.colour_bars import colours
-from drillctl.plots.plane import named_values
+from drillctl.plots.plane import named_values, title_of
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
@@ -67,7 +67,7 @@ def root_locus(result: RootLocus, ax: Axes | None = None, system: units.System =
     ax.axvline(0.0, color=style.BLACK, linewidth=1.2)
     ax.set_xlim(left, right)
     ax.set_ylim(-0.02 * top, top)
-    title = result.design.tables.title or result.design.name
+    title = title_of(result)
     style.dress(ax, "real part (1/s), growing to the right", "frequency (Hz)", title)
     _crossings(ax, tracks, values, top)
     ax.legend(

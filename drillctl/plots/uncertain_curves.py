@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.errors import InputError
-from drillctl.plots.plane import NAMES
+from drillctl.plots.plane import NAMES, title_of
 from drillctl.plots.style import COLOURS, DASHES, LINE, SMALL, axes_or_new, dress, grid_or_new
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def area_convergence(result: Uncertainty, ax: Axes | None = None) -> Figure:
         ax.set_xscale("log", base=2)
         ax.set_xticks(curves.counts, [f"{count:,}" for count in curves.counts])
         ax.minorticks_off()
-    title = result.design.tables.title or result.design.name
+    title = title_of(result)
     dress(ax, "draws", "area of the 95 % region (% of the map)", title)
     ax.legend(fontsize=SMALL, frameon=False)
     figure.supxlabel(
@@ -99,7 +99,7 @@ def cell_distributions(
     ax.set_xlim(0.0, top)
     ax.set_ylim(0.0, 1.02)
     dress(ax, "J1 (s)", "share of the draws at or under it",
-          result.design.tables.title or result.design.name)  # fmt: skip
+          title_of(result))  # fmt: skip
     ax.legend(fontsize=SMALL, frameon=False, loc="lower right")
     figure.supxlabel(f"{result.realizations} draws; levels dashed", fontsize=SMALL)
     return figure

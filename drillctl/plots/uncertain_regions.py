@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from drillctl import units
 from drillctl.errors import InputError
-from drillctl.plots.plane import axis_label
+from drillctl.plots.plane import axis_label, title_of
 from drillctl.plots.style import BLACK, BLUE, LINE, SMALL, VERMILLION, dress, grid_or_new
 from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER, needed
 
@@ -235,9 +235,7 @@ def _shown(j1: NDArray[np.float64], level: float) -> NDArray[np.float64]:
 def _finish(
     figure: Figure, result: Uncertainty, handles: Sequence[Patch | Line2D], what: str
 ) -> None:
-    figure.suptitle(
-        result.design.tables.title or result.design.name, fontsize=11.0, x=0.01, ha="left"
-    )
+    figure.suptitle(title_of(result), fontsize=11.0, x=0.01, ha="left")
     status = result.design.tables.status
     origin = f"string {status}; " if status == "reconstructed" else ""
     method = result.design.tables.uncertainty.sampling

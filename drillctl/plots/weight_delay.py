@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.plots.plane import title_of
 from drillctl.plots.style import (
     BLACK,
     COLOURS,
@@ -90,7 +91,7 @@ def weight_delay(
     left.legend(
         loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, fontsize=SMALL, frameon=False
     )
-    title = result.design.tables.title or result.design.name
+    title = title_of(result)
     figure.suptitle(title, fontsize=TITLE, x=0.01, ha="left")
     figure.supxlabel(_caption(result), fontsize=SMALL)
     return figure

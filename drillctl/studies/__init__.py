@@ -16,6 +16,7 @@
 - `comparison.py`: cases at the same draws; `cases.py`: what makes them comparable.
 - `weight_delay.py`: a weight on bit that follows the bit speed, against the delay of its path;
   `delayed_lanes.py`: its lanes; `delay_limits.py`: where a benefit ends.
+- `advantage/`: that weight against a constant one, each with the drive at its robust optimum.
 - `robust/`: gains searched for many realizations at once, linear and by trajectories.
 - `nominal.py`: their maps and motions at their own values.
 - `drawn_runs.py`: runs of draws, equal mean weights; `intervals.py`: shares and means.

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from drillctl.design import Design
+from drillctl.studies.advantage.policies import policies
+from drillctl.studies.advantage.study import checked
 from drillctl.studies.cases import case_designs, refuse_unequal
 from drillctl.studies.delayed_lanes import following_design
 from drillctl.studies.draws import uncertain_parameters
 from drillctl.studies.grid import axes_of
+from drillctl.studies.robust import tuned_parameters
 from drillctl.studies.uncertainty.study import map_axes, refuse_impossible
 
 
 def refuse_what_studies_would(design: Design) -> None:
-    """Refuse (`InputError`) axes, draws, cases and delays that a study would refuse.
+    """Refuse (`InputError`) what a study would refuse: axes, draws, cases, delays, what is tuned.
 
     Parameters
     ----------
@@ -28,3 +31,7 @@ def refuse_what_studies_would(design: Design) -> None:
         refuse_unequal(case_designs(design))
     if "weight_delay" in design.tree:
         following_design(design)
+    if "advantage" in design.tree:
+        checked(policies(design))
+    if "tune" in design.tree:
+        tuned_parameters(design)

@@ -138,16 +138,8 @@ def equalising_shift(drawn: DrawnLanes, count: int) -> float:
     """
     if isinstance(drawn.groups[0].lanes.weight, ConstantWeight):
         return 0.0
-    target = float(np.mean(np.concatenate([g.lanes.nominal_weight for g in drawn.groups])))
-    low, high = _allowed(drawn)
-
-    def excess(shift: float) -> float:
-        weights = run_draws(drawn, count, shift).measures["mean_weight_after_start"]
-        if np.isnan(weights).all():
-            raise InputError("no draw gives a finite answer", "weight_on_bit")
-        return float(np.nanmean(weights)) / target - 1.0
-
-    shift, error = _zero(excess, low, high, target)
+    target = _nominal(drawn)
+    shift, error = matching_shift(drawn, count, "mean_weight_after_start", target)
     if abs(error) > EQUAL_TO:
         raise InputError(
             f"within its limits the law cannot have a mean weight of {target / 1e3:g} kN: at the "
@@ -155,6 +147,48 @@ def equalising_shift(drawn: DrawnLanes, count: int) -> float:
             "weight_on_bit",
         )
     return shift
+
+
+def matching_shift(
+    drawn: DrawnLanes, count: int, measure: str, target: float
+) -> tuple[float, float]:
+    """Shift of the nominal weight at which the mean of a measure over the draws is a given one.
+
+    Parameters
+    ----------
+    drawn : DrawnLanes
+        The possible draws, of a law that moves the weight.
+    count : int
+        All draws.
+    measure : str
+        Of `DrawnRuns`, one that grows with the weight.
+    target : float
+        Its mean, positive (SI).
+
+    Returns
+    -------
+    tuple of float
+        The shift (N), and by what share of the target the mean is off there.
+
+    Raises
+    ------
+    InputError
+        No draw gives a finite answer.
+    """
+    low, high = _allowed(drawn)
+
+    def excess(shift: float) -> float:
+        found = run_draws(drawn, count, shift).measures[measure]
+        if np.isnan(found).all():
+            raise InputError("no draw gives a finite answer", "weight_on_bit")
+        return float(np.nanmean(found)) / target - 1.0
+
+    return _zero(excess, low, high, _nominal(drawn))
+
+
+def _nominal(drawn: DrawnLanes) -> float:
+    """Mean over the draws of the nominal weight (N)."""
+    return float(np.mean(np.concatenate([g.lanes.nominal_weight for g in drawn.groups])))
 
 
 def _allowed(drawn: DrawnLanes) -> tuple[float, float]:

@@ -256,9 +256,11 @@ def _singly(a: Axis) -> list[slice]:
 def _by_kind(design: Design, axes: tuple[Axis, ...], a: Axis) -> list[slice]:
     """Runs of an axis along which the laws keep their types, the other axes at their lowest.
 
-    A delay of zero is no delay, an infinite limit no limit: such laws take other kernels.
+    A delay of zero is no delay, an infinite limit no limit, a drive that absorbs nothing a plain
+    PI: such laws take other kernels.
     """
-    if not a.path.startswith(("controller.drive.", "weight_on_bit.path.", "scenario.")):
+    changing = ("controller.drive.", "controller.absorption", "weight_on_bit.path.", "scenario.")
+    if not a.path.startswith(changing):
         return [slice(0, len(a))]
     low = {other.path: other.values[0] for other in axes}
     kind = [kinds(replaced(design, low | {a.path: value})) for value in a.values]

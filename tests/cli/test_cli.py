@@ -18,6 +18,13 @@ import drillctl
 from drillctl import catalog
 from drillctl.errors import SimulationError
 
+HOLDS = (
+    (
+        "resumed runs",
+        "the same bits after an interruption and a kill",
+    ),
+)
+
 DESIGN = "monteiro-trindade-140kn"
 BISTABLE = "navarro-lopez-2dof-bistable"
 SHORT = ["--set", "simulation.duration=10 s"]

@@ -24,6 +24,13 @@ from drillctl.errors import InputError
 from drillctl.studies.uncertainty import cluster as cluster_module
 from drillctl.studies.uncertainty import keeping as keeping_module
 
+HOLDS = (
+    (
+        "runs under uncertainty",
+        "killed, interrupted, extended, disk full: the same bits",
+    ),
+)
+
 PAPER = "monteiro-trindade-140kn"
 AXES = ["--axis", "controller.kp=500:700:3", "--axis", "controller.ki=100:150:2"]
 SHORT = [*AXES, "--set", "simulation.duration=20 s", "--set", "simulation.accuracy=fast",

@@ -19,6 +19,13 @@ from drillctl.design.reading import parse_axis
 from drillctl.design.writing import to_tree
 from drillctl.errors import InputError
 
+HOLDS = (
+    (
+        "design files",
+        "round trip, every kind of mistake, fuzzing",
+    ),
+)
+
 PAPER = "monteiro-trindade-140kn"
 
 HEAD = 'schema = 1\ntitle = "a rig"\n'

@@ -13,6 +13,13 @@ from hypothesis import strategies as st
 import drillctl
 from drillctl.bit_rock import NavarroLopezSuarez, WeightTable
 
+HOLDS = (
+    (
+        "friction",
+        "Table 1, slopes against differences, CasADi",
+    ),
+)
+
 RPM = 2 * math.pi / 60
 
 # Table 1 of Monteiro & Trindade (2012): weight (kN), a1 (m), a2 (m), beta (s/rad); and what

@@ -17,6 +17,14 @@ from drillctl.linear.tuning import active_damping, pipe_impedance, stick_slip_fr
 from drillctl.linear.weight_path import BitSide
 from drillctl.top_drive import PI, RealDrive, SampledDrive
 
+HOLDS = (
+    (
+        "real drives",
+        "impedances against states; limits kept; sampling to zero with order 1; the ideal law "
+        "at infinite limits",
+    ),
+)
+
 DESIGN = "monteiro-trindade-140kn"
 SLOPE = 290.0746971030263
 

@@ -14,6 +14,13 @@ from drillctl.linear.weight_path import BitSide, weight_path
 from drillctl.linear.whole_margins import weight_delay_margin
 from drillctl.weight_on_bit import AlarmWeight, FollowingSpeed, ObservedWeight, RealWeight
 
+HOLDS = (
+    (
+        "weight on its way",
+        "order 2; a pure delay sample by sample; delay margin against poles that cross",
+    ),
+)
+
 DESIGN = "monteiro-trindade-140kn"
 SLOPE = 290.0746971030263
 # Coefficients instead of the table: the kernels are made in half the time.

@@ -21,6 +21,13 @@ from drillctl.linear.slope_margin import slope_margin
 from drillctl.linear.state_space import open_loop_matrices
 from drillctl.studies import Axis, loop_map
 
+HOLDS = (
+    (
+        "disk margins, delay margin",
+        "`control.disk_margins`; poles of a delayed loop; 30 against 400 elements",
+    ),
+)
+
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"
 

@@ -14,6 +14,25 @@ from drillctl.drillstring import Section, assemble
 from drillctl.errors import InputError
 from drillctl.linear import modes
 
+HOLDS = (
+    (
+        "frequencies, top held and both ends free",
+        "exact transcendental roots; order 2 in the element length",
+    ),
+    (
+        "first mode",
+        "openTorsion, 1e-6",
+    ),
+    (
+        "two-section string",
+        "Aarsnes & Shor (2018) Well A",
+    ),
+    (
+        "overdamped and non-classical strings",
+        "eigenvalues of the companion matrix",
+    ),
+)
+
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"
 
@@ -92,7 +111,7 @@ def test_thirty_elements():
 
 
 @pytest.mark.parametrize("mass", ["consistent", "lumped"])
-def test_second_order_convergence(mass):
+def test_second_order_convergence(mass, figure):
     counts = (10, 20, 40, 80, 160)
     errors = []
     for elements in counts:
@@ -102,6 +121,7 @@ def test_second_order_convergence(mass):
         errors.append(np.array(computed) - exact)
     orders = np.diff(np.log2(np.abs(errors)), axis=0)
     np.testing.assert_allclose(-orders, 2.0, atol=0.15)
+    figure(f"order of frequencies in the element length, {mass} mass", -orders[-1].mean())
 
 
 def test_two_section_string_of_well_a():

@@ -17,6 +17,13 @@ from drillctl.linear.ends import ends_of
 from drillctl.linear.state_space import closed_loop_matrices, plant_matrices
 from drillctl.linear.transmission import Lines
 
+HOLDS = (
+    (
+        "string as transmission lines",
+        "dense M, C, K on nine strings, 1e-10; hand-written cot and csc; order 2 to the continuum",
+    ),
+)
+
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"
 HZ = np.array([0.02, 0.08, 0.15, 0.3, 0.5, 0.9, 1.4, 2.4, 5.0])

@@ -19,6 +19,13 @@ import pytest
 
 import drillctl
 
+HOLDS = (
+    (
+        "laws with a memory",
+        "both engines over random rigs and 24 combinations of laws",
+    ),
+)
+
 DESIGN = "monteiro-trindade-140kn"
 ROCKS = {
     "nls": {"law": "navarro-lopez-suarez", "a1": 0.026, "a2": 0.085, "beta": 0.098},

@@ -26,6 +26,13 @@ from drillctl.simulation.limit_cycle.flow import Flow
 from drillctl.simulation.limit_cycle.returns import take_returns
 from drillctl.simulation.reference import solve
 
+HOLDS = (
+    (
+        "exact cycles",
+        "event-accurate flow followed until it repeats to 1e-8; monodromy against differences",
+    ),
+)
+
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 LITTLE_DAMPING = {"drillstring.sections.pipe.stiffness_damping": "1 ms"}
 

@@ -9,13 +9,20 @@ from drillctl.design.tables import AxisTable
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.studies.grid import axes_of, groups
 
+HOLDS = (
+    (
+        "kernels",
+        "the same scheme in plain NumPy, J1 to 1e-12",
+    ),
+)
+
 KP, KI = np.linspace(150.0, 900.0, 6), np.linspace(20.0, 400.0, 5)
 
 
 @pytest.mark.parametrize(
     ("damping", "step"), [("0 s", "20 ms"), ("1 ms", "20 ms"), ("0 s", "50 ms"), ("1 ms", "5 ms")]
 )
-def test_the_kernel_is_the_plain_scheme(damping, step):
+def test_the_kernel_is_the_plain_scheme(damping, step, figure):
     design = drillctl.load(
         "monteiro-trindade-140kn",
         **{
@@ -44,4 +51,8 @@ def test_the_kernel_is_the_plain_scheme(damping, step):
     )  # fmt: skip
     assert stuck.max() > 5.0
     np.testing.assert_allclose(batch.measures["j1"], j1, rtol=1e-12)
+    figure(
+        "J1 of the kernels against plain NumPy, relative",
+        abs(batch.measures["j1"] / j1 - 1.0).max(),
+    )
     np.testing.assert_allclose(batch.measures["stuck_time"], stuck, rtol=0, atol=1e-9)

@@ -22,6 +22,13 @@ from drillctl.simulation.propagator import string_step
 from drillctl.simulation.start import Start
 from drillctl.top_drive import PI
 
+HOLDS = (
+    (
+        "steps of the string",
+        "matrix exponential, any viscous damping",
+    ),
+)
+
 numba = pytest.importorskip("numba")
 STEP = 0.02
 

@@ -8,6 +8,17 @@ from drillctl.design import Design
 from drillctl.simulation.reference import solve
 from drillctl.simulation.trajectory import sample
 
+HOLDS = (
+    (
+        "reference solver",
+        "event-accurate values of six runs, J1 to 1e-5; energy to 1e-8; another integrator",
+    ),
+    (
+        "lumped string",
+        "two published equilibria, bistability, period 5.092533 s",
+    ),
+)
+
 # Kp, Ki, WOB (kN), J1 (s), time stuck (s), peak bit speed (rad/s): computed once with another
 # program (LSODA at 1e-9 with located events), to the digits given.
 EVENT_ACCURATE = [
@@ -33,13 +44,15 @@ def paper(kp: float, ki: float, weight: float, **values: object) -> Design:
 
 
 @pytest.mark.parametrize(("kp", "ki", "weight", "j1", "stuck", "peak"), EVENT_ACCURATE)
-def test_event_accurate_values(kp, ki, weight, j1, stuck, peak):
+def test_event_accurate_values(kp, ki, weight, j1, stuck, peak, figure):
     motion = solve(paper(kp, ki, weight))
     measures = sample(motion).measures
     assert measures.j1 == pytest.approx(j1, rel=1e-5)
     assert measures.stuck_time == pytest.approx(stuck, abs=1e-3)
     assert measures.peak_bit_speed == pytest.approx(peak, abs=1e-4)
     assert motion.energy.relative_residual < 1e-8
+    figure("energy left over, of the work done, reference solver", motion.energy.relative_residual)
+    figure("error of J1, relative, reference solver", abs(measures.j1 / j1 - 1.0))
 
 
 def test_tolerance_converges():
@@ -50,11 +63,12 @@ def test_tolerance_converges():
     assert errors[1] < errors[0] / 10
 
 
-def test_another_integrator_agrees():
+def test_another_integrator_agrees(figure):
     design = paper(400, 100, 140, **{"simulation.duration": "15 s"})
     by_dop853 = sample(solve(design, 1e-9)).measures
     by_radau = sample(solve(design, 1e-8, method="Radau")).measures
     assert by_radau.j1 == pytest.approx(by_dop853.j1, rel=1e-6)
+    figure("J1 by Radau against DOP853, relative", abs(by_radau.j1 / by_dop853.j1 - 1.0))
     assert by_radau.stuck_time == pytest.approx(by_dop853.stuck_time, abs=1e-5)
 
 

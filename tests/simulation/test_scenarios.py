@@ -9,6 +9,13 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.program import NONE, Ramp
 
+HOLDS = (
+    (
+        "programs",
+        "both engines; jumps cost no order",
+    ),
+)
+
 DESIGN = "monteiro-trindade-140kn"
 FIXED = {"bit_rock": {"law": "navarro-lopez-suarez", "a1": 0.026, "a2": 0.085, "beta": 0.098}}
 

@@ -13,6 +13,15 @@ from drillctl.studies.adaptive_checks import Mismatch, full_audit, mismatch
 from drillctl.studies.contour_search import bands_of
 from drillctl.studies.regions import region
 
+HOLDS = (
+    (
+        "adaptive maps",
+        "outlines and bits of the full grid, to the last; known functions with islands, "
+        "holes, jumps, saddles and failures; random ones: each contour whole or missed whole; "
+        "samples of known mismatch",
+    ),
+)
+
 # One worker: the kernels of these runs are compiled once.
 pytestmark = pytest.mark.xdist_group("adaptive")
 DESIGN = "monteiro-trindade-140kn"

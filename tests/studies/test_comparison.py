@@ -19,6 +19,14 @@ from drillctl.studies.drawn_runs import EQUAL_TO, equalising_shift, run_draws, s
 from drillctl.studies.draws import draw
 from drillctl.studies.intervals import mean_interval, share_interval
 
+HOLDS = (
+    (
+        "comparison of cases",
+        "J1 of the weight-on-bit law; a case against itself; `scipy.stats.bootstrap`, "
+        "binomial tails; weight from traces; maps and responses those of `map` and `simulate`",
+    ),
+)
+
 SHIPPED = "pi-vs-dynamic-wob-140kn"
 PAPER = "monteiro-trindade-140kn"
 A1, A2 = "bit_rock.a1_factor", "bit_rock.a2_factor"

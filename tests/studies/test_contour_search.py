@@ -18,6 +18,15 @@ from drillctl.studies.grid import Axis
 from drillctl.studies.lattices import around, in_quads, nested_lattices
 from drillctl.studies.regions import region
 
+HOLDS = (
+    (
+        "adaptive maps",
+        "outlines and bits of the full grid, to the last; known functions with islands, "
+        "holes, jumps, saddles and failures; random ones: each contour whole or missed whole; "
+        "samples of known mismatch",
+    ),
+)
+
 LEVELS = (20.0, 30.0, 40.0, 50.0)
 
 

@@ -18,6 +18,13 @@ from drillctl.studies.draws import (
 )
 from drillctl.studies.sampling import probabilities
 
+HOLDS = (
+    (
+        "draws of uncertain parameters",
+        "moments and quantiles in closed form and by SciPy; the same draw for any number of them",
+    ),
+)
+
 PAPER = "monteiro-trindade-140kn"
 A1 = "bit_rock.a1_factor"
 A2 = "bit_rock.a2_factor"

@@ -376,3 +376,14 @@ def test_fewer_measures_are_less_memory(paper, monkeypatch):
     assert sweep(paper, large, audit_cells=0, measures=["j1"]).j1.shape == (2, 50)
     with pytest.raises(InputError, match="fewer points"):
         sweep(paper, large)
+
+
+def test_a_drive_that_absorbs_nothing_is_a_law_of_its_own(paper):
+    """At an absorption of zero a Z-torque drive is a plain PI, with fewer numbers."""
+    design = paper.replace({"controller.law": "z-torque"})
+    axes = grid(design, ("controller.absorption", 0, 1, 3))
+    found = sweep(design, axes, audit_cells=0)
+    for cell, value in enumerate(axes[0].values):
+        alone = design.replace({"controller.absorption": float(value)})
+        expected = drillctl.simulate(alone, engine="batch").measures.j1
+        assert found.j1[cell] == pytest.approx(expected, rel=1e-12)

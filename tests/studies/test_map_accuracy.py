@@ -17,6 +17,13 @@ from drillctl.simulation.batch import prepare, run_batch
 from drillctl.studies.error_estimate import PROMISES
 from drillctl.studies.grid import axes_of, groups
 
+HOLDS = (
+    (
+        "accuracies",
+        "event-accurate cells of the paper's map; the whole map at 0.5 ms",
+    ),
+)
+
 PATH = Path(__file__).parents[1] / "data" / "paper_map_sample.json"
 KNOWN = json.loads(PATH.read_text(encoding="utf-8"))
 CELLS = np.array([int(cell) for cell in KNOWN["j1"]])

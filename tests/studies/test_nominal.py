@@ -15,6 +15,14 @@ from drillctl.studies.cases import case_designs
 from drillctl.studies.comparison import compare
 from drillctl.studies.nominal import NOT_ASKED
 
+HOLDS = (
+    (
+        "comparison of cases",
+        "J1 of the weight-on-bit law; a case against itself; `scipy.stats.bootstrap`, "
+        "binomial tails; weight from traces; maps and responses those of `map` and `simulate`",
+    ),
+)
+
 SHIPPED = "pi-vs-dynamic-wob-140kn"
 PAPER = "monteiro-trindade-140kn"
 KP, KI, WEIGHT = "controller.kp", "controller.ki", "operating_point.weight_on_bit"

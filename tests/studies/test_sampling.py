@@ -13,6 +13,14 @@ from drillctl.studies import compare, weight_delay
 from drillctl.studies.draws import draw, uncertain_parameters
 from drillctl.studies.sampling import Sampling, correlation_root
 
+HOLDS = (
+    (
+        "samplings and correlations",
+        "pieces of one sequence, strata of every replicate, correlation of 40,000 draws, "
+        "truncated and beta laws by SciPy",
+    ),
+)
+
 PAPER = "monteiro-trindade-140kn"
 A1, A2, WEIGHT = "bit_rock.a1_factor", "bit_rock.a2_factor", "operating_point.weight_on_bit"
 LAW = {"distribution": "lognormal", "cov": 0.05}

@@ -21,6 +21,13 @@ from drillctl.studies import attraction, sweep
 from drillctl.studies.grid import axes_of
 from drillctl.studies.three_regions import FIELDS, MASKS, three_regions
 
+HOLDS = (
+    (
+        "three regions",
+        "eigenvalues, reference solver, published bistability",
+    ),
+)
+
 LONG = {"simulation.duration": "200 s"}
 
 

@@ -19,6 +19,14 @@ from drillctl.studies.uncertainty.probability import INNER, OUTER, needed, proba
 from drillctl.studies.uncertainty.scatter import Scatter
 from drillctl.studies.uncertainty.stopping import level_of, look, schedule
 
+HOLDS = (
+    (
+        "intervals under uncertainty",
+        "the binomial law, exactly, n 10 to 10,000; coverage of areas, quantiles and best "
+        "cells on made-up draws",
+    ),
+)
+
 ALONE = Scatter(1)
 NONE = np.zeros((1, 1), dtype=bool)
 

@@ -22,6 +22,14 @@ from drillctl.studies.uncertainty import uncertainty
 from drillctl.studies.uncertainty.job import Drawn, Job
 from drillctl.studies.uncertainty.keeping import InMemory, pieces
 
+HOLDS = (
+    (
+        "realizations over a map",
+        "each lane the design it stands for, to the bit; blocks, threads, draws that fail; "
+        "Ishigami's indices",
+    ),
+)
+
 A1, A2, WEIGHT = "bit_rock.a1_factor", "bit_rock.a2_factor", "operating_point.weight_on_bit"
 LENGTH, INERTIA = "drillstring.sections.pipe.length", "bha.inertia"
 FIVE = {"distribution": "lognormal", "cov": 0.05}

@@ -17,6 +17,13 @@ from drillctl.studies.uncertainty import uncertainty
 from drillctl.studies.uncertainty.cluster import Cluster, connect
 from drillctl.studies.uncertainty.job import Drawn, Job
 
+HOLDS = (
+    (
+        "clusters",
+        "two worker processes, one killed half-way: the same bits",
+    ),
+)
+
 distributed = pytest.importorskip("distributed")
 
 GAINS = [

@@ -18,6 +18,14 @@ from drillctl.studies.delayed_lanes import Runs, following_design
 from drillctl.studies.intervals import share_interval
 from drillctl.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 
+HOLDS = (
+    (
+        "weight on bit against its delay",
+        "runs of `simulate`, in both engines; differences and intervals of `compare`; limits "
+        "by hand",
+    ),
+)
+
 SHIPPED = "dynamic-wob-delay-140kn"
 SMOOTH = {"controller.kp": 625.0, "controller.ki": 125.0}
 GAINS, DELAYS, DRAWS = (0.0, 2e3, 6e3), (0.0, 0.1, 0.5, 1.0), 12

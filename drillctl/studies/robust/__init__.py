@@ -20,20 +20,30 @@ Nonlinear design, for the least statistic of J1 over realizations:
   `judge.py`: both together.
 - `trust_region.py`, `polish.py`, `search.py`: from a first look to the gains.
 
+What is made of found gains:
+
+- `fresh.py`: runs at draws that no search has seen; `certificate.py`: how often they keep the
+  level, margins, worst draw, audit; `tolerance.py`: how far gains may drift.
+- `baselines.py`: other gains and laws at the same draws.
+- `tune_study.py`: all of it in one go; `tune_data.py`: its dataset.
+
 CasADi is imported where a function needs it, never with the package.
 """
 
 from drillctl.studies.robust.linear_design import LinearDesign, linear_design
 from drillctl.studies.robust.search import Tuning, search
 from drillctl.studies.robust.trajectory import Trajectories
+from drillctl.studies.robust.tune_study import Tune, tune
 from drillctl.studies.robust.tuned import Tuned, tuned_parameters
 
 __all__ = [
     "LinearDesign",
     "Trajectories",
+    "Tune",
     "Tuned",
     "Tuning",
     "linear_design",
     "search",
+    "tune",
     "tuned_parameters",
 ]

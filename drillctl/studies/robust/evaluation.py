@@ -85,8 +85,9 @@ class Evaluation:
         return Ready(group, prepare(group.lanes, table), string_numbers(group.design.string))
 
     def measures(
-        self, points: Array, names: tuple[str, ...], first: int = 0, last: int | None = None
-    ) -> dict[str, Array]:
+        self, points: Array, names: tuple[str, ...], first: int = 0, last: int | None = None,
+        give_up: float = math.inf,
+    ) -> dict[str, Array]:  # fmt: skip
         """Measures of points at realizations.
 
         Parameters
@@ -97,6 +98,9 @@ class Evaluation:
             Measures of `simulation.batch`, or `effort`.
         first, last : int
             Which of the realizations; by default all.
+        give_up : float
+            J1 (s) over which nothing more is asked of a run: what is then told of it is a lower
+            bound of J1, and NaN for anything else.
 
         Returns
         -------
@@ -107,13 +111,13 @@ class Evaluation:
         found = {name: np.full((len(points), len(chosen)), np.nan) for name in names}
         if not self._at_once:
             for row, point in enumerate(points):
-                self._one_by_one(point, chosen, found, row)
+                self._one_by_one(point, chosen, found, row, give_up)
         else:
             for ready in self.groups:
                 members = np.flatnonzero(np.isin(ready.group.numbers, chosen))
                 if len(members):
                     columns = np.searchsorted(chosen, ready.group.numbers[members])
-                    self._group(points, ready, members, columns, found)
+                    self._group(points, ready, members, columns, found, give_up)
         self.trajectories += len(points) * len(chosen)
         if "j1" in found:
             found["j1"] = np.where(np.isnan(found["j1"]), math.inf, found["j1"])
@@ -121,7 +125,7 @@ class Evaluation:
 
     def _group(
         self, points: Array, ready: Ready, members: NDArray[np.int64],
-        columns: NDArray[np.int64], found: dict[str, Array],
+        columns: NDArray[np.int64], found: dict[str, Array], give_up: float,
     ) -> None:  # fmt: skip
         """All points at the realizations that share a string."""
         most = TOGETHER // (20 if "effort" in found else 1)  # traces take more room
@@ -129,7 +133,7 @@ class Evaluation:
         for begin in range(0, len(points), rows):
             some = points[begin : begin + rows]
             lanes = self._lanes(some, ready, members)
-            for name, values in _run(lanes, ready.prepared, tuple(found)).items():
+            for name, values in _run(lanes, ready.prepared, tuple(found), give_up).items():
                 place = np.ix_(np.arange(begin, begin + len(some)), columns)
                 found[name][place] = values.reshape(len(some), len(members))
 
@@ -156,8 +160,9 @@ class Evaluation:
         return replace(lanes, drive=drive, weight=weight)
 
     def _one_by_one(
-        self, point: Array, chosen: NDArray[np.int64], found: dict[str, Array], row: int
-    ) -> None:
+        self, point: Array, chosen: NDArray[np.int64], found: dict[str, Array], row: int,
+        give_up: float,
+    ) -> None:  # fmt: skip
         """A point whose lanes are made anew from the design: any parameter may be tuned."""
         try:
             drawn = drawn_lanes(put(self.design, self.tuned, point), self.draws)
@@ -170,7 +175,7 @@ class Evaluation:
             lanes = group.lanes[members]
             prepared = prepare(lanes, group.design.tables.simulation)
             columns = np.searchsorted(chosen, group.numbers[members])
-            for name, values in _run(lanes, prepared, tuple(found)).items():
+            for name, values in _run(lanes, prepared, tuple(found), give_up).items():
                 found[name][row, columns] = values
 
 
@@ -183,8 +188,10 @@ def _at_once(design: Design, tuned: tuple[Tuned, ...]) -> bool:
     return all(t.path in known for t in tuned) and not drawn
 
 
-def _run(lanes: Lanes, prepared: Prepared, names: tuple[str, ...]) -> dict[str, Array]:
-    measures = run_batch(lanes, prepared).measures
+def _run(
+    lanes: Lanes, prepared: Prepared, names: tuple[str, ...], give_up: float
+) -> dict[str, Array]:
+    measures = run_batch(lanes, prepared, give_up).measures
     found = {name: measures[name] for name in names if name != "effort"}
     if "effort" in names:
         found["effort"] = _effort(lanes, prepared)

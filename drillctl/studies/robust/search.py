@@ -176,7 +176,7 @@ def search(
     """
     begin, processor = time.perf_counter(), time.process_time()
     tuned = tuned_parameters(design)
-    judge = Judge(_fast(design), tuned)
+    judge = searching_judge(design, tuned)
     log = _Log(judge, progress)
     progress.begin("tuning", 5)
     field_ = _race(judge, _first_look(judge, design, verbose), log)
@@ -195,10 +195,19 @@ def search(
     return _told(design, judge, best, log, how, begin, processor)
 
 
-def _fast(design: Design) -> Design:
-    if design.tables.simulation.step is not None:
-        return design
-    return design.replace({"simulation.accuracy": "fast"})
+def searching_judge(design: Design, tuned: tuple[Tuned, ...]) -> Judge:
+    """What a search judges gains by: its realizations, at accuracy `fast` unless a step is given.
+
+    Parameters
+    ----------
+    design : Design
+        With its `[tune]` and `[uncertain]` tables.
+    tuned : tuple of Tuned
+        What differs.
+    """
+    if design.tables.simulation.step is None:
+        design = design.replace({"simulation.accuracy": "fast"})
+    return Judge(design, tuned)
 
 
 def _merit(point: Point) -> float:

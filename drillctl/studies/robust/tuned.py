@@ -76,14 +76,23 @@ def tuned_parameters(design: Design) -> tuple[Tuned, ...]:
         An unknown path, a wrong unit, bounds in the wrong order, or a count.
     """
     table = design.tables.tune
-    if not table.parameters:
-        return _defaults(design)
-    return tuple(_read(design, path, entry) for path, entry in table.parameters.items())
+    if table.parameters:
+        found = tuple(_read(design, path, entry) for path, entry in table.parameters.items())
+    else:
+        found = _defaults(design)
+    for path in (t.path for t in found if t.path in design.tables.uncertain):
+        raise InputError(
+            "is drawn in [uncertain], and cannot be tuned as well", _where(design, path)
+        )
+    return found
+
+
+def _where(design: Design, path: str) -> str:
+    return f"{design.origin}: " * bool(design.origin) + f"tune.parameters.{path}"
 
 
 def _read(design: Design, path: str, entry: RangeTable) -> Tuned:
-    where = f"{design.origin}: " if design.origin else ""
-    where += f"tune.parameters.{path}"
+    where = _where(design, path)
     try:
         target = parameter(design, path)
         low, high = target.parse(entry.min), target.parse(entry.max)
@@ -92,7 +101,16 @@ def _read(design: Design, path: str, entry: RangeTable) -> Tuned:
     if path.startswith("simulation.") or target.whole:
         raise InputError("is not a number of the rig that can be tuned", where)
     if not low < high:
-        raise InputError(f"min {entry.min} must be less than max {entry.max}", where)
+        raise InputError(
+            f"min {entry.min} must be less than max {entry.max}: the bounds are "
+            + ("reversed" if high < low else "equal"),
+            where,
+        )
+    for key, end in (("min", low), ("max", high)):
+        try:
+            design.replace({path: units.SI(end)})
+        except InputError as error:
+            raise InputError(f"no design has it: {error.problem}", f"{where}.{key}") from None
     return Tuned(path, target.si_unit, low, high)
 
 

@@ -199,7 +199,7 @@ class Job:
         return Job(self.design, self.axes, self.source, self.measures, self.censor, strings)
 
 
-STUDIES = ("map", "uncertain", "uncertainty", "compare", "weight_delay")
+STUDIES = ("map", "uncertain", "uncertainty", "compare", "weight_delay", "tune", "advantage")
 """Tables of a design that say what is to be computed of a rig, not what it is."""
 
 

@@ -13,6 +13,14 @@ from drillctl.studies.robust.linear_design import linear_design
 from drillctl.studies.robust.loops import loops_of
 from drillctl.studies.robust.tuned import tuned_parameters
 
+HOLDS = (
+    (
+        "linear design",
+        "maps and grids of the slope margin, figures of `drillctl.loop`; derivatives of D* "
+        "against differences",
+    ),
+)
+
 PAPER = "monteiro-trindade-140kn"
 DAMPED = {"drillstring.sections.pipe.stiffness_damping": "1 ms"}
 LATE = {

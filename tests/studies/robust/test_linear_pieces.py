@@ -16,6 +16,14 @@ from drillctl.studies.robust.pairs import Pair, pair
 from drillctl.studies.robust.spread import spread
 from drillctl.studies.robust.tuned import drive_numbers, put, string_numbers, tuned_parameters
 
+HOLDS = (
+    (
+        "linear design",
+        "maps and grids of the slope margin, figures of `drillctl.loop`; derivatives of D* "
+        "against differences",
+    ),
+)
+
 PAPER = "monteiro-trindade-140kn"
 DAMPED = {"drillstring.sections.pipe.stiffness_damping": "1 ms"}
 LAGS = {

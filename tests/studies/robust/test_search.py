@@ -14,6 +14,14 @@ from drillctl.studies.robust.search import search
 from drillctl.studies.robust.trust_region import Derivatives, descended
 from drillctl.studies.robust.tuned import put, tuned_parameters
 
+HOLDS = (
+    (
+        "search of gains",
+        "runs of `compare`, to the last bit; an exhaustive grid, within 1 % from a tenth of "
+        "its trajectories (slow)",
+    ),
+)
+
 PAPER = "monteiro-trindade-140kn"
 WINDOW = {"controller.kp": {"min": 400, "max": 800}, "controller.ki": {"min": 0, "max": 200}}
 MOVING = {"weight_on_bit.law": "navarro-lopez-suarez", "weight_on_bit.gain": "2 kN*s/rad"}

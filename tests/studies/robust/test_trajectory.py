@@ -11,6 +11,13 @@ from drillctl.studies.draws import draw
 from drillctl.studies.robust.trajectory import MEASURED, Trajectories
 from drillctl.studies.robust.tuned import put, tuned_parameters
 
+HOLDS = (
+    (
+        "J1 and its derivatives in CasADi",
+        "runs of the batch engine, to 1e-9; central differences",
+    ),
+)
+
 PAPER = "monteiro-trindade-140kn"
 FAST = {"simulation.accuracy": "fast"}
 DAMPED = {"drillstring.sections.pipe.stiffness_damping": "1 ms"}
@@ -60,13 +67,15 @@ CASES = [
 
 
 @pytest.mark.parametrize(("values", "points"), CASES)
-def test_j1_is_that_of_the_batch_engine(values, points):
+def test_j1_is_that_of_the_batch_engine(values, points, figure):
     design, trajectories = made(**values)
     for point in points:
         expected = by_engine(design, trajectories, point)
         found = trajectories.measures(np.array(point))
         for name in MEASURED[:3]:
             np.testing.assert_allclose(found[name], expected[name], rtol=1e-9)
+        apart = abs(found["j1"] / expected["j1"] - 1.0).max()
+        figure("J1 of the scheme in CasADi against the batch engine, relative", apart)
         again = trajectories.sensitivities(np.array(point))
         np.testing.assert_allclose(again.values["j1"], found["j1"], rtol=1e-13)
     assert np.ptp(found["j1"]) > 0.0

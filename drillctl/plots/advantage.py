@@ -1,0 +1,264 @@
+"""PI against PI with a weight on bit that follows the bit speed."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.plots.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    DASHES,
+    LINE,
+    SMALL,
+    TITLE,
+    VERMILLION,
+    axes_or_new,
+    dress,
+    grid_or_new,
+)
+
+if TYPE_CHECKING:
+    from drillctl.studies.advantage import Advantage
+    from drillctl.studies.advantage.delays import Crossing, DelayLine
+
+Array = NDArray[np.float64]
+
+MARKS = "osD"
+BAND = 0.18
+"""How much of its colour fills an interval."""
+HARM = 0.6
+"""Harm that is shown, over the objective of the constant weight."""
+WIDEST = 110
+"""Longest line of a caption (characters)."""
+
+
+def advantage_front(
+    result: Advantage, ax: Axes | None = None, system: units.System = "si"
+) -> Figure:
+    """Draw the robust objective against the mean weight on bit, a line a policy.
+
+    Parameters
+    ----------
+    result : Advantage
+        From `drillctl.advantage`.
+    ax : Axes, optional
+        To draw on.
+    system : {'si', 'field'}
+        Units of the weight.
+
+    Returns
+    -------
+    Figure
+        Each point is a nominal weight with gains tuned for it; bars are 95 % intervals.
+    """
+    figure, axes = axes_or_new(ax, 7.5, 5.2)
+    factor, unit = units.displayed(1.0, "N", system)
+    front = result.front.figures
+    for k, name in enumerate(result.front.policies):
+        weight = front["mean_weight"][k, :, 0] * factor
+        value = front["objective"][k, :, 0]
+        ends = np.stack([front[f"objective_{end}"][k, :, 0] for end in ("low", "high")])
+        axes.errorbar(
+            weight, value, yerr=np.abs(ends - value), fmt=MARKS[k % 3], color=COLOURS[k],
+            linestyle=DASHES[k], linewidth=LINE, markersize=5.0, capsize=3.0, label=name,
+        )  # fmt: skip
+    axes.set_ylim(bottom=0.0)
+    speed, rpm = units.displayed(float(result.front.speeds[0]), "rad/s", system)
+    dress(axes, f"mean weight on bit after the start ({unit})", f"{_objective(result)} (s)",
+          f"Each at its own robust optimum, {speed:g} {rpm}")  # fmt: skip
+    axes.legend(fontsize=SMALL, frameon=False)
+    if ax is None:
+        figure.supxlabel(_caption(result), fontsize=SMALL)
+    return figure
+
+
+def advantage_map(
+    result: Advantage, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
+    """Draw the advantage over weight and speed, a panel for each path of the weight.
+
+    Parameters
+    ----------
+    result : Advantage
+        From `drillctl.advantage`.
+    ax : sequence of Axes, optional
+        Two panels.
+    system : {'si', 'field'}
+        Units of the weight.
+
+    Returns
+    -------
+    Figure
+        Objective of the constant weight less that of the one that follows, each tuned in each cell;
+        a cross where the 95 % interval holds zero.
+    """
+    figure, panels = grid_or_new(ax, 1, 2, 12.0, 5.2)
+    factor, unit = units.displayed(1.0, "N", system)
+    turning, rpm = units.displayed(1.0, "rad/s", system)
+    values = result.chart.figures["advantage"][1:]
+    most = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 1.0
+    mesh = None
+    for k, axes in enumerate(panels, start=1):
+        mesh = axes.pcolormesh(
+            result.chart.speeds * turning, result.chart.weights * factor, values[k - 1],
+            cmap="PuOr", vmin=-most, vmax=most, shading="nearest",
+        )  # fmt: skip
+        doubtful = ~result.chart.significant(k)
+        for i, j in np.ndindex(values[k - 1].shape):
+            place = (result.chart.speeds[j] * turning, result.chart.weights[i] * factor)
+            value = values[k - 1][i, j]
+            mark = "" if not np.isfinite(value) else f"{value:.1f}" + "×" * int(doubtful[i, j])
+            dark = abs(value) > 0.6 * most
+            axes.annotate(mark, place, ha="center", va="center", fontsize=SMALL,
+                          color="white" if dark else BLACK)  # fmt: skip
+        dress(axes, f"set speed ({rpm})", f"nominal weight on bit ({unit})",
+              result.chart.policies[k])  # fmt: skip
+        axes.grid(visible=False)
+        axes.set_xticks(result.chart.speeds * turning)
+        axes.set_yticks(result.chart.weights * factor)
+        for formatted in (axes.xaxis, axes.yaxis):
+            formatted.set_major_formatter("{x:.4g}")
+    if mesh is not None:
+        bar = figure.colorbar(mesh, ax=panels)
+        bar.set_label(f"advantage in the {_objective(result)} (s)", fontsize=SMALL)
+    if ax is None:
+        figure.suptitle(_title(result), fontsize=TITLE, x=0.01, ha="left")
+        more = "Positive: the weight that follows is better. ×: the 95 % interval holds zero."
+        figure.supxlabel(_caption(result, more), fontsize=SMALL)
+    return figure
+
+
+def advantage_delay(
+    result: Advantage, ax: Axes | None = None, system: units.System = "si"
+) -> Figure:
+    """Draw the advantage against the delay of the path, with kept gains and gains tuned anew.
+
+    Parameters
+    ----------
+    result : Advantage
+        From `drillctl.advantage`.
+    ax : Axes, optional
+        To draw on.
+    system : {'si', 'field'}
+        Not used: seconds are seconds.
+
+    Returns
+    -------
+    Figure
+        Bands are 95 % intervals; a cross with a bar where the advantage of kept gains vanishes and
+        where that of gains tuned anew is no longer material.
+    """
+    figure, axes = axes_or_new(ax, 8.0, 5.2)
+    found, share = result.delay, result.design.tables.advantage.material
+    lines: tuple[tuple[str, DelayLine, Crossing, float, str], ...] = (
+        ("gains of the ideal path", found.kept, found.kept.zero, 0.0, VERMILLION),
+        ("gains tuned at each delay", found.anew, found.anew.material,
+         share * found.constant, BLUE),
+    )  # fmt: skip
+    for number, (name, line, crossing, level, colour) in enumerate(lines):
+        axes.fill_between(line.delays, line.low, line.high, color=colour, alpha=BAND, linewidth=0)
+        axes.plot(line.delays, line.advantage, MARKS[number], color=colour, linewidth=LINE,
+                  linestyle=DASHES[number], markersize=4.0,
+                  label=f"{name}: {_vanishes(crossing, level)}")  # fmt: skip
+        if crossing.delay is not None:
+            longest = float(found.delays[-1])
+            ends = [longest if end is None else end for end in crossing.interval_95]
+            bar = np.abs(np.array([[e] for e in ends]) - crossing.delay)
+            axes.errorbar([crossing.delay], [level], xerr=bar, fmt="X", color=colour, zorder=6,
+                          markersize=8.0, markeredgecolor=BLACK, capsize=4.0)  # fmt: skip
+    axes.axhline(0.0, color=BLACK, linewidth=0.9)
+    axes.set_xlim(0.0, max(float(found.delays[-1]), 1e-3) * 1.02)
+    if np.isfinite(found.constant):  # harm goes far below: what matters is where it begins
+        axes.set_ylim(bottom=max(axes.get_ylim()[0], -HARM * found.constant))
+    dress(axes, "delay of the bit speed (s)", f"advantage in the {_objective(result)} (s)",
+          f"Over the constant weight's {found.constant:.1f} s")  # fmt: skip
+    axes.legend(fontsize=SMALL, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13))
+    if ax is None:
+        more = "Hoist lag and limits are the same at every delay. Harm goes on below the picture."
+        figure.supxlabel(_caption(result, more), fontsize=SMALL)
+    return figure
+
+
+def advantage_cases(
+    result: Advantage, ax: Axes | None = None, system: units.System = "si"
+) -> Figure:
+    """Draw the distribution of J1 of every case over the fresh draws.
+
+    Parameters
+    ----------
+    result : Advantage
+        From `drillctl.advantage`.
+    ax : Axes, optional
+        To draw on.
+    system : {'si', 'field'}
+        Not used: seconds are seconds.
+
+    Returns
+    -------
+    Figure
+        Quantiles 5 to 95 % as a bar, the median as a line, the objective as a diamond with its 95 %
+        interval.
+    """
+    figure, axes = axes_or_new(ax, 9.0, 4.8)
+    names = []
+    for row, case in enumerate(result.cases):
+        values = case.measures["j1"]
+        values = values[~np.isnan(values)]
+        if values.size:
+            low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+            colour = COLOURS[result.chart.policies.index(case.policy)]
+            axes.barh(row, high - low, left=low, height=0.55, color=colour, alpha=0.35)
+            axes.plot([middle, middle], [row - 0.28, row + 0.28], color=colour, linewidth=2.0)
+        if case.objective.value is not None and case.objective.interval is not None:
+            ends = np.abs(np.array(case.objective.interval)[:, None] - case.objective.value)
+            axes.errorbar([case.objective.value], [row], xerr=ends, fmt="D", color=BLACK,
+                          markersize=4.5, capsize=3.5)  # fmt: skip
+        names.append(case.name)
+    axes.set_yticks(range(len(names)), names)
+    axes.invert_yaxis()
+    axes.set_xlim(left=0.0)
+    dress(axes, "J1 (s)", "", f"5 to 95 % of the draws, median; diamond: {_objective(result)}")
+    if ax is None:
+        figure.supxlabel(_caption(result), fontsize=SMALL)
+    return figure
+
+
+def _objective(result: Advantage) -> str:
+    table = result.design.tables.tune
+    return {
+        "mean": "mean of J1",
+        "quantile": f"{table.quantile:.0%} quantile of J1",
+        "cvar": f"mean of J1 beyond its {table.quantile:.0%} quantile",
+        "worst": "worst J1",
+    }[table.objective]
+
+
+def _vanishes(found: Crossing, level: float) -> str:
+    what = "none" if level == 0.0 else f"under {level:.2g} s"
+    if found.delay is None:
+        return f"never {what} up to the longest delay"
+    low, high = ("beyond" if end is None else f"{end:.2f}" for end in found.interval_95)
+    return f"{what} from {found.delay:.2f} s ({low} to {high})"
+
+
+def _title(result: Advantage) -> str:
+    return result.design.tables.title or result.design.name
+
+
+def _caption(result: Advantage, more: str = "") -> str:
+    tables = result.design.tables
+    origin = f"String {tables.status}. " if tables.status == "reconstructed" else ""
+    text = (
+        f"{origin}{tables.advantage.realizations} fresh draws, the same everywhere (seed "
+        f"{tables.advantage.seed}); intervals by resampled pairs. {more}"
+    )
+    return "\n".join(textwrap.wrap(text, WIDEST))

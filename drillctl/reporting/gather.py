@@ -1,0 +1,244 @@
+"""The studies of a report in the folders below it: read if they are there, done if not."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import drillctl
+from drillctl import store
+from drillctl.design import Design
+from drillctl.errors import DrillctlError, InputError
+from drillctl.json_files import read_json
+from drillctl.progress import SILENT, Progress
+from drillctl.reporting.profiles import Profile
+from drillctl.reporting.studies import ALL, RECIPES, Asked, Recipe
+from drillctl.reporting.words import Words
+
+State = Literal["done", "failed", "interrupted", "left_out", "not_asked"]
+
+
+class NotThereError(DrillctlError):
+    """A section needs a study that is not there.
+
+    Parameters
+    ----------
+    why : str
+        Reason, for the reader.
+    """
+
+    def __init__(self, why: str) -> None:
+        self.why = why
+        super().__init__(why)
+
+
+@dataclass(frozen=True)
+class Study:
+    """One study of a report.
+
+    Attributes
+    ----------
+    name, title : str
+        Of its folder, and in messages.
+    state : {'done', 'failed', 'interrupted', 'left_out', 'not_asked'}
+        What became of it.
+    why : str
+        Reason, if it is not done.
+    folder : Path
+        Where it is.
+    """
+
+    name: str
+    title: str
+    state: State
+    why: str
+    folder: Path
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """What it told."""
+        found: dict[str, Any] = read_json(self.folder / "summary.json")
+        return found
+
+    @cached_property
+    def result(self) -> Any:
+        """The whole result, read back."""
+        return store.open(self.folder)
+
+    @property
+    def key(self) -> str:
+        """What tells it from another run: identity, count of draws."""
+        about = read_json(self.folder / "run.json")
+        return f"{about['identity']}{about.get('count', '')}"
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """A design with its studies, of which the sections are made.
+
+    Attributes
+    ----------
+    design : Design
+        As the profile cuts it.
+    asked : Design
+        As it was given.
+    profile : Profile
+        What was spent.
+    words : Words
+        Units of the reader.
+    studies : dict of Study
+        By name.
+    """
+
+    design: Design
+    asked: Design
+    profile: Profile
+    words: Words
+    studies: dict[str, Study] = field(repr=False)
+
+    def need(self, name: str) -> Study:
+        """A study that is done.
+
+        Raises
+        ------
+        NotThereError
+            It is not.
+        """
+        study = self.studies[name]
+        if study.state != "done":
+            raise NotThereError(study.why)
+        return study
+
+    def have(self, name: str) -> Study | None:
+        """A study if it is done."""
+        study = self.studies[name]
+        return study if study.state == "done" else None
+
+    def key(self, names: Iterable[str]) -> str:
+        """What tells a picture of some studies from another one."""
+        parts = [drillctl.__version__, self.words.system, store.identity("report", self.design)]
+        parts += [self.studies[name].key for name in names]
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What failed or was interrupted, and why."""
+        return tuple(
+            f"{one.title[0].upper()}{one.title[1:]} {_PARTIAL[one.state]}: {one.why}"
+            for one in self.studies.values()
+            if one.state in _PARTIAL
+        )
+
+
+_PARTIAL = {"failed": "failed", "interrupted": "is not finished"}
+INTERRUPTED = "the report was interrupted; the same command with the same folder goes on from there"
+
+
+def gather(
+    design: Design,
+    profile: Profile,
+    folder: Path,
+    wanted: Iterable[str],
+    words: Words,
+    progress: Progress = SILENT,
+) -> Gathered:
+    """Read or do the studies of a report.
+
+    Parameters
+    ----------
+    design : Design
+        As it was given.
+    profile : Profile
+        What may be spent.
+    folder : Path
+        Each study is in a folder of its name below it.
+    wanted : iterable of str
+        Names of the studies.
+    words : Words
+        Units of the reader.
+    progress : Progress
+        Told of what is being done.
+
+    Returns
+    -------
+    Gathered
+        A study that fails says so in its place, and so does one that is interrupted: those after
+        it are not begun then.
+
+    Raises
+    ------
+    InputError
+        A folder holds another run.
+    """
+    cut = profile.applied(design)
+    names = _with_needs(wanted)
+    found: dict[str, Study] = {}
+    interrupted = False
+    for recipe in ALL:
+        place = folder / recipe.name
+        if recipe.name not in names:
+            why = "it was not asked for"
+            found[recipe.name] = Study(recipe.name, recipe.title, "not_asked", why, place)
+        elif interrupted and not _finished(place):
+            found[recipe.name] = Study(recipe.name, recipe.title, "interrupted", INTERRUPTED, place)
+        else:
+            asked = Asked(cut, profile, found)
+            found[recipe.name] = _study(recipe, asked, place, progress)
+            interrupted |= found[recipe.name].state == "interrupted"
+    return Gathered(cut, design, profile, words, found)
+
+
+def _with_needs(wanted: Iterable[str]) -> set[str]:
+    names: set[str] = set()
+    waiting = list(wanted)
+    while waiting:
+        name = waiting.pop()
+        if name not in names:
+            names.add(name)
+            waiting += RECIPES[name].needs
+    return names
+
+
+def _finished(place: Path) -> bool:
+    try:
+        return bool(read_json(place / "run.json").get("finished"))
+    except InputError:
+        return False
+
+
+def _study(recipe: Recipe, asked: Asked, place: Path, progress: Progress) -> Study:
+    """One study, whatever becomes of it."""
+
+    def ended(state: State, why: str = "") -> Study:
+        return Study(recipe.name, recipe.title, state, why, place)
+
+    lacking = [asked.found[name] for name in recipe.needs if asked.found[name].state != "done"]
+    if lacking:
+        state = lacking[0].state
+        why = f"{lacking[0].title} is missing: {lacking[0].why}"
+        return ended("left_out" if state in ("failed", "not_asked") else state, why)
+    if why := recipe.missing(asked):
+        return ended("left_out", why)
+    try:
+        design = recipe.variant(asked)
+    except InputError as error:
+        return ended("failed", str(error))
+    growing = store.growing_realizations(design) if recipe.growing else None
+    run = store.claim(recipe.verb, design, place, growing, **recipe.settings)
+    if run.finished:
+        return ended("done")
+    try:
+        result = recipe.compute(design, run, progress)
+        if recipe.write:
+            store.write_data(result, run.path)
+        run.finish(recipe.told(result))
+    except KeyboardInterrupt:
+        return ended("interrupted", INTERRUPTED)
+    except (DrillctlError, ArithmeticError, MemoryError, ValueError) as error:
+        run.discard()
+        return ended("failed", str(error) or type(error).__name__)
+    return ended("done")

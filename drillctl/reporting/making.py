@@ -1,0 +1,166 @@
+"""One call from a design to a report on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from drillctl import store
+from drillctl.design import Design
+from drillctl.errors import DrillctlError, InputError, nearest
+from drillctl.progress import SILENT, Progress
+from drillctl.reporting import folder as files
+from drillctl.reporting.document import chosen_sections, compose, studies_of
+from drillctl.reporting.gather import INTERRUPTED, Gathered, gather
+from drillctl.reporting.pictures import Album
+from drillctl.reporting.profiles import PROFILES, Profile
+from drillctl.reporting.verdict import summary as told_verdict
+from drillctl.reporting.verdict import verdict
+from drillctl.reporting.words import Words
+
+if TYPE_CHECKING:
+    from drillctl import units
+    from drillctl.reporting.blocks import Document
+
+Format = Literal["html", "pdf", "md"]
+FORMATS: tuple[Format, ...] = ("html", "pdf", "md")
+
+
+@dataclass(frozen=True)
+class Report:
+    """A report on disk.
+
+    Attributes
+    ----------
+    folder : Path
+        Where it is.
+    files : dict of Path
+        Files by format: `html`, `pdf`, `md`.
+    problems : tuple of str
+        What failed or was not finished; empty for a complete report.
+    interrupted : bool
+        Whether it was interrupted; the same call goes on.
+    unwritten : dict of str
+        Formats that could not be written, with the reason.
+    content : dict
+        What `summary.json` holds.
+    """
+
+    folder: Path
+    files: dict[str, Path]
+    problems: tuple[str, ...]
+    interrupted: bool
+    unwritten: dict[str, str]
+    content: dict[str, Any]
+
+    def summary(self) -> dict[str, Any]:
+        """Verdict, problems, files and the summaries of the studies; SI units."""
+        return self.content
+
+
+def report(
+    design: Design,
+    folder: str | Path | None = None,
+    profile: str | Profile = "quick",
+    sections: Iterable[str] | None = None,
+    title: str | None = None,
+    formats: Iterable[str] = ("html",),
+    system: units.System = "field",
+    progress: Progress = SILENT,
+) -> Report:
+    """Write the report of a design; studies that are in its folder are read, not done again.
+
+    Parameters
+    ----------
+    design : Design
+        Any.
+    folder : str or Path, optional
+        New, empty, or holding the report of the very same design and profile; by default a new
+        folder under `runs`.
+    profile : str or Profile
+        How much is computed: `quick`, `standard` or `full`.
+    sections : iterable of str, optional
+        Names of the sections; all by default.
+    title : str, optional
+        Instead of the design's own.
+    formats : iterable of str
+        `html`, `pdf` and `md`.
+    system : {'si', 'field'}
+        Units of tables and pictures.
+    progress : Progress
+        Told of what is being done.
+
+    Returns
+    -------
+    Report
+        A study that fails is told in it and in the first lines of what is written. If no format
+        that was asked for could be written, an exception is raised instead.
+
+    Raises
+    ------
+    InputError
+        No profile, section or format of that name, or the folder holds something else.
+    """
+    spent, wanted = _profile(profile), chosen_sections(sections)
+    kinds = _formats(formats)
+    run = store.claim("report", design, folder, profile=spent.name)
+    words = Words(system)
+    studies = studies_of(wanted)
+    gathered = gather(design, spent, run.path / "studies", studies, words, progress)
+    interrupted = any(one.why == INTERRUPTED for one in gathered.studies.values())
+    progress.begin("writing the report", 1)
+    document = compose(gathered, wanted, title)
+    album = Album(run.path / "figures", gathered)
+    problems = (*gathered.problems, *album.collect(document))
+    document = replace(document, problems=problems)
+    written, unwritten = files.write(document, album, run.path, kinds)
+    if not written:
+        raise DrillctlError("; ".join(unwritten.values()))
+    content = _content(gathered, document, written, unwritten)
+    if problems:
+        files.unfinished(run.path, content)
+    else:
+        run.finish(content)
+    return Report(run.path, written, problems, interrupted, unwritten, content)
+
+
+def _profile(asked: str | Profile) -> Profile:
+    if isinstance(asked, Profile):
+        return asked
+    if asked not in PROFILES:
+        raise InputError(f"no profile {asked!r}; {nearest(asked, PROFILES)}", "--profile")
+    return PROFILES[asked]
+
+
+def _formats(asked: Iterable[str]) -> tuple[Format, ...]:
+    names = tuple(asked)
+    for name in names:
+        if name not in FORMATS:
+            raise InputError(f"no format {name!r}; {nearest(name, FORMATS)}", "--format")
+    return tuple(name for name in FORMATS if name in names) or ("html",)
+
+
+def _content(
+    gathered: Gathered,
+    document: Document,
+    written: dict[str, Path],
+    unwritten: dict[str, str],
+) -> dict[str, Any]:
+    design = gathered.asked
+    return {
+        "design": design.name,
+        "title": document.title,
+        "profile": gathered.profile.name,
+        "complete": not document.problems,
+        "problems": list(document.problems),
+        "verdict": told_verdict(verdict(gathered)),
+        "sections": [section.name for section in document.sections],
+        "left_out": dict(document.left_out),
+        "files": {kind: path.name for kind, path in written.items()},
+        "not_written": unwritten,
+        "studies": {
+            name: one.summary for name, one in gathered.studies.items() if one.state == "done"
+        },
+    }

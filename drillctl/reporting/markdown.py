@@ -1,0 +1,100 @@
+"""A report as Markdown, its pictures beside it as PNG."""
+
+from __future__ import annotations
+
+import re
+from functools import singledispatch
+from html import escape
+
+from drillctl.reporting.blocks import (
+    Block,
+    Checks,
+    Code,
+    Document,
+    Figure,
+    InteractiveMap,
+    Table,
+    Text,
+)
+from drillctl.reporting.pictures import Album
+
+_MARKS = re.compile(r"([\\`*_{}\[\]#|~])")
+
+
+def page(document: Document, album: Album) -> str:
+    """The whole document.
+
+    Parameters
+    ----------
+    document : Document
+        Of a design.
+    album : Album
+        Its pictures.
+    """
+    lines = [f"# {_text(document.title)}", ""]
+    if document.problems:
+        lines += ["**This report is not complete.**", ""]
+        lines += [f"- {_text(problem)}" for problem in document.problems] + [""]
+    lines += [_text(document.subtitle), ""]
+    lines += [f"- {_text(name)}: {_text(value)}" for name, value in document.facts] + [""]
+    for section in document.sections:
+        lines += [f"## {_text(section.title)}", ""]
+        for block in section.blocks:
+            lines += [_block(block, album), ""]
+    if document.left_out:
+        lines += ["## Not in this report", ""]
+        lines += [f"- {_text(name)}: {_text(why)}" for name, why in document.left_out] + [""]
+    return "\n".join(lines)
+
+
+def _text(text: str) -> str:
+    """Text in which nothing is markup, on one line."""
+    return _MARKS.sub(r"\\\1", escape(" ".join(text.split()), quote=False))
+
+
+@singledispatch
+def _block(block: Block, album: Album) -> str:
+    raise TypeError(type(block).__name__)
+
+
+@_block.register
+def _(block: Text, album: Album) -> str:
+    return _text(block.text) if block.kind == "plain" else f"> {_text(block.text)}"
+
+
+@_block.register
+def _(block: Table, album: Album) -> str:
+    return _table(block.caption, block.heads, block.rows)
+
+
+@_block.register
+def _(block: Checks, album: Album) -> str:
+    rows = tuple((one.question, one.word, one.detail) for one in block.checks)
+    return _table(block.caption, ("question", "answer", "detail"), rows)
+
+
+def _table(caption: str, heads: tuple[str, ...], rows: tuple[tuple[str, ...], ...]) -> str:
+    lines = [f"**{_text(caption)}**", ""]
+    lines.append("| " + " | ".join(map(_text, heads)) + " |")
+    lines.append("|" + "---|" * len(heads))
+    lines += ["| " + " | ".join(map(_text, row)) + " |" for row in rows]
+    return "\n".join(lines)
+
+
+@_block.register
+def _(block: Figure, album: Album) -> str:
+    album.picture(block)
+    return f"![{_text(block.alt)}](figures/{block.name}.png)\n\n*{_text(block.caption)}*"
+
+
+@_block.register
+def _(block: InteractiveMap, album: Album) -> str:
+    return _block(block.figure, album)
+
+
+@_block.register
+def _(block: Code, album: Album) -> str:
+    fence = "```"
+    while fence in block.text:
+        fence += "`"
+    return f"{_text(block.caption)}\n\n{fence}{block.language}\n{block.text.rstrip()}\n{fence}"

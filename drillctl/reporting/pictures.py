@@ -1,0 +1,183 @@
+"""Pictures of a report as files, kept as long as what they show is the same."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drillctl.errors import DrillctlError, InputError
+from drillctl.json_files import read_json, write_json, write_text
+from drillctl.plots.style import axes_or_new
+from drillctl.reporting.blocks import Document, Figure, InteractiveMap
+from drillctl.reporting.gather import Gathered
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawn
+
+DPI = 110
+"""Of pictures as PNG, and of what is a bitmap within an SVG."""
+MOST_SHAPES = 500
+"""Shapes of one kind that an SVG holds as such; more of them make it slow and large."""
+INDEX = "index.json"
+_PATHS = re.compile(r' d="([^"]*)"', re.DOTALL)
+_DIGITS = re.compile(r"(\.\d\d)\d+")
+_METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture on disk.
+
+    Attributes
+    ----------
+    name : str
+        Of its files.
+    width, height : float
+        Size (points).
+    box : tuple of float
+        Its first axes: left, top, width, height as shares of the picture.
+    folder : Path
+        Where `name.svg` and `name.png` are.
+    """
+
+    name: str
+    width: float
+    height: float
+    box: tuple[float, float, float, float]
+    folder: Path
+
+    @property
+    def svg(self) -> str:
+        """The picture as SVG."""
+        return (self.folder / f"{self.name}.svg").read_text(encoding="utf-8")
+
+    @property
+    def png(self) -> Path:
+        """The file of the picture as PNG."""
+        return self.folder / f"{self.name}.png"
+
+
+class Album:
+    """The pictures of a report in their folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there.
+    gathered : Gathered
+        What tells whether a picture may be kept.
+    """
+
+    def __init__(self, folder: Path, gathered: Gathered) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder, self._gathered = folder, gathered
+        self._problems: list[str] = []
+        self._index: dict[str, Any] = {}
+        if (folder / INDEX).is_file():
+            try:
+                self._index = dict(read_json(folder / INDEX))
+            except InputError:  # pictures are drawn anew
+                self._index = {}
+
+    def collect(self, document: Document) -> tuple[str, ...]:
+        """Draw every picture of a document that is not there; tells which could not be drawn."""
+        for section in document.sections:
+            for block in section.blocks:
+                if isinstance(block, Figure):
+                    self.picture(block)
+                elif isinstance(block, InteractiveMap):
+                    self.picture(block.figure)
+        return tuple(self._problems)
+
+    def picture(self, figure: Figure) -> Picture:
+        """The picture of a figure, drawn if it is not there."""
+        key = self._gathered.key(figure.of)
+        held = self._index.get(figure.name, {})
+        there = all((self._folder / f"{figure.name}.{kind}").is_file() for kind in ("svg", "png"))
+        if held.get("key") == key and there:
+            return self._made(figure.name, held)
+        try:
+            made = self._draw(figure)
+        except (DrillctlError, ArithmeticError, ValueError, LookupError) as error:
+            self._problems.append(f"The picture {figure.name} could not be drawn: {error}")
+            return self._draw(replace(figure, draw=_blank))
+        about = {k: v for k, v in asdict(made).items() if k not in ("name", "folder")}
+        self._index[figure.name] = about | {"key": key}
+        write_json(self._folder / INDEX, self._index)
+        return made
+
+    def _made(self, name: str, held: dict[str, Any]) -> Picture:
+        return Picture(name, held["width"], held["height"], tuple(held["box"]), self._folder)
+
+    def _draw(self, figure: Figure) -> Picture:
+        from matplotlib import rc_context
+
+        drawn = figure.draw()
+        for ax in drawn.axes:
+            for crowd in ax.collections:
+                crowd.set_rasterized(crowd.get_rasterized() or len(crowd.get_paths()) > MOST_SHAPES)
+        svg = self._folder / f"{figure.name}.svg"
+        part = svg.with_suffix(".part")
+        # A fixed salt: the same picture is the same file.
+        with rc_context({"svg.hashsalt": figure.name, "svg.fonttype": "path"}):
+            drawn.savefig(part, format="svg", dpi=DPI, metadata={"Date": None})
+        write_text(svg, _small(part.read_text(encoding="utf-8")))
+        part.unlink(missing_ok=True)
+        place = drawn.axes[0].get_position()
+        drawn.set_layout_engine("none")  # laid out already
+        drawn.savefig(part, format="png", dpi=DPI)
+        part.replace(svg.with_suffix(".png"))
+        width, height = (72.0 * float(inches) for inches in drawn.get_size_inches())
+        left, up = float(place.x0), 1.0 - float(place.y1)
+        box = (left, up, float(place.width), float(place.height))
+        return Picture(figure.name, width, height, box, self._folder)
+
+
+def _blank() -> Drawn:
+    """In the place of a picture that could not be drawn."""
+    made, ax = axes_or_new(None, 6.0, 2.0)
+    ax.set_axis_off()
+    ax.text(0.5, 0.5, "could not be drawn: see the first lines", ha="center", va="center")
+    return made
+
+
+def _small(svg: str) -> str:
+    """Without metadata, and with curves to a hundredth of a point."""
+    svg = _METADATA.sub("", svg)
+    return _PATHS.sub(lambda found: _DIGITS.sub(r"\1", found[0]), svg)
+
+
+# Ink, paper, grid and the palette of `plots.style`, by what they are on dark ground.
+_INKS = {
+    "#000000": ("ink", "#1a1a1a", "#e8e6e3"),
+    "#ffffff": ("paper", "#ffffff", "#16191d"),
+    "#dddddd": ("grid", "#dddddd", "#3a3f45"),
+    "#0072b2": ("blue", "#0072b2", "#4fb0e8"),
+    "#d55e00": ("vermillion", "#d55e00", "#ff8b3d"),
+    "#009e73": ("green", "#009e73", "#2cc79b"),
+    "#cc79a7": ("purple", "#cc79a7", "#e39ac2"),
+    "#bbbbbb": ("shade", "#bbbbbb", "#5a6068"),
+}
+_COLOURS = re.compile("|".join(_INKS), re.IGNORECASE)
+
+
+def themed(svg: str) -> str:
+    """A picture that turns light on dark ground where the reader's screen is dark.
+
+    Parameters
+    ----------
+    svg : str
+        As it was drawn, dark on white.
+    """
+    svg = _COLOURS.sub(lambda found: f"var(--{_INKS[found[0].lower()][0]})", svg)
+    light = "".join(f"--{name}:{colour};" for name, colour, _ in _INKS.values())
+    dark = "".join(f"--{name}:{colour};" for name, _, colour in _INKS.values())
+    style = (
+        f"<style>svg{{{light}fill:var(--ink)}}"
+        f"@media (prefers-color-scheme:dark){{svg{{{dark}}}}}</style>"
+    )
+    head, mark, rest = svg.partition("<svg")
+    opening, end, body = rest.partition(">")
+    return f"{head}{mark}{opening}{end}{style}{body}"

@@ -1,0 +1,115 @@
+"""Cases at the same draws: distributions, paired differences, regions, responses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from drillctl import plots
+from drillctl.reporting.blocks import Block, Figure, Table, Text
+from drillctl.reporting.gather import Gathered
+from drillctl.reporting.words import NOTHING, between, chance, number
+
+MEASURES = (
+    ("J1 (s)", "j1", ""),
+    ("time stuck (s)", "stuck_time", ""),
+    ("peak top torque", "peak_top_torque", "N*m"),
+    ("peak pipe torque", "peak_pipe_torque", "N*m"),
+    ("mean weight after the start", "mean_weight_after_start", "N"),
+    ("ROP proxy", "rop_proxy", ""),
+)
+
+
+def build(gathered: Gathered) -> tuple[Block, ...]:
+    """Means, shares, differences and pictures."""
+    study = gathered.need("compare")
+    found, system = study.summary, gathered.words.system
+    cases = found["cases"]
+    first = next(iter(cases))
+    blocks: list[Block] = [
+        Text(
+            f"{found['realizations']} draws, seed {found['seed']}, the same for every case; "
+            f"differences are to the first case, {first}."
+        ),
+        _means(gathered, cases),
+        _shares(cases),
+        _differences(gathered, found["paired"]),
+    ]
+    of = ("compare",)
+
+    def added(name: str, caption: str, alt: str, draw: Any, paper: bool = False) -> None:
+        blocks.append(Figure(name, caption, alt, lambda: draw(study.result), of, paper))
+
+    names = ", ".join(cases)
+    added("compared-distributions", "J1 of each case over the draws.",
+          f"Distribution functions of J1 of {names}.", plots.j1_distributions)  # fmt: skip
+    if len(cases) > 1:
+        added("paired-differences", "Paired differences to the first case, with intervals.",
+              f"Differences to {first} of every measure, in percent.",
+              plots.paired_differences)  # fmt: skip
+    added("compared-weight", "J1 against the mean weight on bit.",
+          "J1 of each case against its mean weight on bit.",
+          lambda result: plots.j1_against_weight(result, system=system))  # fmt: skip
+    added("compared-responses", "Responses of the cases at their own values.",
+          f"Speeds of bit and top of {names}.",
+          lambda result: plots.compared_responses(result, system=system))  # fmt: skip
+    if any(case["regions"] and any(r["cells"] is not None for r in case["regions"].values())
+           for case in cases.values()):  # fmt: skip
+        added("compared-regions", "Regions of the cases.", f"Outlines of the regions of {names}.",
+              lambda result: plots.compared_regions(result, system=system), True)  # fmt: skip
+    return tuple(blocks)
+
+
+def _means(gathered: Gathered, cases: dict[str, Any]) -> Table:
+    words = gathered.words
+    heads = ["case"]
+    for title, _, unit in MEASURES:
+        heads.append(f"{title} ({words.unit(unit)})" if unit else title)
+    rows = []
+    for name, case in cases.items():
+        row = [name]
+        for _, key, unit in MEASURES:
+            mean = case["measures"][key]["mean"]
+            scaled = mean if mean is None or not unit else words.scaled(mean, unit)
+            row.append(number(scaled))
+        rows.append(tuple(row))
+    return Table("cases", "Means over the draws", tuple(heads), tuple(rows))
+
+
+def _shares(cases: dict[str, Any]) -> Table:
+    levels = list(next(iter(cases.values()))["regions"])
+    rows = tuple(
+        (name, *(chance(case["regions"][x]["share"], case["regions"][x]["interval_95"])
+                 for x in levels))
+        for name, case in cases.items()
+    )  # fmt: skip
+    heads = ("case", *(f"P(J1 ≤ {x} s)" for x in levels))
+    return Table("shares", "Share of the draws at or under each level (95 % interval)", heads, rows)
+
+
+def _differences(gathered: Gathered, paired: dict[str, Any]) -> Table:
+    words = gathered.words
+    heads = ["case"]
+    for title, _, unit in MEASURES:
+        heads.append(f"{title} ({words.unit(unit)})" if unit else title)
+    rows = []
+    for name, measures in paired.items():
+        row = [name]
+        for _, key, unit in MEASURES:
+            told = measures[key]
+            if told["difference"] is None:
+                row.append(NOTHING)
+                continue
+            value = _scaled(gathered, told["difference"], unit)
+            ends = told["interval_95"]
+            text = number(value, 3)
+            if ends is not None:
+                low, high = (_scaled(gathered, end, unit) for end in ends)
+                text += f" ({between(low, high, 3)})"
+            row.append(text)
+        rows.append(tuple(row))
+    return Table("differences", "Mean paired difference to the first case (95 % interval)",
+                 tuple(heads), tuple(rows))  # fmt: skip
+
+
+def _scaled(gathered: Gathered, value: float, unit: str) -> float:
+    return gathered.words.scaled(value, unit) if unit else value

@@ -1,0 +1,89 @@
+"""Time responses at the current, the best and a bad setting."""
+
+from __future__ import annotations
+
+from drillctl import plots
+from drillctl.reporting.blocks import Block, Figure, Table
+from drillctl.reporting.gather import Gathered, NotThereError, Study
+from drillctl.reporting.words import NOTHING, Words, number
+
+NAMES = {"simulate": "current", "best": "best of the map", "bad": "a bad one"}
+MEASURES = (
+    ("J1 (s)", "j1", ""),
+    ("time stuck (s)", "stuck_time", ""),
+    ("sticks", "sticks", ""),
+    ("stick-slip index", "stick_slip_index", ""),
+    ("settling time to 2 % (s)", "settling_time", ""),
+    ("peak bit speed", "peak_bit_speed", "rad/s"),
+    ("peak pipe torque", "peak_pipe_torque", "N*m"),
+    ("peak top torque", "peak_top_torque", "N*m"),
+    ("mean weight on bit", "mean_weight_on_bit", "N"),
+    ("ROP proxy", "rop_proxy", ""),
+    ("work per turn", "work_per_turn", "J"),
+)
+
+
+def build(gathered: Gathered) -> tuple[Block, ...]:
+    """Runs beside each other, and their measures."""
+    runs = {name: study for name in NAMES if (study := gathered.have(name)) is not None}
+    if not runs:
+        raise NotThereError(gathered.studies["simulate"].why)
+    paths = list(study.summary["axes"]) if (study := gathered.have("map")) is not None else []
+    heads = ["measure", *(NAMES[name] for name in runs)]
+    rows = [["engine", *(study.summary["engine"] for study in runs.values())]]
+    rows.append(["status", *(s.summary["status"].replace("_", " ") for s in runs.values())])
+    for title, key, unit in MEASURES:
+        head = _head(title, unit, gathered.words)
+        rows.append([head, *(_value(s, key, unit, gathered.words) for s in runs.values())])
+    rows += _places(gathered, runs)
+    table = Table("responses", "Measures of the runs", tuple(heads), tuple(map(tuple, rows)))
+    figure = Figure(
+        "responses",
+        "Speeds of bit and top drive at the current, the best and a bad setting, in this order; "
+        "grey where the bit stands still.",
+        _alt(runs),
+        lambda: plots.time_response([one.result for one in runs.values()], paths=paths),
+        tuple(runs),
+    )
+    return figure, table
+
+
+def _value(study: Study, key: str, unit: str, words: Words) -> str:
+    value = study.summary["measures"][key]
+    if value is None:
+        return NOTHING
+    return number(words.scaled(value, unit) if unit else value)
+
+
+def _head(title: str, unit: str, words: Words) -> str:
+    return f"{title} ({words.unit(unit)})" if unit else title
+
+
+def _places(gathered: Gathered, runs: dict[str, Study]) -> list[list[str]]:
+    """Where the runs are on the map."""
+    study = gathered.have("cells")
+    if study is None:
+        return []
+    from drillctl.design import parameter
+
+    best = study.summary["best"] or study.summary["bad"] or {}
+    rows = []
+    for path in best:
+        own = parameter(gathered.design, path)
+        row = [gathered.words.head(gathered.design, path)]
+        for name in runs:
+            at = own.value if name == "simulate" else study.summary[name][path]
+            row.append(
+                NOTHING if at is None else number(gathered.words.scaled(at, own.si_unit))
+            )  # fmt: skip
+        rows.append(row)
+    return rows
+
+
+def _alt(runs: dict[str, Study]) -> str:
+    told = [
+        f"{NAMES[name]}: {study.summary['status'].replace('_', ' ')}, "
+        f"J1 {number(study.summary['measures']['j1'])} s"
+        for name, study in runs.items()
+    ]
+    return f"Time responses of bit and top speed. {'; '.join(told)}."

@@ -1,0 +1,344 @@
+"""The studies that a report is made of: what each asks for, and when it does not apply."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import drillctl
+from drillctl import units
+from drillctl.design import Design
+from drillctl.reporting import cells
+from drillctl.reporting.profiles import Profile
+
+if TYPE_CHECKING:
+    from drillctl.progress import Progress
+    from drillctl.reporting.gather import Study
+    from drillctl.store import RunFolder
+
+Found = Mapping[str, "Study"]
+"""Studies that are done already, by name."""
+FREE = 20.0
+"""Samples of a run that is kept for its numbers alone are so far apart (s)."""
+FINE = 0.05
+"""And of one that is drawn (s)."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a study is asked.
+
+    Attributes
+    ----------
+    design : Design
+        To be studied.
+    profile : Profile
+        What may be spent.
+    found : mapping of Study
+        The studies before it.
+    """
+
+    design: Design
+    profile: Profile
+    found: Found
+
+
+def _applies(asked: Asked) -> str:
+    return ""
+
+
+def _as_asked(asked: Asked) -> Design:
+    return asked.design
+
+
+def _summary(result: Any) -> dict[str, Any]:
+    return dict(result.summary())
+
+
+class Recipe(NamedTuple):
+    """One study of a report.
+
+    Attributes
+    ----------
+    name : str
+        Of its folder.
+    title : str
+        What it is called in messages.
+    verb : str
+        Command that would make the same folder.
+    compute : callable
+        The result, from its design, its folder and the progress.
+    missing : callable
+        Why it does not apply; empty where it does.
+    variant : callable
+        The design that is studied.
+    needs : tuple of str
+        Studies that must be done before.
+    settings : dict
+        What the result depends on beside its design.
+    growing : bool
+        Whether more draws may be added later.
+    write : bool
+        Whether the result is one that the store writes.
+    told : callable
+        The summary of a result.
+    """
+
+    name: str
+    title: str
+    verb: str
+    compute: Callable[[Design, RunFolder, Progress], Any]
+    missing: Callable[[Asked], str] = _applies
+    variant: Callable[[Asked], Design] = _as_asked
+    needs: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = MappingProxyType({})
+    growing: bool = False
+    write: bool = True
+    told: Callable[[Any], dict[str, Any]] = _summary
+
+
+def level_of(design: Design) -> float:
+    """The level of J1 (s) that a setting is judged by."""
+    return design.tables.tune.level
+
+
+def _two_axes(asked: Asked) -> str:
+    reason = _fitting_map(asked)
+    count = len(asked.design.tables.map.axes)
+    if not reason and count != 2:
+        return f"it is shown over two parameters, the map of this design has {count}"
+    return reason
+
+
+def _fitting_map(asked: Asked) -> str:
+    """Why the default map does not fit a design that names no axes of its own."""
+    from drillctl.errors import InputError
+    from drillctl.studies.grid import axes_of
+
+    try:
+        axes_of(asked.design, asked.design.tables.map.axes)
+    except InputError as error:
+        return f"its map does not fit this design ({error.problem}); name other axes in [map]"
+    return ""
+
+
+def _in_batch(asked: Asked) -> str:
+    if asked.design.tables.bit_rock.law == "printed-three-branch":
+        return "the batch engine does not take the friction law printed-three-branch"
+    return ""
+
+
+def _both(*reasons: Callable[[Asked], str]) -> Callable[[Asked], str]:
+    return lambda asked: next((why for reason in reasons if (why := reason(asked))), "")
+
+
+def _simulated(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    progress.begin("simulating one run", 1)
+    return drillctl.simulate(design, interval=FINE)
+
+
+def _numbers(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    progress.begin("simulating one run", 1)
+    return drillctl.simulate(design, interval=FREE)
+
+
+def _swept(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    from drillctl import studies
+
+    return studies.sweep(design, progress=progress, blocks=folder.blocks())
+
+
+def _cells(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    return cells.traced(design, folder.path, progress)
+
+
+def _uncertain(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    from drillctl import studies
+
+    return studies.uncertainty(design, progress=progress, shelf=folder.shelf())
+
+
+def _under_uncertainty(asked: Asked) -> Design:
+    """The design with as many audited lanes as the profile spends."""
+    if asked.profile.drawn_audit is None:
+        return asked.design
+    return asked.design.replace({"map.audit_cells": asked.profile.drawn_audit})
+
+
+def _setting(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    from drillctl import studies
+
+    return studies.uncertainty(design, axes=(), audit_cells=0, progress=progress)
+
+
+def _told_of_setting(result: Any) -> dict[str, Any]:
+    level = level_of(result.design)
+    share = result.probability(level)
+    low, high = share.interval
+    return {
+        "level": level,
+        "realizations": result.realizations,
+        "seed": result.seed,
+        "uncertain": list(result.drawn),
+        "probability": float(share.probability),
+        "interval_95": [float(low), float(high)],
+        "failures": [{"reason": one.reason, "count": one.count} for one in result.failures],
+    }
+
+
+def _at_setting(asked: Asked) -> Design:
+    """The design with more draws at its own gains, and its level among those that are counted."""
+    design, level = asked.design, level_of(asked.design)
+    levels = sorted({*design.tables.map.levels, level})
+    # Nothing that a map under uncertainty has beyond its draws.
+    values: dict[str, Any] = {
+        "map.levels": levels, "uncertainty.sampling": "monte-carlo",
+        "uncertainty.realizations": asked.profile.setting, "uncertainty.sensitivity": None,
+        "uncertainty.until": None, "uncertainty.axes": [], "uncertainty.contours": False,
+        "uncertainty.keep": [],
+    }  # fmt: skip
+    return design.replace(values)
+
+
+def _cell(which: str) -> Callable[[Asked], Design]:
+    """The design of the best or of a bad cell of the map."""
+
+    def variant(asked: Asked) -> Design:
+        at = asked.found["cells"].summary[which]
+        values = {path: units.SI(value) for path, value in at.items()}
+        return asked.design.replace({**values, "simulation.engine": "batch"})
+
+    return variant
+
+
+def _no_such_cell(which: str) -> Callable[[Asked], str]:
+    def missing(asked: Asked) -> str:
+        return "" if asked.found["cells"].summary[which] else f"the map has no {which} cell"
+
+    return missing
+
+
+def _finer(parts: int, of: str) -> Callable[[Asked], Design]:
+    """The design with elements, or the step of the batch engine, divided."""
+
+    def variant(asked: Asked) -> Design:
+        design = asked.design.replace({"simulation.engine": "batch"})
+        if of == "step":
+            held = asked.found["mesh-1"].summary["step"] / parts
+            return design.replace({"simulation.step": units.SI(held)})
+        sections = design.tables.drillstring.sections
+        counts = {part.name: part.elements for part in design.string.parts.sections}
+        return design.replace({
+            f"drillstring.sections.{table.name}.elements": parts * counts[table.name]
+            for table in sections
+            if table.stiffness is None
+        } if parts > 1 else {})  # fmt: skip
+
+    return variant
+
+
+def _lumped(asked: Asked) -> str:
+    if all(table.stiffness is not None for table in asked.design.tables.drillstring.sections):
+        return "a lumped string has no mesh"
+    return ""
+
+
+def _moded(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    return drillctl.modes(design)
+
+
+def _looped(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    progress.begin("analysing the loop", 1)
+    return drillctl.loop(design)
+
+
+def _no_cases(asked: Asked) -> str:
+    if not asked.design.tables.compare.cases:
+        return "the design names no cases to compare ([compare])"
+    if not asked.profile.compared:
+        return "cases are compared with --profile full"
+    return ""
+
+
+def _not_tuned(asked: Asked) -> str:
+    if not asked.profile.tuned:
+        return "gains are tuned with --profile full"
+    if not hasattr(drillctl, "tune"):
+        return "this version does not tune gains"
+    return ""
+
+
+def _not_weighed(asked: Asked) -> str:
+    if not asked.profile.compared or not hasattr(drillctl, "advantage"):
+        return "the benefit of a moving weight on bit was not studied"
+    if "advantage" not in asked.design.tree:
+        return "the design does not ask for it ([advantage])"
+    return ""
+
+
+def _by_name(verb: str) -> Callable[[Design, RunFolder, Progress], Any]:
+    def compute(design: Design, folder: RunFolder, progress: Progress) -> Any:
+        return getattr(drillctl, verb)(design, progress=progress)
+
+    return compute
+
+
+def _compared(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    return drillctl.compare(design, progress=progress)
+
+
+def _regions(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    from drillctl import studies
+
+    return studies.three_regions(design, progress=progress)
+
+
+def _loop_map(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    from drillctl import studies
+
+    return studies.loop_map(design, quantities=("slope_margin",), progress=progress)
+
+
+def _examined(design: Design, folder: RunFolder, progress: Progress) -> Any:
+    return drillctl.doctor(design, 0, progress=progress)
+
+
+ALL = (
+    Recipe("modes", "the modes", "modes", _moded, settings={"count": 10}),
+    Recipe("loop", "the loop", "loop", _looped),
+    Recipe("simulate", "the run at the current setting", "simulate", _simulated),
+    Recipe("setting", "the draws at the current setting", "uncertainty", _setting, _in_batch,
+           _at_setting, settings={"axes": []}, told=_told_of_setting),
+    Recipe("map", "the J1 map", "map", _swept, _both(_in_batch, _fitting_map)),
+    Recipe("cells", "the responses over the map", "report-cells", _cells, _fitting_map,
+           needs=("map",), write=False, told=dict),
+    Recipe("best", "the run at the best cell", "simulate", _simulated, _no_such_cell("best"),
+           _cell("best"), needs=("cells",)),
+    Recipe("bad", "the run at a bad cell", "simulate", _simulated, _no_such_cell("bad"),
+           _cell("bad"), needs=("cells",)),
+    Recipe("slope-margin", "the slope margin over the map", "loop-map", _loop_map, _two_axes),
+    Recipe("regions", "the three regions", "regions", _regions, _both(_in_batch, _two_axes)),
+    Recipe("uncertainty", "the map under uncertainty", "uncertainty", _uncertain,
+           _both(_in_batch, _fitting_map), _under_uncertainty, growing=True),
+    Recipe("compare", "the comparison", "compare", _compared, _both(_no_cases, _in_batch)),
+    Recipe("tune", "the tuning of the gains", "tune", _by_name("tune"),
+           _both(_not_tuned, _in_batch)),
+    Recipe("advantage", "the benefit of a moving weight", "advantage", _by_name("advantage"),
+           _both(_not_weighed, _in_batch)),
+    Recipe("doctor", "the errors of the batch engine", "doctor", _examined,
+           settings={"audited": 0}),
+    Recipe("mesh-1", "the run by the batch engine", "simulate", _numbers, _in_batch,
+           _finer(1, "elements")),
+    Recipe("mesh-2", "the run with twice the elements", "simulate", _numbers,
+           _both(_in_batch, _lumped), _finer(2, "elements")),
+    Recipe("mesh-4", "the run with four times the elements", "simulate", _numbers,
+           _both(_in_batch, _lumped), _finer(4, "elements")),
+    Recipe("step-2", "the run with half the step", "simulate", _numbers, _in_batch,
+           _finer(2, "step"), needs=("mesh-1",)),
+    Recipe("step-4", "the run with a quarter of the step", "simulate", _numbers, _in_batch,
+           _finer(4, "step"), needs=("mesh-1",)),
+)  # fmt: skip
+"""Every study, in the order in which they are done."""
+RECIPES = {recipe.name: recipe for recipe in ALL}

@@ -1,0 +1,286 @@
+"""The advantage against the delay of the path, and the delay at which it vanishes.
+
+Two answers, which are not to be mixed. *Gains of the ideal path*, kept while the signal comes
+later: the advantage turns to harm, and the delay where it does is a zero of a line. *Gains tuned
+anew* at every delay: a policy that may set its gain to zero contains the constant weight and is
+never worse but for the draws; its advantage fades, and the delay is told where it falls under a
+stated share of the constant weight's objective, and where its interval first holds zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.progress import Progress
+from drillctl.studies.advantage.cases import Optima, optimum_beside
+from drillctl.studies.advantage.measured import Fresh, estimate, less
+from drillctl.studies.advantage.optimum import Optimum
+from drillctl.studies.advantage.policies import DELAY, Policies, Policy
+from drillctl.studies.delay_limits import first_not_negative
+from drillctl.studies.intervals import CONFIDENCE
+
+Array = NDArray[np.float64]
+
+STEPS = 10
+"""Into which a step of the grid is divided where kept gains lose their advantage."""
+STEPS_ANEW = 5
+"""The same where gains tuned anew do, each of which is a search."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Delay at which an advantage first falls to a threshold.
+
+    Attributes
+    ----------
+    delay : float or None
+        On straight lines between the delays (s); None if it never does.
+    interval_95 : tuple of float or None
+        Percentiles over resampled draws; None for an end beyond the longest delay.
+    within : float
+        Share of the resamples in which it does.
+    """
+
+    delay: float | None
+    interval_95: tuple[float | None, float | None]
+    within: float
+
+    def summary(self) -> dict[str, Any]:
+        """As strict JSON values."""
+        return {"delay": self.delay, "interval_95": list(self.interval_95), "within": self.within}
+
+
+@dataclass(frozen=True, eq=False)
+class DelayLine:
+    """One choice of gains over the delays, at the same fresh draws.
+
+    Attributes
+    ----------
+    delays : ndarray, shape (delays,)
+        Increasing (s), closer together where the advantage vanishes.
+    gains : ndarray, shape (delays, 3)
+        kp, ki and the gain of the weight (SI).
+    objective : ndarray, shape (delays,)
+        At the fresh draws (s).
+    advantage, low, high : ndarray, shape (delays,)
+        Objective of the constant weight less that, and its 95 % interval (s).
+    zero : Crossing
+        Where the advantage first is none.
+    material : Crossing
+        Where it first falls under the stated share of the constant weight's objective.
+    """
+
+    delays: Array
+    gains: Array
+    objective: Array
+    advantage: Array
+    low: Array
+    high: Array
+    zero: Crossing
+    material: Crossing
+
+    @property
+    def indistinct_from(self) -> float | None:
+        """First of the delays (s) at which the interval does not lie above zero."""
+        found = np.flatnonzero(~(self.low > 0.0))
+        return float(self.delays[found[0]]) if found.size else None
+
+
+@dataclass(frozen=True, eq=False)
+class DelayCurve:
+    """The advantage against the delay of the path.
+
+    Attributes
+    ----------
+    delays : ndarray, shape (delays,)
+        Of the way from the bit to the driller (s); lags and limits are the same at all.
+    constant : float
+        Objective of the constant weight (s).
+    kept : DelayLine
+        Gains of the ideal path.
+    anew : DelayLine
+        Gains tuned at each delay.
+    """
+
+    delays: Array
+    constant: float
+    kept: DelayLine
+    anew: DelayLine
+
+    def summary(self) -> dict[str, Any]:
+        """As strict JSON values, SI."""
+        return {
+            "delays": self.delays.tolist(),
+            "constant": self.constant,
+            **{
+                name: {
+                    "delays": line.delays.tolist(),
+                    "advantage": _plain(line.advantage),
+                    "low": _plain(line.low),
+                    "high": _plain(line.high),
+                    "zero": line.zero.summary(),
+                    "material": line.material.summary(),
+                    "indistinct_from": line.indistinct_from,
+                }
+                for name, line in (("kept", self.kept), ("anew", self.anew))
+            },
+        }
+
+
+def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Progress) -> DelayCurve:
+    """Advantage of the real path over the delays of the design's `[advantage]` table.
+
+    Parameters
+    ----------
+    compared : Policies
+        At the design's own weight and speed.
+    optima : Optima
+        There.
+    fresh : Fresh
+        Draws.
+    progress : Progress
+        Told of delays.
+    """
+    ground = fresh.run(compared.constant.with_gains(optima.constant.values))
+    constant = np.append(ground.value, ground.resampled(fresh))
+    table = compared.real.design.tables.advantage
+    delays, fixed = np.array(table.delays), optima.ideal.values
+    anew = _tuned_anew(compared.real, optima, fresh, ground.value, progress)
+    kept: Points = {
+        delay: (fixed, _measured(_late(compared.real, delay), fixed, fresh))
+        for delay in table.delays
+    }
+    for delay in _between(delays, _advantages(ground.value, kept)):
+        kept[delay] = fixed, _measured(_late(compared.real, delay), fixed, fresh)
+    return DelayCurve(
+        delays,
+        ground.value,
+        _line(kept, constant, table.material),
+        _line(anew, constant, table.material),
+    )
+
+
+def _tuned_anew(
+    policy: Policy, optima: Optima, fresh: Fresh, constant: float, progress: Progress
+) -> Points:
+    """Gains tuned at each delay of the grid, and closer where the advantage vanishes.
+
+    What is best at one delay is a start for the next. Where the grid has lost the advantage in a
+    step, the small steps into it may carry it over the end: then it is looked for in the next.
+    """
+    table, tune = policy.design.tables.advantage, policy.design.tables.tune
+    found: dict[float, Optimum] = {}
+
+    def tuned(delay: float, start: Array) -> Optimum:
+        # As many draws as the constant weight was tuned at: fewer would fit their own draws more.
+        return optimum_beside(
+            _late(policy, delay), tune.realizations, optima.constant, [optima.real.values, start]
+        )
+
+    def points() -> Points:
+        return {
+            delay: (one.values, _measured(_late(policy, delay), one.values, fresh))
+            for delay, one in sorted(found.items())
+        }
+
+    last = optima.real.values
+    for delay in table.delays:
+        found[delay] = tuned(delay, last)
+        last = found[delay].values
+        progress.advance(1)
+    none = table.material * constant
+    while True:
+        measured = points()
+        over = [d for d in table.delays if constant - measured[d][1][0] <= none]
+        before = [d for d in table.delays if over and d < over[0]]
+        if not before:
+            return measured
+        last = found[before[-1]].values
+        for delay in np.linspace(before[-1], over[0], STEPS_ANEW + 1)[1:-1].tolist():
+            found[delay] = tuned(delay, last)
+            last = found[delay].values
+        again = tuned(over[0], last)
+        if not again.value < found[over[0]].value:
+            return points()
+        found[over[0]] = again
+
+
+Points = dict[float, tuple[Array, Array]]
+"""Gains, and what was measured with them, by delay (s)."""
+
+
+def _advantages(constant: float, points: Points) -> Array:
+    """Over increasing delays (s)."""
+    return np.array([constant - points[delay][1][0] for delay in sorted(points)])
+
+
+def _late(policy: Policy, delay: float) -> Policy:
+    return policy.at(DELAY, delay) if policy.follows else policy
+
+
+def _measured(policy: Policy, gains: Array, fresh: Fresh) -> Array:
+    """Objective at the fresh draws, then of every resample, shape (1 + resamples,)."""
+    measured = fresh.run(policy.with_gains(gains))
+    return np.append(measured.value, measured.resampled(fresh))
+
+
+def _between(delays: Array, advantage: Array) -> list[float]:
+    """Delays between the two of the grid where an advantage first vanishes.
+
+    It falls off a cliff there, where draws begin to stick: a straight line over a wide step of the
+    grid would put the crossing next to its upper end, whatever the cliff is.
+    """
+    over = np.flatnonzero(advantage <= 0.0)
+    if not over.size or over[0] == 0:
+        return []
+    k = int(over[0])
+    inside = np.linspace(delays[k - 1], delays[k], STEPS + 1)[1:-1]
+    return [float(delay) for delay in inside]
+
+
+def _line(points: Points, constant: Array, share: float) -> DelayLine:
+    """A line from what was measured: objectives of the draws, then of every resample."""
+    delays = np.array(sorted(points))
+    gains = np.stack([points[delay][0] for delay in delays.tolist()])
+    found = np.stack([points[delay][1] for delay in delays.tolist()])
+    apart = less(constant, found)
+    ends = [estimate(float(row[0]), row[1:]).interval or (np.nan, np.nan) for row in apart]
+    padded = np.zeros((len(gains), 3))
+    padded[:, : gains.shape[1]] = gains
+    return DelayLine(
+        delays=delays,
+        gains=padded,
+        objective=found[:, 0],
+        advantage=apart[:, 0],
+        low=np.array([low for low, _ in ends]),
+        high=np.array([high for _, high in ends]),
+        zero=crossing(delays, apart),
+        material=crossing(delays, less(apart, share * constant)),
+    )
+
+
+def crossing(delays: Array, margin: Array) -> Crossing:
+    """Where a margin first is not positive.
+
+    Parameters
+    ----------
+    delays : ndarray, shape (delays,)
+        Increasing (s).
+    margin : ndarray, shape (delays, 1 + resamples)
+        Of the draws first, then of each resample.
+    """
+    found = [first_not_negative(delays, -column) for column in margin.T]
+    again = np.sort([np.inf if delay is None else delay for delay in found[1:]])
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    # Order statistics: between a delay and none there is nothing to interpolate.
+    ends = np.quantile(again, [tail, 1.0 - tail], method="inverted_cdf")
+    low, high = (float(end) if np.isfinite(end) else None for end in ends)
+    return Crossing(found[0], (low, high), float(np.isfinite(again).mean()))
+
+
+def _plain(values: Array) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

@@ -1,0 +1,186 @@
+"""What found gains are set beside: other gains and other laws, at the same fresh draws.
+
+Each is what an engineer would have without the search. Where one does not apply, the reason
+stands in its place.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design, parameter
+from drillctl.errors import InputError
+from drillctl.progress import SILENT, Progress
+from drillctl.studies.grid import Axis
+from drillctl.studies.robust.crossings import by_path
+from drillctl.studies.robust.fresh import Fresh, FreshRuns
+from drillctl.studies.robust.judge import Judge
+from drillctl.studies.robust.linear_design import linear_design
+from drillctl.studies.robust.objective import PRICE
+from drillctl.studies.robust.tuned import Tuned
+from drillctl.studies.sweeps import sweep
+
+Array = NDArray[np.float64]
+
+PAPER = {"controller.kp": 200.0, "controller.ki": 100.0}
+"""Gains that Monteiro & Trindade (2012) begin with (N m s/rad, N m/rad)."""
+OTHER_LAWS = {"soft torque": "soft-torque", "Z-torque": "z-torque", "stiff speed": "stiff-speed"}
+"""Laws at their default tuning."""
+ANY_OTHER = {"soft-torque": "stiff-speed", "z-torque": "stiff-speed", "stiff-speed": "soft-torque"}
+"""A law to change to on the way, which drops the numbers that a law has already."""
+POINTS = 41
+"""Along each axis of a grid."""
+MOST_AXES = 2
+"""Of a grid that is gone through."""
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """Gains or a law beside those that were found.
+
+    Attributes
+    ----------
+    name : str
+        What it is.
+    told : dict
+        Its gains by path (SI); of another law its name alone.
+    runs : FreshRuns or None
+        At the fresh draws; None where it does not apply.
+    reason : str
+        Why it does not.
+    found : dict
+        Of a search of its own: value (s) where it searched, trajectories, seconds.
+    """
+
+    name: str
+    told: dict[str, Any]
+    runs: FreshRuns | None
+    reason: str
+    found: dict[str, float]
+
+    def summary(self) -> dict[str, Any]:
+        """Strict JSON values, SI."""
+        told: dict[str, Any] = {"gains": self.told, "reason": self.reason or None}
+        if self.runs is not None:
+            told |= {
+                "value": self.runs.value,
+                "probability": self.runs.probability,
+                "interval_95": list(self.runs.interval),
+                "quantiles": self.runs.quantiles,
+            }
+        return told | ({"search": self.found} if self.found else {})
+
+
+def baselines(
+    design: Design, fresh: Fresh, exhaustive: Judge | None, progress: Progress = SILENT
+) -> tuple[Baseline, ...]:
+    """What the found gains are compared with.
+
+    Parameters
+    ----------
+    design : Design
+        As it was asked for.
+    fresh : Fresh
+        Runs at the fresh draws.
+    exhaustive : Judge or None
+        Realizations of the search, where a grid is to be gone through at them.
+    progress : Progress
+        Told of each baseline.
+    """
+    made = [
+        ("as designed", lambda: _own(design, fresh)),
+        ("paper's gains", lambda: _paper(design, fresh)),
+        ("largest slope margin", lambda: _linear(design, fresh)),
+        ("least nominal J1", lambda: _nominal(design, fresh)),
+        *(
+            (name, lambda law=law: ({"law": law}, fresh.of_design(_law(design, law)), {}))
+            for name, law in OTHER_LAWS.items()
+        ),
+    ]
+    if exhaustive is not None:
+        made.append(("exhaustive grid", lambda: _exhaustive(exhaustive, fresh)))
+    progress.begin("baselines", len(made))
+    found = []
+    for name, make in made:
+        try:
+            told, runs, more = make()
+            found.append(Baseline(name, told, runs, "", more))
+        except InputError as error:
+            found.append(Baseline(name, {}, None, error.problem, {}))
+        progress.advance(1)
+    return tuple(found)
+
+
+Made = tuple[dict[str, Any], FreshRuns, dict[str, float]]
+
+
+def _own(design: Design, fresh: Fresh) -> Made:
+    tuned = fresh.judge.tuned
+    told = {t.path: parameter(design, t.path).value for t in tuned}
+    if any(value is None for value in told.values()):  # by a rule of its law
+        return told, fresh.of_design(design), {}
+    # The same runs; the draws are not made again.
+    return told, fresh.of_gains(np.array([told[t.path] for t in tuned], dtype=float))[1], {}
+
+
+def _paper(design: Design, fresh: Fresh) -> Made:
+    if design.tables.controller.law != "pi":
+        raise InputError(f"gains of a PI; the law is {design.tables.controller.law}")
+    other = design.replace(dict(PAPER))
+    if set(PAPER) <= {t.path for t in fresh.judge.tuned}:
+        return dict(PAPER), _own(other, fresh)[1], {}
+    return dict(PAPER), fresh.of_design(other), {}
+
+
+def _law(design: Design, law: str) -> Design:
+    """The design with a law at its default tuning; the drive around it stays."""
+    return design.replace({"controller.law": ANY_OTHER[law]}).replace({"controller.law": law})
+
+
+def _linear(design: Design, fresh: Fresh) -> Made:
+    found = linear_design(design)
+    return found.gains, fresh.of_gains(found.values)[1], {"slope_margin": found.slope_margin}
+
+
+def _nominal(design: Design, fresh: Fresh) -> Made:
+    tuned = fresh.judge.tuned
+    begin = time.perf_counter()
+    axes = tuple(Axis(t.path, t.unit, line) for t, line in zip(tuned, _lines(tuned), strict=True))
+    found = sweep(design, axes, audit_cells=0, measures=("j1",))
+    if found.minimum is None:
+        raise InputError("no cell of the nominal map gives a finite answer")
+    j1, at = found.minimum
+    values = np.array([at[t.path] for t in tuned])
+    more = {"value": j1, "trajectories": found.j1.size, "seconds": time.perf_counter() - begin}
+    return by_path(tuned, values), fresh.of_gains(values)[1], more
+
+
+def _lines(tuned: tuple[Tuned, ...]) -> list[Array]:
+    if len(tuned) > MOST_AXES:
+        raise InputError(f"a grid goes over {MOST_AXES} parameters, {len(tuned)} are tuned")
+    return [np.linspace(t.low, t.high, POINTS) for t in tuned]
+
+
+def _exhaustive(judge: Judge, fresh: Fresh) -> Made:
+    """The best of a grid by the plain objective at all realizations of the search."""
+    begin, before = time.perf_counter(), judge.trajectories
+    grid = np.meshgrid(*_lines(judge.tuned), indexing="ij")
+    cells = np.stack([column.ravel() for column in grid], axis=1)
+    least, best = np.inf, cells[0]
+    value = np.inf
+    for first in range(0, len(cells), POINTS):
+        for point in judge.points(cells[first : first + POINTS], len(judge)):
+            merit = point.value + PRICE * sum(judge.violations(point).values())
+            if merit < least:
+                least, best, value = merit, point.values, point.value
+    more = {
+        "value": value,
+        "trajectories": judge.trajectories - before,
+        "seconds": time.perf_counter() - begin,
+    }
+    return by_path(judge.tuned, best), fresh.of_gains(best)[1], more
