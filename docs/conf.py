@@ -19,6 +19,7 @@ extensions = [
     "sphinx_copybutton",
     "site_math",
     "site_commands",
+    "site_links",
     "site_surface",
 ]
 source_suffix = {".md": "markdown"}
