@@ -28,8 +28,8 @@ from drillctl.studies.advantage.policies import (
     REAL,
     policies,
 )
-from drillctl.studies.drawn_lanes import drawn_lanes
-from drillctl.studies.draws import draw
+from drillctl.studies.draws.lanes import drawn_lanes
+from drillctl.studies.draws.parameters import draw
 from drillctl.studies.robust import search
 from drillctl.studies.robust.objective import Objective
 from drillctl.weight_on_bit import ConstantWeight, FollowingSpeed, ObservedWeight, RealWeight
