@@ -10,7 +10,7 @@ from small_report import TINY, small_design
 from drillctl.json_files import write_json
 from drillctl.reporting.blocks import Checks, Table
 from drillctl.reporting.gather import Gathered, NotThereError, Study
-from drillctl.reporting.sections import advantage, tuning
+from drillctl.reporting.sections import tuning
 from drillctl.reporting.words import Words
 
 SUMMARY = {
@@ -61,9 +61,3 @@ def test_it_tells_what_was_saved(tmp_path):
 def test_without_it_the_reason_is_told(tmp_path):
     with pytest.raises(NotThereError, match="it was not asked for"):
         tuning.build(gathered(tmp_path, "tune", "left_out"))
-
-
-def test_other_saved_numbers_are_told_one_by_one(tmp_path):
-    (table,) = advantage.build(gathered(tmp_path, "advantage", "done"))
-    assert ("certificate passed", "yes") in table.rows
-    assert ("gains controller.kp", "612.5") in table.rows
