@@ -21,7 +21,7 @@ import drillctl
 from drillctl import catalog
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.simulation.scheme import Scheme
-from drillctl.studies.error_estimate import PROMISES
+from drillctl.studies.diagnosis.error_estimate import PROMISES
 from drillctl.studies.grid import axes_of, groups
 
 PAGE = Path(__file__).with_name("accuracy.md")

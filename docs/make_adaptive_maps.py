@@ -17,7 +17,7 @@ import numpy as np
 import drillctl
 from drillctl.design.reading import parse_axis
 from drillctl.studies import AdaptiveMap
-from drillctl.studies.contour_search import bands_of, search
+from drillctl.studies.adaptive.contour_search import bands_of, search
 
 PAGE = Path(__file__).with_name("adaptive-maps.md")
 MARKS = ("<!-- table: begin, made by make_adaptive_maps.py -->", "<!-- table: end -->")

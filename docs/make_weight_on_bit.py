@@ -12,8 +12,8 @@ from pathlib import Path
 import drillctl
 from drillctl import plots
 from drillctl.studies import WeightDelay, weight_delay
-from drillctl.studies.delay_limits import EndedShare, HarmfulFrom
-from drillctl.studies.weight_delay import DelayedBenefit
+from drillctl.studies.weight_delay.limits import EndedShare, HarmfulFrom
+from drillctl.studies.weight_delay.study import DelayedBenefit
 
 PAGE = Path(__file__).with_name("weight-on-bit.md")
 DESIGN = "dynamic-wob-delay-140kn"

@@ -13,12 +13,12 @@ from drillctl import units
 from drillctl.errors import InputError
 from drillctl.plots.plane import title_of
 from drillctl.plots.style import BLACK, COLOURS, DASHES, LINE, SMALL, TITLE, axes_or_new, dress
-from drillctl.studies.intervals import mean_interval
+from drillctl.studies.draws.intervals import mean_interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from drillctl.studies.comparison import ComparedCase, Comparison
+    from drillctl.studies.comparison.study import ComparedCase, Comparison
 
 _WORDS = {
     "j1": "J1", "stuck_time": "stuck time", "stick_slip_index": "stick-slip index",

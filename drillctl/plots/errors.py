@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from drillctl.errors import InputError
 from drillctl.plots.plane import title_of
 from drillctl.plots.style import BLACK, BLUE, LINE, SMALL, VERMILLION, axes_or_new, dress
-from drillctl.studies.error_estimate import PROMISES, ROUNDING, SMALLEST
+from drillctl.studies.diagnosis.error_estimate import PROMISES, ROUNDING, SMALLEST
 
 if TYPE_CHECKING:
     from drillctl.studies import Doctor

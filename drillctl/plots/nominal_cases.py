@@ -25,7 +25,7 @@ from drillctl.plots.style import BLACK, DASHES, SMALL, TITLE, axes_or_new, dress
 if TYPE_CHECKING:
     import shapely
 
-    from drillctl.studies.comparison import ComparedCase, Comparison
+    from drillctl.studies.comparison.study import ComparedCase, Comparison
     from drillctl.studies.grid import Axis
 
 Array = NDArray[np.float64]

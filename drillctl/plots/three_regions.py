@@ -17,7 +17,7 @@ from drillctl.plots.style import BLACK, BLUE, SMALL, VERMILLION
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
 
-    from drillctl.studies.three_regions import ThreeRegions
+    from drillctl.studies.three_regions.study import ThreeRegions
 
 FILL = "#F7DFA6"
 """Of the cells at or under the level: light enough for hatching and marks, grey in print."""

@@ -23,11 +23,11 @@ from drillctl.plots.style import (
     dress,
     grid_or_new,
 )
-from drillctl.studies.delay_limits import ENOUGH
+from drillctl.studies.weight_delay.limits import ENOUGH
 
 if TYPE_CHECKING:
-    from drillctl.studies.delay_limits import HarmfulFrom
-    from drillctl.studies.weight_delay import DelayedBenefit, WeightDelay
+    from drillctl.studies.weight_delay.limits import HarmfulFrom
+    from drillctl.studies.weight_delay.study import DelayedBenefit, WeightDelay
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def weight_delay(
     Parameters
     ----------
     result : WeightDelay
-        From `drillctl.studies.weight_delay`.
+        From `drillctl.studies.weight_delay.study`.
     ax : sequence of Axes, optional
         Two panels.
     system : {'si', 'field'}

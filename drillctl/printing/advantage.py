@@ -9,7 +9,7 @@ import numpy as np
 from drillctl import units
 from drillctl.console import line, table
 from drillctl.printing.words import title_of
-from drillctl.studies.drawn_runs import EQUAL_TO
+from drillctl.studies.draws.runs import EQUAL_TO
 
 if TYPE_CHECKING:
     from drillctl.studies.advantage import Advantage

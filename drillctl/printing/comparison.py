@@ -10,12 +10,12 @@ from drillctl.printing.words import head_of, title_of
 
 if TYPE_CHECKING:
     from drillctl.studies import Comparison, Region
-    from drillctl.studies.comparison import ComparedCase, Difference
+    from drillctl.studies.comparison.study import ComparedCase, Difference
 
 
 def comparison(result: Comparison, system: units.System) -> None:
     """Distributions of the cases, differences from the first, shares and areas under each level."""
-    from drillctl.studies.comparison import MEASURES
+    from drillctl.studies.comparison.study import MEASURES
 
     names = [case.name for case in result.cases]
     rows = []

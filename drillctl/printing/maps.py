@@ -10,7 +10,7 @@ from drillctl.printing.words import place_of, span_of, title_of
 
 if TYPE_CHECKING:
     from drillctl.studies import AdaptiveMap, Regularisation, Sweep, ThreeRegions
-    from drillctl.studies.adaptive_checks import FullAudit, SelfCheck
+    from drillctl.studies.adaptive.checks import FullAudit, SelfCheck
 
 
 def sweep(result: Sweep, system: units.System) -> None:

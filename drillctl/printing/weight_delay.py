@@ -10,8 +10,8 @@ from drillctl.printing.words import title_of
 
 if TYPE_CHECKING:
     from drillctl.studies import WeightDelay
-    from drillctl.studies.delay_limits import EndedShare, EndsUpTo, HarmfulFrom
-    from drillctl.studies.weight_delay import DelayedBenefit
+    from drillctl.studies.weight_delay.limits import EndedShare, EndsUpTo, HarmfulFrom
+    from drillctl.studies.weight_delay.study import DelayedBenefit
 
 
 def weight_delay(result: WeightDelay, system: units.System) -> None:

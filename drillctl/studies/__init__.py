@@ -1,39 +1,30 @@
-"""Studies over many lanes.
+"""Studies over many lanes, a package a subject.
 
-- `grid.py`: axes over a design's parameters, and the lanes they stand for.
-- `sweeps.py`: measures over a grid; the J1 map is one case.
-- `adaptive.py`: contours of J1 at a grid's resolution from a fraction of its cells;
-  `contour_search.py`: which cells; `lattices.py`: nested lattices of a grid;
-  `chosen_cells.py`: their lanes; `adaptive_checks.py`: a sample, or all, of what was left out.
+- `grid.py`: axes over a design's parameters, and the lanes they stand for; `lane_grid.py`: lane
+  numbers, held along the axes they vary over.
+- `sweeps.py`: measures over a grid, the J1 map being one case; `regions.py`: cells and outlines at
+  or under a level; `responses.py`, `tables.py`: time responses at cells, maps as CSV.
+- `adaptive/`: the contours of a fine grid from a fraction of its cells.
 - `loop_maps.py`: figures of the linear loop over a grid.
-- `regions.py`: cells and outlines at or under a level.
-- `three_regions.py`: locally stable, J1 under a level, attracted: three regions of one map.
-- `attraction.py`: long runs of its cells; `steady.py`: operating points of the cells of a grid.
+- `three_regions/`: locally stable, J1 under a level, attracted: three regions of one map.
 - `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
-- `draws.py`: uncertain parameters and draws from them; `sampling.py`: the points behind them;
-  `drawn_lanes.py`: the lanes of draws.
-- `uncertainty/`: a map at thousands of draws, `uncertainty_tables.py` its CSV.
-- `comparison.py`: cases at the same draws; `cases.py`: what makes them comparable.
-- `weight_delay.py`: a weight on bit that follows the bit speed, against the delay of its path;
-  `delayed_lanes.py`: its lanes; `delay_limits.py`: where a benefit ends.
-- `advantage/`: that weight against a constant one, each with the drive at its robust optimum.
-- `robust/`: gains searched for many realizations at once, linear and by trajectories.
-- `nominal.py`: their maps and motions at their own values.
-- `drawn_runs.py`: runs of draws, equal mean weights; `intervals.py`: shares and means.
-- `lane_grid.py`: lane numbers over a grid, held along the axes they vary over.
-- `examination.py`: what the batch engine does with a design, `diagnosis.py` what is found;
-  `error_estimate.py`, `engine_speed.py`: its errors from itself, and its speed.
-- `audit.py`: cells of a map simulated again with the reference solver.
-- `responses.py`, `tables.py`: time responses at cells of a map; maps as CSV.
-- `blocks.py`: finished blocks of a long run.
-- `memory.py`: grids too large for the memory.
+- `draws/`: what is uncertain, and draws from it.
+- `comparison/`: cases at the same draws.
+- `weight_delay/`: a weight on bit that follows the bit speed, against the delay of its path.
+- `uncertainty/`: a map at thousands of draws.
+- `robust/`: gains searched for many realizations at once, and certified at fresh ones.
+- `advantage/`: PI against PI with dynamic weight on bit, each at its robust optimum.
+- `diagnosis/`: what the batch engine does with a design; `audit.py`: cells of a map simulated again
+  with the reference solver.
+- `blocks.py`: finished blocks of a long run; `memory.py`: grids too large for the memory;
+  `checking.py`: what a design asks of the studies, without running any.
 """
 
-from drillctl.studies.adaptive import AdaptiveMap, adaptive_map
-from drillctl.studies.comparison import Comparison, compare
-from drillctl.studies.diagnosis import Doctor
-from drillctl.studies.draws import Draws, draw, uncertain_parameters
-from drillctl.studies.examination import doctor
+from drillctl.studies.adaptive.study import AdaptiveMap, adaptive_map
+from drillctl.studies.comparison.study import Comparison, compare
+from drillctl.studies.diagnosis.examination import doctor
+from drillctl.studies.diagnosis.result import Doctor
+from drillctl.studies.draws.parameters import Draws, draw, uncertain_parameters
 from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import LoopMap, loop_map
 from drillctl.studies.regions import Region, region
@@ -47,10 +38,10 @@ from drillctl.studies.tables import (
     write_tables,
     write_weight_delay,
 )
-from drillctl.studies.three_regions import ThreeRegions, three_regions
+from drillctl.studies.three_regions.study import ThreeRegions, three_regions
 from drillctl.studies.uncertainty import Uncertainty, uncertainty
-from drillctl.studies.uncertainty_tables import write_uncertainty_tables
-from drillctl.studies.weight_delay import WeightDelay, weight_delay
+from drillctl.studies.uncertainty.tables import write_uncertainty_tables
+from drillctl.studies.weight_delay.study import WeightDelay, weight_delay
 
 __all__ = [
     "AdaptiveMap",

@@ -17,7 +17,7 @@ from drillctl.linear.loop_margins import peak_sensitivities
 from drillctl.linear.loop_poles import many_loop_poles
 from drillctl.progress import SILENT, Progress
 from drillctl.studies.grid import Axis, Group, axes_of, groups, shape_of
-from drillctl.studies.steady import gains_of, slopes_tolerated, steady_drilling
+from drillctl.studies.three_regions.steady import gains_of, slopes_tolerated, steady_drilling
 
 if TYPE_CHECKING:
     from pathlib import Path

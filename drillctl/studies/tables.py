@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.adaptive import AdaptiveMap
-from drillctl.studies.comparison import MEASURES, QUANTILES, Comparison
+from drillctl.studies.adaptive.study import AdaptiveMap
+from drillctl.studies.comparison.study import MEASURES, QUANTILES, Comparison
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.sweeps import Sweep
-from drillctl.studies.weight_delay import WeightDelay
+from drillctl.studies.weight_delay.study import WeightDelay
 
 
 def write_tables(result: Sweep, folder: Path) -> None:

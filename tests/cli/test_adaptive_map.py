@@ -127,7 +127,7 @@ def test_a_small_grid_says_that_all_was_simulated(call):
 
 
 def test_a_mismatch_is_told(call, monkeypatch):
-    from drillctl.studies import adaptive_checks
+    from drillctl.studies.adaptive import checks as adaptive_checks
 
     real = adaptive_checks.self_check
 
@@ -137,7 +137,7 @@ def test_a_mismatch_is_told(call, monkeypatch):
         said[:2] = 0
         return adaptive_checks.SelfCheck(check.cells, said, check.found, 17)
 
-    monkeypatch.setattr("drillctl.studies.adaptive.self_check", doubted)
+    monkeypatch.setattr("drillctl.studies.adaptive.study.self_check", doubted)
     code, out, err = call(*ADAPTIVE)
     assert code == 0
     assert "self-check: look, 2 of 300 cells" in out
@@ -172,7 +172,7 @@ class Counted:
     """`run_batch` that counts its calls and is interrupted at one of them."""
 
     def __init__(self, monkeypatch, stop_at=None):
-        from drillctl.studies import chosen_cells
+        from drillctl.studies.adaptive import chosen_cells
 
         self.calls, self.stop_at = 0, stop_at
         self.real = chosen_cells.run_batch

@@ -74,7 +74,7 @@ def test_finished_run_is_shown_again(call, monkeypatch):
     def fail(*arguments, **options):
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("drillctl.studies.weight_delay", fail, raising=False)
+    monkeypatch.setattr("drillctl.studies.weight_delay.study", fail, raising=False)
     code, again, err = call("delay", SHIPPED, *SMALL, "--out", "run")
     assert (code, err) == (0, "already done: run\n")
     assert again == first.replace("results: run\n", "")

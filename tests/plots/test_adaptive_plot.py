@@ -13,10 +13,10 @@ from drillctl.plots import adaptive_map
 from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies import Axis
-from drillctl.studies.adaptive import AdaptiveMap
-from drillctl.studies.adaptive_checks import SelfCheck, full_audit
+from drillctl.studies.adaptive.checks import SelfCheck, full_audit
+from drillctl.studies.adaptive.contour_search import search
+from drillctl.studies.adaptive.study import AdaptiveMap
 from drillctl.studies.audit import Audit
-from drillctl.studies.contour_search import search
 
 KP = Axis("controller.kp", "N*m*s/rad", np.linspace(0.0, 1000.0, 101))
 SPEED = Axis("operating_point.speed", "rad/s", np.linspace(8.0, 12.0, 91))

@@ -7,10 +7,11 @@ import pytest
 
 import drillctl
 from drillctl.errors import InputError
-from drillctl.studies import Axis, adaptive_checks
-from drillctl.studies.adaptive import AdaptiveMap, adaptive_map
-from drillctl.studies.adaptive_checks import Mismatch, full_audit, mismatch
-from drillctl.studies.contour_search import bands_of
+from drillctl.studies import Axis
+from drillctl.studies.adaptive import checks as adaptive_checks
+from drillctl.studies.adaptive.checks import Mismatch, full_audit, mismatch
+from drillctl.studies.adaptive.contour_search import bands_of
+from drillctl.studies.adaptive.study import AdaptiveMap, adaptive_map
 from drillctl.studies.regions import region
 
 HOLDS = (
@@ -139,7 +140,7 @@ def test_strings_and_kinds_of_law_along_the_axes():
 
 def test_a_missed_island_is_told_and_mended(monkeypatch, design):
     """A lane that reads 5 s where nobody expects it, drawn into the sample by its seed."""
-    from drillctl.studies import chosen_cells
+    from drillctl.studies.adaptive import chosen_cells
 
     real = chosen_cells.ChosenCells.simulate
     hit = {}

@@ -28,11 +28,19 @@ from drillctl.studies.advantage.policies import (
     REAL,
     policies,
 )
-from drillctl.studies.drawn_lanes import drawn_lanes
-from drillctl.studies.draws import draw
+from drillctl.studies.draws.lanes import drawn_lanes
+from drillctl.studies.draws.parameters import draw
 from drillctl.studies.robust import search
 from drillctl.studies.robust.objective import Objective
 from drillctl.weight_on_bit import ConstantWeight, FollowingSpeed, ObservedWeight, RealWeight
+
+HOLDS = (
+    (
+        "constant against dynamic weight, each tuned",
+        "a weight that may not follow is the constant one to the bit; equal means by runs of "
+        "`compare`; the search itself; crossing delays by hand; the shipped case (slow)",
+    ),
+)
 
 SHIPPED = "pi-vs-pi-dynamic-wob"
 SMALL = {

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
-from drillctl.studies.adaptive import banded
-from drillctl.studies.adaptive_checks import self_check
-from drillctl.studies.contour_search import ContourSearch, bands_of, search
+from drillctl.studies.adaptive.checks import self_check
+from drillctl.studies.adaptive.contour_search import ContourSearch, bands_of, search
+from drillctl.studies.adaptive.lattices import around, in_quads, nested_lattices
+from drillctl.studies.adaptive.study import banded
 from drillctl.studies.grid import Axis
-from drillctl.studies.lattices import around, in_quads, nested_lattices
 from drillctl.studies.regions import region
 
 HOLDS = (

@@ -8,8 +8,10 @@ import pytest
 import drillctl
 from drillctl.design.reading import parse_axis
 from drillctl.errors import InputError
-from drillctl.studies import audit, diagnosis, examination
-from drillctl.studies.error_estimate import PROMISES, ErrorEstimate, Promise, errors_of
+from drillctl.studies import audit
+from drillctl.studies.diagnosis import examination
+from drillctl.studies.diagnosis import result as diagnosis
+from drillctl.studies.diagnosis.error_estimate import PROMISES, ErrorEstimate, Promise, errors_of
 
 PAPER = "monteiro-trindade-140kn"
 GAINS = ("controller.kp=100:1000:9", "controller.ki=20:500:7")

@@ -9,14 +9,14 @@ from scipy import stats
 import drillctl
 from drillctl.design import to_toml
 from drillctl.errors import InputError
-from drillctl.studies.drawn_lanes import drawn_lanes
-from drillctl.studies.draws import (
+from drillctl.studies.draws.lanes import drawn_lanes
+from drillctl.studies.draws.parameters import (
     DEFAULT_COV,
     DEFAULT_PATHS,
     draw,
     uncertain_parameters,
 )
-from drillctl.studies.sampling import probabilities
+from drillctl.studies.draws.sampling import probabilities
 
 HOLDS = (
     (

@@ -14,7 +14,7 @@ import pytest
 
 import drillctl
 from drillctl.simulation.batch import prepare, run_batch
-from drillctl.studies.error_estimate import PROMISES
+from drillctl.studies.diagnosis.error_estimate import PROMISES
 from drillctl.studies.grid import axes_of, groups
 
 HOLDS = (

@@ -11,9 +11,9 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.progress import Within
 from drillctl.simulation.trajectory import SIGNALS
-from drillctl.studies.cases import case_designs
-from drillctl.studies.comparison import compare
-from drillctl.studies.nominal import NOT_ASKED
+from drillctl.studies.comparison.cases import case_designs
+from drillctl.studies.comparison.nominal import NOT_ASKED
+from drillctl.studies.comparison.study import compare
 
 HOLDS = (
     (
@@ -142,7 +142,7 @@ def test_without_maps_nothing_is_swept_and_all_comes_back(short, tmp_path, monke
     def swept(*arguments, **options):
         raise AssertionError("swept")
 
-    monkeypatch.setattr("drillctl.studies.nominal.sweep", swept)
+    monkeypatch.setattr("drillctl.studies.comparison.nominal.sweep", swept)
     made = compare(short.replace({"compare.maps": False}), realizations=2)
     assert not [name for name in made.data.variables if name.startswith("map_")]
     same_nominal(made, drillctl.open(made.save(tmp_path / "run")))

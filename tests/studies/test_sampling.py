@@ -10,8 +10,8 @@ import drillctl
 from drillctl.design import to_toml
 from drillctl.errors import InputError
 from drillctl.studies import compare, weight_delay
-from drillctl.studies.draws import draw, uncertain_parameters
-from drillctl.studies.sampling import Sampling, correlation_root
+from drillctl.studies.draws.parameters import draw, uncertain_parameters
+from drillctl.studies.draws.sampling import Sampling, correlation_root
 
 HOLDS = (
     (

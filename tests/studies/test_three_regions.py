@@ -17,9 +17,10 @@ from drillctl.linear.slope_margin import slope_margin
 from drillctl.linear.state_space import closed_loop_matrices
 from drillctl.simulation.measures import STATUSES
 from drillctl.store import claim
-from drillctl.studies import attraction, sweep
+from drillctl.studies import sweep
 from drillctl.studies.grid import axes_of
-from drillctl.studies.three_regions import FIELDS, MASKS, three_regions
+from drillctl.studies.three_regions import attraction
+from drillctl.studies.three_regions.study import FIELDS, MASKS, three_regions
 
 HOLDS = (
     (

@@ -13,9 +13,14 @@ from drillctl import units
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies import compare, weight_delay
-from drillctl.studies.delay_limits import EndedShare, ends_up_to, first_not_negative, harmful_from
-from drillctl.studies.delayed_lanes import Runs, following_design
-from drillctl.studies.intervals import share_interval
+from drillctl.studies.draws.intervals import share_interval
+from drillctl.studies.weight_delay.lanes import Runs, following_design
+from drillctl.studies.weight_delay.limits import (
+    EndedShare,
+    ends_up_to,
+    first_not_negative,
+    harmful_from,
+)
 from drillctl.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 
 HOLDS = (

@@ -1,4 +1,4 @@
-"""What a weight that follows the bit speed is worth, each at its own robust optimum."""
+"""What a moving weight on bit is worth, each policy at its robust optimum."""
 
 from __future__ import annotations
 
@@ -9,119 +9,101 @@ from typing import TYPE_CHECKING, Any
 from drillctl import plots
 from drillctl.reporting.blocks import Block, Figure, Table, Text
 from drillctl.reporting.gather import Gathered, Study
-from drillctl.reporting.words import NOTHING, between, chance, name_of, number
+from drillctl.reporting.words import NOTHING, between, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
-    from drillctl import units
-
-PICTURES = {
-    "advantage_cases": (
-        "J1 of each case at the fresh draws, and what it is less than at a constant weight.",
-        "Distributions of J1 and paired differences of every case.",
-    ),
-    "advantage_front": (
-        "Objective against the mean weight on bit.",
-        "Curves of the objective over the mean weight for each policy.",
-    ),
-    "advantage_map": (
-        "Advantage over weights and set speeds.",
-        "Maps of the advantage over weight on bit and set speed.",
-    ),
-    "advantage_delay": (
-        "Advantage against the delay of the path of the weight.",
-        "Curves of the advantage against delay, with intervals, gains kept and tuned anew.",
-    ),
-}
-"""Caption and text of the pictures of `drillctl advantage`."""
-LINES = {"kept": "gains kept", "anew": "gains tuned anew at each delay"}
+PICTURES = (
+    ("advantage-cases", "Policies at the fresh draws, each at its robust optimum.",
+     "Spread of J1 of every policy at each of the terms.", plots.advantage_cases),
+    ("advantage-front", "Robust J1 against the mean weight on bit.",
+     "Objective of every policy against its mean weight, over nominal weights.",
+     plots.advantage_front),
+    ("advantage-map", "Advantage over weights and set speeds.",
+     "Maps of the objective of the constant weight less that of the weight that follows.",
+     plots.advantage_map),
+    ("advantage-delays", "Advantage against the delay of the path.",
+     "Advantage over the delay, with kept gains and with gains tuned at each delay.",
+     plots.advantage_delay),
+)  # fmt: skip
+"""Name, caption, text and function of each picture of `drillctl advantage`."""
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
-    """Cases, shares, the delay that ends it, pictures."""
+    """Cases with paired differences, areas, crossing delays and pictures."""
     study = gathered.need("advantage")
-    found = study.summary
+    found, system = study.summary, gathered.words.system
     blocks: list[Block] = [
         Text(
-            f"PI with a constant weight on bit and with one that follows the bit speed, each tuned "
-            f"to the same objective ({found['objective']} of J1) and measured at "
-            f"{found['realizations']} fresh draws, seed {found['seed']}. A negative difference: "
-            "less than with a constant weight."
+            "Constant weight with PI, and PI with a weight that follows the bit speed, each tuned "
+            f"to the {found['objective']} of J1 and measured at the same {found['realizations']} "
+            f"fresh draws, seed {found['seed']}."
         ),
-        _cases(gathered, found["cases"]),
-        _shares(found["cases"]),
-        _delays(found["delay"]),
+        _cases(gathered, found),
+        _areas(found["regions"]),
+        _delays(found),
     ]
-    for name, (caption, alt) in PICTURES.items():
-        drawn = partial(_drawn, getattr(plots, name), study, gathered.words.system)
-        paper = name == "advantage_map"
-        blocks.append(Figure(name.replace("_", "-"), caption, alt, drawn, ("advantage",), paper))
+    for name, caption, alt, draw in PICTURES:
+        drawn = partial(_drawn, draw, study, system)
+        blocks.append(Figure(name, caption, alt, drawn, ("advantage",)))
     return tuple(blocks)
 
 
-def _drawn(draw: Callable[..., Drawn], study: Study, system: units.System) -> Drawn:
+def _drawn(draw: Callable[..., Drawn], study: Study, system: str) -> Drawn:
     return draw(study.result, system=system)
 
 
-def _cases(gathered: Gathered, cases: dict[str, Any]) -> Table:
+def _cases(gathered: Gathered, found: dict[str, Any]) -> Table:
     words, rows = gathered.words, []
-    for name, case in cases.items():
+    first = next(iter(found["cases"]))
+    for name, case in found["cases"].items():
+        less, apart = case["objective_difference"], NOTHING
+        if name != first and less["interval_95"] is not None:
+            apart = f"{number(less['value'])} ({between(*less['interval_95'])})"
+        kp, ki, gain = case["gains"].values()
+        gains = (
+            f"Kp {number(kp)} N m s, Ki {number(ki)} N m, "
+            f"K_w {number(words.scaled(gain, 'N'))} {words.unit('N')} s/rad"
+        )
+        weight = case["means"]["mean_weight_after_start"]
         rows.append((
-            name, *(_gain(gathered, path, value) for path, value in case["gains"].items()),
-            _estimate(case["objective"]), _estimate(case["objective_difference"]),
-            words.quantity(case["means"]["mean_weight_after_start"], "N"),
-            number(case["means"]["rop_proxy"]),
+            name, gains, number(case["objective"]["value"]), apart,
+            words.quantity(weight, "N"), number(case["means"]["rop_proxy"]),
         ))  # fmt: skip
-    paths = next(iter(cases.values()))["gains"]
-    heads = (
-        "case", *("gain of the weight" if path.startswith("weight") else name_of(path)
-                  for path in paths),
-        "objective (s)", "difference (s)", "mean weight", "ROP proxy",
-    )  # fmt: skip
-    caption = "Cases at their own optimum (95 % interval)"
-    return Table("advantage", caption, heads, tuple(rows))
+    heads = ("case", "gains", f"{found['objective']} of J1 (s)",
+             "less constant (s), 95 % interval", "mean weight", "ROP proxy")  # fmt: skip
+    return Table("advantage", "Policies at their robust optima", heads, tuple(rows))
 
 
-def _gain(gathered: Gathered, path: str, value: float) -> str:
-    if path.startswith("weight_on_bit."):  # per speed: a force by rad/s
-        force = gathered.words.quantity(value, "N")
-        return NOTHING if value == 0.0 else f"{force} s/rad"
-    return gathered.words.named(gathered.design, path, value).partition(" ")[2]
+def _areas(found: dict[str, Any]) -> Table:
+    rows = [
+        (policy, f"J1 ≤ {level} s", _share(one["nominal_area"]),
+         _share(one["area_p95"]["value"]), _share(one["area_p05"]["value"]))
+        for policy, regions in found.items()
+        for level, one in regions["levels"].items()
+    ]  # fmt: skip
+    heads = ("policy", "region", "without draws", "P ≥ 0.95", "P ≥ 0.05")
+    return Table("advantage-areas", "Share of the window of the drive's gains", heads, tuple(rows))
 
 
-def _estimate(found: dict[str, Any]) -> str:
-    if found["value"] is None:
-        return NOTHING
-    if found["interval_95"] is None:
-        return number(found["value"])
-    return f"{number(found['value'])} ({between(*found['interval_95'])})"
-
-
-def _shares(cases: dict[str, Any]) -> Table:
-    levels = list(next(iter(cases.values()))["levels"])
-    rows = tuple(
-        (name, *(chance(case["levels"][x]["share"], case["levels"][x]["interval_95"])
-                 for x in levels))
-        for name, case in cases.items()
-    )  # fmt: skip
-    heads = ("case", *(f"P(J1 ≤ {level} s)" for level in levels))
-    caption = "Share of the fresh draws at or under each level (95 % interval)"
-    return Table("advantage-shares", caption, heads, rows)
+def _share(value: float) -> str:
+    return f"{100.0 * value:.1f} %"
 
 
 def _delays(found: dict[str, Any]) -> Table:
-    rows = tuple(
-        (told, _crossing(found[key]["zero"]), _crossing(found[key]["material"]))
-        for key, told in LINES.items()
-    )
-    heads = ("gains", "no advantage from (s)", "less than the stated share from (s)")
-    caption = "Delay of the path at which the advantage ends (95 % interval)"
-    return Table("advantage-delays", caption, heads, rows)
+    delays, share = found["delay"], 100.0 * found["material"]
+    rows = (
+        ("gains of the ideal path: no advantage from", _crossing(delays["kept"]["zero"])),
+        (f"gains tuned at each delay: under {share:g} % from",
+         _crossing(delays["anew"]["material"])),
+    )  # fmt: skip
+    heads = ("gains", "delay (s), 95 % interval")
+    return Table("advantage-ends", "The delay at which the advantage ends", heads, rows)
 
 
 def _crossing(found: dict[str, Any]) -> str:
     if found["delay"] is None:
-        return NOTHING
-    low, high = found["interval_95"]
-    return f"{number(found['delay'], 3)} ({between(low, high, 3)})"
+        return "beyond the longest delay"
+    low, high = (NOTHING if end is None else number(end) for end in found["interval_95"])
+    return f"{number(found['delay'])} ({low} to {high})"

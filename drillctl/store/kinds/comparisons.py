@@ -17,14 +17,14 @@ from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.store.kind import Kind
 from drillctl.store.names import axis_of, stored_name
 from drillctl.studies.audit import Audit
-from drillctl.studies.cases import case_designs
-from drillctl.studies.comparison import MEASURES, ComparedCase, Comparison
-from drillctl.studies.delayed_lanes import MEASURES as DELAY_MEASURES
-from drillctl.studies.delayed_lanes import Runs
-from drillctl.studies.drawn_lanes import Failures
-from drillctl.studies.nominal import Nominal, map_dimension, nominal_design
+from drillctl.studies.comparison.cases import case_designs
+from drillctl.studies.comparison.nominal import Nominal, map_dimension, nominal_design
+from drillctl.studies.comparison.study import MEASURES, ComparedCase, Comparison
+from drillctl.studies.draws.lanes import Failures
 from drillctl.studies.sweeps import Sweep
-from drillctl.studies.weight_delay import WeightDelay
+from drillctl.studies.weight_delay.lanes import MEASURES as DELAY_MEASURES
+from drillctl.studies.weight_delay.lanes import Runs
+from drillctl.studies.weight_delay.study import WeightDelay
 
 if TYPE_CHECKING:
     import xarray

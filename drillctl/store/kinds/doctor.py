@@ -10,8 +10,8 @@ from drillctl.design import Design
 from drillctl.store.kind import Kind
 from drillctl.store.names import stored_name
 from drillctl.studies.audit import Audit
-from drillctl.studies.diagnosis import Doctor
-from drillctl.studies.error_estimate import ErrorEstimate
+from drillctl.studies.diagnosis.error_estimate import ErrorEstimate
+from drillctl.studies.diagnosis.result import Doctor
 from drillctl.studies.grid import Axis
 
 if TYPE_CHECKING:

@@ -10,14 +10,14 @@ from drillctl.design import Design
 from drillctl.simulation.batch import FLOATS
 from drillctl.store.kind import Kind
 from drillctl.store.names import asked_axes, axis_of
-from drillctl.studies.adaptive import AdaptiveMap, banded
-from drillctl.studies.adaptive_checks import CHECK_CELLS, SelfCheck, full_audit
+from drillctl.studies.adaptive.checks import CHECK_CELLS, SelfCheck, full_audit
+from drillctl.studies.adaptive.contour_search import INTERVALS
+from drillctl.studies.adaptive.study import AdaptiveMap, banded
 from drillctl.studies.audit import Audit, choose_cells
-from drillctl.studies.contour_search import INTERVALS
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
 from drillctl.studies.regularisation import WIDTHS, Regularisation
 from drillctl.studies.sweeps import Sweep
-from drillctl.studies.three_regions import FIELDS, MASKS, PAPER_LEVEL, ThreeRegions
+from drillctl.studies.three_regions.study import FIELDS, MASKS, PAPER_LEVEL, ThreeRegions
 
 if TYPE_CHECKING:
     import xarray

@@ -11,7 +11,7 @@ from drillctl.design import Design
 from drillctl.store.kind import Kind
 from drillctl.store.names import axis_of, stored_name
 from drillctl.studies.audit import Audit
-from drillctl.studies.drawn_lanes import Failures
+from drillctl.studies.draws.lanes import Failures
 from drillctl.studies.robust.baselines import Baseline
 from drillctl.studies.robust.certificate import Certificate
 from drillctl.studies.robust.fresh import FreshRuns

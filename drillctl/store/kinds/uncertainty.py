@@ -12,7 +12,7 @@ from drillctl.store.kind import Kind
 from drillctl.store.names import asked_axes, axis_of, stored_name
 from drillctl.store.realizations import write_uncertainty
 from drillctl.studies.audit import Audit
-from drillctl.studies.drawn_lanes import Failures
+from drillctl.studies.draws.lanes import Failures
 from drillctl.studies.uncertainty import Uncertainty
 from drillctl.studies.uncertainty.sensitivity import read_sensitivity
 from drillctl.studies.uncertainty.stopping import Look

@@ -20,7 +20,7 @@ from drillctl.studies.advantage.equalities import (
 from drillctl.studies.advantage.measured import Estimate, Fresh, Measured, estimate, less
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import CONSTANT, GAIN, KI, KP, Policies, Policy
-from drillctl.studies.intervals import Interval, mean_interval, share_interval
+from drillctl.studies.draws.intervals import Interval, mean_interval, share_interval
 
 Array = NDArray[np.float64]
 

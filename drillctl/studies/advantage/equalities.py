@@ -18,9 +18,9 @@ from drillctl.design import Design
 from drillctl.studies.advantage.measured import Measured
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import WEIGHT, Policy
-from drillctl.studies.drawn_lanes import DrawnLanes, drawn_lanes
-from drillctl.studies.drawn_runs import matching_shift, run_draws
-from drillctl.studies.draws import draw
+from drillctl.studies.draws.lanes import DrawnLanes, drawn_lanes
+from drillctl.studies.draws.parameters import draw
+from drillctl.studies.draws.runs import matching_shift, run_draws
 
 ROUNDS = 4
 """Most turns of gains and shift."""

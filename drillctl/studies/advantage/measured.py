@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.studies.drawn_lanes import DrawnLanes, Failures, drawn_lanes
-from drillctl.studies.drawn_runs import DrawnRuns, run_draws
-from drillctl.studies.draws import draw
-from drillctl.studies.intervals import CONFIDENCE, Interval
+from drillctl.studies.draws.intervals import CONFIDENCE, Interval
+from drillctl.studies.draws.lanes import DrawnLanes, Failures, drawn_lanes
+from drillctl.studies.draws.parameters import draw
+from drillctl.studies.draws.runs import DrawnRuns, run_draws
 from drillctl.studies.robust.objective import Objective, objective_of
 
 Array = NDArray[np.float64]

@@ -26,7 +26,7 @@ from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
 from drillctl.studies.audit import Audit, choose_cells, references
-from drillctl.studies.drawn_lanes import Failures, beyond_the_table
+from drillctl.studies.draws.lanes import Failures, beyond_the_table
 from drillctl.studies.robust.fresh import Fresh, FreshRuns
 from drillctl.studies.robust.tolerance import Neighbourhood, Tolerance, neighbourhood, tolerances
 

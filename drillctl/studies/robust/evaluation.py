@@ -13,8 +13,8 @@ from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.simulation.batch import Prepared, prepare, run_batch, trace
 from drillctl.simulation.lanes import Lanes
-from drillctl.studies.drawn_lanes import DrawnGroup, Failures, drawn_lanes
-from drillctl.studies.draws import draw
+from drillctl.studies.draws.lanes import DrawnGroup, Failures, drawn_lanes
+from drillctl.studies.draws.parameters import draw
 from drillctl.studies.robust.tuned import (
     LAW_KEYS,
     StringNumbers,

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from drillctl import units
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.studies.draws import Draws
+from drillctl.studies.draws.parameters import Draws
 
 
 def designs_at(design: Design, draws: Draws) -> Iterator[Design]:

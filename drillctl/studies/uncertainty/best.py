@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.errors import InputError
-from drillctl.studies.intervals import CONFIDENCE, mean_interval, share_interval
+from drillctl.studies.draws.intervals import CONFIDENCE, mean_interval, share_interval
 from drillctl.studies.uncertainty.objectives import (
     Exceedance,
     Mean,

@@ -16,8 +16,8 @@ from drillctl.provenance import provenance
 from drillctl.simulation.batch import Prepared, prepare, warm_up
 from drillctl.simulation.lanes import lane_numbers, lanes_of
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.drawn_lanes import beyond_the_table
-from drillctl.studies.draws import drawing
+from drillctl.studies.draws.lanes import beyond_the_table
+from drillctl.studies.draws.parameters import drawing
 from drillctl.studies.grid import Axis, parts, shape_of
 from drillctl.studies.uncertainty.engine import simulate
 from drillctl.studies.uncertainty.realizations import PartOfMap

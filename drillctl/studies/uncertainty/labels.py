@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.draws import uncertain_parameters
+from drillctl.studies.draws.parameters import uncertain_parameters
 from drillctl.studies.sweeps import UNITS
 from drillctl.studies.uncertainty.objectives import Mean, Quantile, TailMean
 from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER

@@ -15,10 +15,10 @@ from drillctl.errors import InputError
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.audit import Audit
-from drillctl.studies.drawn_lanes import Failures
+from drillctl.studies.draws.lanes import Failures
+from drillctl.studies.draws.sampling import sampling_of
 from drillctl.studies.grid import Axis
 from drillctl.studies.regions import Region, region
-from drillctl.studies.sampling import sampling_of
 from drillctl.studies.uncertainty.areas import Area, region_areas
 from drillctl.studies.uncertainty.best import (
     NEEDS_FULL,

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.draws import uncertain_parameters
-from drillctl.studies.intervals import CONFIDENCE
+from drillctl.studies.draws.intervals import CONFIDENCE
+from drillctl.studies.draws.parameters import uncertain_parameters
 from drillctl.studies.uncertainty.best import NEEDS_FULL
 
 Array = NDArray[np.float64]

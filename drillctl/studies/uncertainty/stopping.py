@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drillctl.design.uncertain_tables import UntilTable
 from drillctl.errors import InputError
-from drillctl.studies.intervals import CONFIDENCE, Interval
+from drillctl.studies.draws.intervals import CONFIDENCE, Interval
 from drillctl.studies.uncertainty.areas import region_areas
 from drillctl.studies.uncertainty.probability import probability_map
 from drillctl.studies.uncertainty.scatter import Scatter

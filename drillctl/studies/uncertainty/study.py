@@ -18,11 +18,11 @@ from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.batch import FLOATS
 from drillctl.studies import audit as auditing
-from drillctl.studies.drawn_lanes import Failures, beyond_the_table, told
-from drillctl.studies.draws import drawing
+from drillctl.studies.draws.lanes import Failures, beyond_the_table, told
+from drillctl.studies.draws.parameters import drawing
+from drillctl.studies.draws.sampling import sampling_of
 from drillctl.studies.grid import Axis, axes_of, cell_design, shape_of
 from drillctl.studies.memory import refuse_more_bytes
-from drillctl.studies.sampling import sampling_of
 from drillctl.studies.sweeps import sweep
 from drillctl.studies.uncertainty import sensitivity as indices
 from drillctl.studies.uncertainty.job import Drawn, Job, Listed, Source

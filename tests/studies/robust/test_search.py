@@ -5,9 +5,9 @@ import pytest
 
 import drillctl
 from drillctl.errors import InputError
-from drillctl.studies.drawn_lanes import drawn_lanes
-from drillctl.studies.drawn_runs import run_draws
-from drillctl.studies.draws import draw
+from drillctl.studies.draws.lanes import drawn_lanes
+from drillctl.studies.draws.parameters import draw
+from drillctl.studies.draws.runs import run_draws
 from drillctl.studies.robust.evaluation import Evaluation
 from drillctl.studies.robust.judge import Judge
 from drillctl.studies.robust.search import search

@@ -6,8 +6,8 @@ import pytest
 import drillctl
 from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, run_batch, trace
-from drillctl.studies.drawn_lanes import drawn_lanes
-from drillctl.studies.draws import draw
+from drillctl.studies.draws.lanes import drawn_lanes
+from drillctl.studies.draws.parameters import draw
 from drillctl.studies.robust.trajectory import MEASURED, Trajectories
 from drillctl.studies.robust.tuned import put, tuned_parameters
 

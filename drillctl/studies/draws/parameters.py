@@ -7,7 +7,7 @@ known far better than either of them.
 
 A draw that no rig has, such as a static friction below the sliding one, is neither clipped nor
 drawn again: that would change the distribution that was asked for. It is a failed run with a
-reason, counted; see `drawn_lanes.py`. Only a normal distribution, which has no ends of its own,
+reason, counted; see `lanes.py`. Only a normal distribution, which has no ends of its own,
 is truncated at what its key allows; one with ends beyond that is refused.
 """
 
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from drillctl.design import Design, Parameter, parameter
 from drillctl.design.tables import DistributionTable
 from drillctl.errors import InputError
-from drillctl.studies.sampling import (
+from drillctl.studies.draws.sampling import (
     correlated,
     correlation_root,
     sampling_of,

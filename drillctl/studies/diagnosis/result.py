@@ -12,7 +12,7 @@ from drillctl.design import Design
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies import audit as auditing
-from drillctl.studies.error_estimate import (
+from drillctl.studies.diagnosis.error_estimate import (
     PROMISES,
     REFINEMENTS,
     ErrorEstimate,

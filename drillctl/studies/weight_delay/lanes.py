@@ -14,9 +14,9 @@ from drillctl.design.delay_tables import VARIED
 from drillctl.errors import InputError
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.drawn_lanes import DrawnGroup, DrawnLanes, drawn_lanes
-from drillctl.studies.drawn_runs import run_draws
-from drillctl.studies.draws import Draws, uncertain_parameters
+from drillctl.studies.draws.lanes import DrawnGroup, DrawnLanes, drawn_lanes
+from drillctl.studies.draws.parameters import Draws, uncertain_parameters
+from drillctl.studies.draws.runs import run_draws
 
 Array = NDArray[np.float64]
 

@@ -19,15 +19,15 @@ from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.measures import NARROW_BAND, WINDOW
-from drillctl.studies.attraction import (
+from drillctl.studies.grid import Axis, Group, axes_of, groups, shape_of
+from drillctl.studies.sweeps import sweep
+from drillctl.studies.three_regions.attraction import (
     HORIZON,
     STARTS,
     ends_from,
     long_runs,
 )
-from drillctl.studies.grid import Axis, Group, axes_of, groups, shape_of
-from drillctl.studies.steady import slopes_tolerated, steady_drilling
-from drillctl.studies.sweeps import sweep
+from drillctl.studies.three_regions.steady import slopes_tolerated, steady_drilling
 
 if TYPE_CHECKING:
     from pathlib import Path

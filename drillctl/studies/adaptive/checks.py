@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.studies.contour_search import Bands, Cells, ContourSearch
+from drillctl.studies.adaptive.contour_search import Bands, Cells, ContourSearch
+from drillctl.studies.adaptive.lattices import Lattice
+from drillctl.studies.draws.intervals import Interval, share_interval
 from drillctl.studies.grid import Axis
-from drillctl.studies.intervals import Interval, share_interval
-from drillctl.studies.lattices import Lattice
 from drillctl.studies.regions import Region, region
 
 if TYPE_CHECKING:

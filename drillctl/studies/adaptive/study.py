@@ -18,18 +18,18 @@ from drillctl.provenance import provenance
 from drillctl.simulation.batch import FLOATS, Batch
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies import audit as auditing
-from drillctl.studies.adaptive_checks import (
+from drillctl.studies.adaptive.checks import (
     CHECK_CELLS,
     FullAudit,
     SelfCheck,
     full_audit,
     self_check,
 )
+from drillctl.studies.adaptive.chosen_cells import ChosenCells
+from drillctl.studies.adaptive.contour_search import INTERVALS, Bands, Cells, ContourSearch, Mask
+from drillctl.studies.adaptive.lattices import nested_lattices
 from drillctl.studies.blocks import Blocks
-from drillctl.studies.chosen_cells import ChosenCells
-from drillctl.studies.contour_search import INTERVALS, Bands, Cells, ContourSearch, Mask
 from drillctl.studies.grid import Axis, axes_of, shape_of
-from drillctl.studies.lattices import nested_lattices
 from drillctl.studies.memory import refuse_too_large
 from drillctl.studies.regions import Region, region
 from drillctl.studies.sweeps import UNITS

@@ -26,7 +26,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.studies.lattices import (
+from drillctl.studies.adaptive.lattices import (
     Lattice,
     around,
     corners,

@@ -12,7 +12,7 @@ from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import NARROW_BAND, STATUSES, WINDOW
 from drillctl.simulation.start import Kind
 from drillctl.studies.grid import Group
-from drillctl.studies.steady import gains_of
+from drillctl.studies.three_regions.steady import gains_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from drillctl.design import Design, parameter
 from drillctl.errors import InputError
-from drillctl.studies.draws import Uncertain, uncertain_parameters
+from drillctl.studies.draws.parameters import Uncertain, uncertain_parameters
 
 ALONE = "as designed"
 """Name of the only case of a design without cases."""

@@ -20,15 +20,15 @@ from drillctl.progress import SILENT, Progress
 from drillctl.simulation.batch import Prepared, prepare, run_batch, warm_up
 from drillctl.simulation.scheme_reasons import SchemeReasons, explain
 from drillctl.studies import audit as auditing
-from drillctl.studies.diagnosis import Doctor
-from drillctl.studies.engine_speed import Speed, engine_speed
-from drillctl.studies.error_estimate import (
+from drillctl.studies.diagnosis.engine_speed import Speed, engine_speed
+from drillctl.studies.diagnosis.error_estimate import (
     PROMISES,
     REFINEMENTS,
     ErrorEstimate,
     errors_of,
     refined,
 )
+from drillctl.studies.diagnosis.result import Doctor
 from drillctl.studies.grid import Axis, Group, axes_of, cell_design, groups, shape_of
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.studies.intervals import Interval
+from drillctl.studies.draws.intervals import Interval
 
 Array = NDArray[np.float64]
 

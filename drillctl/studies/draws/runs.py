@@ -13,7 +13,7 @@ from drillctl.errors import InputError
 from drillctl.simulation.batch import FLOATS, Prepared, prepare, run_batch
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.drawn_lanes import DrawnLanes
+from drillctl.studies.draws.lanes import DrawnLanes
 from drillctl.weight_on_bit import AlarmWeight, ConstantWeight
 
 Array = NDArray[np.float64]

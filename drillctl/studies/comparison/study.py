@@ -21,13 +21,13 @@ from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.cases import case_designs, in_case, refuse_unequal
-from drillctl.studies.drawn_lanes import Failures, drawn_lanes
-from drillctl.studies.drawn_runs import DrawnRuns, equalising_shift, run_draws, start_up
-from drillctl.studies.draws import draw, refuse_dependent, uncertain_parameters
-from drillctl.studies.intervals import Interval, mean_interval, share_interval
+from drillctl.studies.comparison.cases import case_designs, in_case, refuse_unequal
+from drillctl.studies.comparison.nominal import Nominal, labelled, nominal_design, nominal_runs
+from drillctl.studies.draws.intervals import Interval, mean_interval, share_interval
+from drillctl.studies.draws.lanes import Failures, drawn_lanes
+from drillctl.studies.draws.parameters import draw, refuse_dependent, uncertain_parameters
+from drillctl.studies.draws.runs import DrawnRuns, equalising_shift, run_draws, start_up
 from drillctl.studies.memory import refuse_too_large
-from drillctl.studies.nominal import Nominal, labelled, nominal_design, nominal_runs
 from drillctl.studies.regions import Region, region
 from drillctl.studies.sweeps import UNITS
 

@@ -16,7 +16,7 @@ from drillctl.progress import SILENT, Progress, Within
 from drillctl.simulation import Simulation, simulate
 from drillctl.simulation.measures import STATUSES
 from drillctl.simulation.trajectory import SIGNALS
-from drillctl.studies.cases import in_case
+from drillctl.studies.comparison.cases import in_case
 from drillctl.studies.grid import Axis, axes_of, shape_of
 from drillctl.studies.memory import refuse_too_large
 from drillctl.studies.sweeps import UNITS, Sweep, sweep

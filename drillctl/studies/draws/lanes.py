@@ -12,7 +12,7 @@ from drillctl import units
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
-from drillctl.studies.draws import Draws
+from drillctl.studies.draws.parameters import Draws
 from drillctl.studies.grid import SHARED
 
 

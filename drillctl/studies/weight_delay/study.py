@@ -21,18 +21,18 @@ from drillctl.design import Design
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.delay_limits import (
+from drillctl.studies.draws.intervals import Interval, mean_interval, share_interval
+from drillctl.studies.draws.lanes import Failures
+from drillctl.studies.draws.parameters import draw, refuse_dependent, uncertain_parameters
+from drillctl.studies.memory import refuse_too_large
+from drillctl.studies.weight_delay.lanes import MEASURES, Runs, delayed_lanes, following_design
+from drillctl.studies.weight_delay.limits import (
     EndedShare,
     EndsUpTo,
     HarmfulFrom,
     ends_up_to,
     harmful_from,
 )
-from drillctl.studies.delayed_lanes import MEASURES, Runs, delayed_lanes, following_design
-from drillctl.studies.drawn_lanes import Failures
-from drillctl.studies.draws import draw, refuse_dependent, uncertain_parameters
-from drillctl.studies.intervals import Interval, mean_interval, share_interval
-from drillctl.studies.memory import refuse_too_large
 
 if TYPE_CHECKING:
     from pathlib import Path
