@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import csv
 import json
 
 import numpy as np
 import pytest
 
 import drillctl
-from drillctl import units
+from drillctl import plots, units
+from drillctl.cli import run
 from drillctl.errors import InputError
 from drillctl.progress import SILENT
 from drillctl.studies import compare
-from drillctl.studies.advantage import advantage
+from drillctl.studies.advantage import advantage, write_advantage
+from drillctl.studies.advantage.cases import optimum_beside
 from drillctl.studies.advantage.chart import chart
 from drillctl.studies.advantage.delays import crossing, delay_curve
 from drillctl.studies.advantage.equalities import MEAN, NOMINAL, ROP, fresh_shift, shifted_policy
 from drillctl.studies.advantage.measured import Fresh, Measured, estimate
-from drillctl.studies.advantage.optimum import optimum
+from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import (
     CONSTANT,
     DELAY,
@@ -168,6 +171,15 @@ def test_known_gains_are_never_lost(design):
     constant = optimum(policies(design).constant, 60)
     start = np.append(constant.values, 0.0)
     assert optimum(late, 60, [start]).value <= constant.value * (1.0 + 2e-3)
+
+
+def test_gains_that_are_known_do_not_hide_better_ones_elsewhere():
+    # 1.25 s late: a valley at some 2.5 kN s/rad, far from the constant weight's gains.
+    compared = policies(drillctl.load(SHIPPED))
+    constant = Optimum(np.array([632.3, 146.7]), 18.43, 0.98, (), 0)
+    found = optimum_beside(compared.real.at(DELAY, 1.25), 1000, constant)
+    assert found.value < 17.0
+    assert found.values[2] > 1e3
 
 
 def test_gains_on_a_bound_are_told(result):
@@ -329,6 +341,52 @@ def test_saved_and_read_back(result, tmp_path):
     for name, values in result.data.variables.items():
         np.testing.assert_array_equal(back.data[name].values, values.values, str(name))
     assert back.verdict == result.verdict
+
+
+def test_a_finished_run_is_shown_again(result, tmp_path, capsys):
+    folder = result.save(tmp_path / "run")
+    names = ["advantage", str(folder / "design.toml"), "--out", str(folder)]
+    assert run(names) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    kept = result.delay.kept.zero
+    assert f"no advantage from {kept.delay:.3f} s" in shown
+    assert f"{result.baseline.gains[KP]:.1f}" in shown
+    assert "on a bound of the search" in shown
+    assert run([*names, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == result.summary()
+
+
+def test_tables_hold_the_figures(result, tmp_path):
+    write_advantage(result, tmp_path)
+    with (tmp_path / "delays.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    kept = [float(row["advantage"]) for row in rows if row["gains"] == "ideal path"]
+    np.testing.assert_array_equal(kept, result.delay.kept.advantage)
+    with (tmp_path / "map.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    values = [float(row["objective"]) for row in rows]
+    np.testing.assert_array_equal(values, result.chart.figures["objective"].ravel())
+    for name, count in (("cases", 7 * 12), ("shares", 7 * 5), ("areas", 3 * 4), ("front", 3 * 2)):
+        lines = (tmp_path / f"{name}.csv").read_text(encoding="utf-8").splitlines()
+        assert len(lines) == count + 1, name
+
+
+def test_pictures_show_the_figures(result):
+    front = plots.advantage_front(result).axes[0]
+    for k, line in enumerate(front.containers):
+        np.testing.assert_allclose(
+            line.lines[0].get_ydata(), result.front.figures["objective"][k, :, 0]
+        )
+    panels = plots.advantage_map(result).axes
+    mesh = panels[1].collections[0].get_array()
+    np.testing.assert_allclose(np.ravel(mesh), result.chart.figures["advantage"][2].ravel())
+    (delays,) = plots.advantage_delay(result).axes
+    lines = {line.get_label().split(":")[0]: line for line in delays.get_lines()}
+    kept = lines["gains of the ideal path"]
+    np.testing.assert_allclose(kept.get_ydata(), result.delay.kept.advantage)
+    cases = plots.advantage_cases(result, system="field")
+    assert [t.get_text() for t in cases.axes[0].get_yticklabels()] == [c.name for c in result.cases]
+    cases.savefig("/dev/null", format="png", dpi=20)
 
 
 @pytest.mark.parametrize(

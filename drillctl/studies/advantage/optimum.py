@@ -2,9 +2,10 @@
 
 The same realizations, objective and polish as `studies.robust.search`, without derivatives, which
 a weight that comes late does not have. Known good gains, those of a neighbour or of the other
-policy, take part from the start. A valley as narrow as that of a constant weight is a thousandth
-of the bounds of three gains: whoever starts elsewhere does not find it, and a policy that contains
-another must never end above it.
+policy, are polished beside what the population finds, and the better of both is taken. A valley as
+narrow as that of a constant weight is a thousandth of the bounds of three gains: whoever starts
+elsewhere does not find it, and a policy that contains another must never end above it. Within the
+population they would draw all of it into their valley, though others may be deeper.
 """
 
 from __future__ import annotations
@@ -26,12 +27,10 @@ LOOK = {2: 300, 3: 500}
 """Gains of the first look by the number of parameters."""
 RACE = ((16, 80), (64, 16))
 """Realizations of each round, and how many gains are kept after it."""
-GENERATIONS, AMONG = 10, 100
+GENERATIONS, AMONG = 20, 100
 """Of the population, and realizations that it lives among."""
 CROSSING = 0.9
 """Share of the parameters of a trial that are changed."""
-FOLLOWED = 2
-"""Ends of the population that are polished."""
 AT_BOUND = 1e-3
 """Over the bounds' width: nearer is at the bound."""
 
@@ -76,14 +75,15 @@ def optimum(policy: Policy, realizations: int, starts: Sequence[Array] = ()) -> 
     """
     judge = _judge(policy, realizations)
     known = [judge.values(judge.shares(np.asarray(start, dtype=float))) for start in starts]
-    points = np.vstack([spread(policy.tuned, LOOK[len(policy.tuned)]), *known])
+    points = spread(policy.tuned, LOOK[len(policy.tuned)])
     for count, kept in RACE:
         found = judge.points(points, min(count, len(judge)))
-        chosen = sorted(found, key=_merit)[:kept]
-        points = np.vstack([*(point.values for point in chosen), *known])
-    ends = [*_evolved(judge, np.unique(points, axis=0))[:FOLLOWED], *_points(judge, known)]
-    whole = sorted((judge.at_all(end) for end in ends), key=_merit)[:FOLLOWED]
-    best = min((polished(judge, end) for end in whole), key=_merit)
+        points = np.stack([point.values for point in sorted(found, key=_merit)[:kept]])
+    # Two searches, each polished: known gains would draw the whole population into their valley.
+    ends = [judge.at_all(_evolved(judge, points)[0])]
+    if known:
+        ends.append(min(judge.points(np.stack(known), len(judge)), key=_merit))
+    best = min((polished(judge, end) for end in ends), key=_merit)
     shares = judge.shares(best.values)
     bounds = tuple(
         t.path
@@ -98,10 +98,6 @@ def _judge(policy: Policy, realizations: int) -> Judge:
     if policy.design.tables.simulation.step is None:
         values["simulation.accuracy"] = "fast"
     return Judge(policy.design.replace(values), policy.tuned)
-
-
-def _points(judge: Judge, known: list[Array]) -> list[Point]:
-    return judge.points(np.stack(known), len(judge)) if known else []
 
 
 def _merit(point: Point) -> float:
