@@ -18,10 +18,10 @@ from pathlib import Path
 import pytest
 
 FENCE = re.compile(
-    r"(?:^<!-- code: (?P<mark>.+?) -->\n\n?)?^```(?P<language>\w*)\n(?P<text>.*?)^```$",
+    r"(?:^<!-- code: (?P<mark>.+?) -->\n\n?)?^```(?P<language>[^`\n]*)\n(?P<text>.*?)^```$",
     flags=re.MULTILINE | re.DOTALL,
 )
-COMMANDS = ("bash", "console", "")
+COMMANDS = ("bash", "console")
 NUMBER = re.compile(r"[-+]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?")
 
 
@@ -39,12 +39,11 @@ class Block:
         """Commands with the lines of output that follow them."""
         if self.language not in COMMANDS:
             return []
-        if self.language == "console" or "$ " in self.text[:2]:
-            parts = re.split(r"^\$ ", self.text.replace("\\\n", " "), flags=re.MULTILINE)[1:]
+        text = self.text.replace("\\\n", " ")
+        if self.language == "console":
+            parts = re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]
             return [(p.splitlines()[0], p.rstrip().splitlines()[1:]) for p in parts]
-        lines = [line for line in self.text.replace("\\\n", " ").splitlines() if line.strip()]
-        if self.language == "" and not all(line.startswith("drillctl ") for line in lines):
-            return []
+        lines = [line for line in text.splitlines() if line.strip()]
         return [(line, []) for line in lines]
 
 
