@@ -1,6 +1,6 @@
 """The Python surface on one page: each object once, where a user would import it from."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from sphinx.application import Sphinx
 from sphinx.util.typing import ExtensionMetadata
@@ -8,12 +8,19 @@ from sphinx.util.typing import ExtensionMetadata
 import drillctl
 
 
+class _Law(NamedTuple):
+    number: float
+
+
+FIELD = type(_Law.__dict__["number"])
+
+
 def leave_out(
     app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: Any
 ) -> bool | None:
-    """Skip in a package what the front door shows, and what is a module."""
+    """Skip in a package what the front door shows; numbers of a law, which its class explains."""
     if what != "module":
-        return None
+        return True if isinstance(thing, FIELD) else None
     here = app.env.current_document.autodoc_module
     at_the_door = here != "drillctl" and name in drillctl.__all__
     return True if at_the_door and getattr(drillctl, name) is thing else None

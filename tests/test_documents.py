@@ -1,6 +1,7 @@
 """README, docs and examples say what the code does."""
 
 import importlib.util
+import itertools
 import os
 import re
 import subprocess
@@ -65,13 +66,60 @@ def test_every_command_of_the_readme_exists():
     assert known <= named
 
 
-def test_links_lead_somewhere():
-    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]:
-        text = path.read_text(encoding="utf-8")
-        for link in re.findall(r"\]\(([^)#]+?)\)", text):
-            assert (path.parent / link).exists(), f"{path.name}: {link}"
-        for named in re.findall(r"`(tests/[\w/.]+?\.py)", text):
-            assert (ROOT / named).exists(), f"{path.name}: {named}"
+PAGES = [
+    *ROOT.glob("*.md"),
+    *(
+        page
+        for folder in ("docs", "reports", "benchmarks", "examples", "designs", "models")
+        for page in (ROOT / folder).rglob("*.md")
+    ),
+]
+
+
+def prose(page):
+    """A page without its code."""
+    return re.sub(
+        r"^```.*?^```$|`[^`\n]*`", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE
+    )
+
+
+def anchors(page):
+    """Of the headings of a page, as forges make them."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
+    found = set()
+    for heading in re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE):
+        words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
+        plain = re.sub(r"[^\w\- ]", "", words).strip().replace(" ", "-")
+        names = (plain if n == 0 else f"{plain}-{n}" for n in itertools.count())
+        found.add(next(name for name in names if name not in found))
+    return found
+
+
+def astray(page):
+    """Links and pictures of a page that lead nowhere, anchors included."""
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose(page)):
+        if re.match(r"[a-z]+:", link):
+            continue
+        name, _, anchor = link.partition("#")
+        target = page.parent / name if name else page
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            yield link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page):
+    assert not list(astray(page))
+    for named in re.findall(r"`(tests/[\w/.]+?\.py)", page.read_text(encoding="utf-8")):
+        assert (ROOT / named).exists(), named
+
+
+def test_links_that_lead_nowhere_are_found(tmp_path):
+    page = tmp_path / "a.md"
+    page.write_text(
+        "# One `two`, three\n\n[a](a.md#one-two-three) [b](a.md#four) [c](c.md) [d](#one-two)\n"
+        "```\n# no heading\n[e](e.md)\n```\n[f](#no-heading) [g](https://example.org/x)\n"
+    )
+    assert list(astray(page)) == ["a.md#four", "c.md", "#one-two", "#no-heading"]
 
 
 @pytest.mark.parametrize(
