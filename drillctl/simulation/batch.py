@@ -193,7 +193,7 @@ def _run(
     lanes: Lanes, prepared: Prepared, every: int, give_up: float = math.inf
 ) -> tuple[Array, Array]:
     """Raw measures, shape (MEASURES, lanes), and traces, shape (samples, signals, lanes)."""
-    from drillctl.simulation.kernels.advance import TRACED, Clock, run
+    from drillctl.simulation.kernels.advance import TRACED, Clock, kernel
     from drillctl.simulation.kernels.rows import MEASURES, ROWS, WIDTH
 
     count = len(lanes)
@@ -228,6 +228,7 @@ def _run(
         observer_step(observer, scheme.step, begin),
         numbers, np.ascontiguousarray(state), ticks,
     )  # fmt: skip
+    run = kernel(*arguments[1:7])
     rows = ROWS + 2 * len(state) + ticks.remembered + 2 * ticks.estimated
 
     def advance(begin: int, end: int) -> None:

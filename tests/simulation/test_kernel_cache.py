@@ -1,5 +1,6 @@
 """A second process compiles nothing, and an edited law is not run stale."""
 
+import os
 import subprocess
 import sys
 
@@ -30,3 +31,53 @@ def test_the_fingerprint_covers_every_source():
     names = {path.name for path in sources}
     assert {"pi.py", "navarro_lopez_suarez.py", "constant.py", "lane_step.py"} <= names
     assert advance.fingerprint(sources) != advance.fingerprint(sources[:-1])
+
+
+OUTSIDE = """
+import drillctl
+from outside_law import Law
+
+class Under(drillctl.Design):
+    bit_rock = property(lambda self: Law(0.02, 0.06, 0.15))
+    bit_rock_before = bit_rock
+
+base = drillctl.load("monteiro-trindade-100kn", **{"simulation.duration": "10 s"})
+design = Under(base.name, base.tables, base.tree, base.origin)
+print(drillctl.simulate(design, "batch").measures.j1)
+"""
+LAW = """
+from typing import Any, NamedTuple
+
+class Law(NamedTuple):
+    a1: Any
+    a2: Any
+    delta: Any
+    set_valued = property(lambda self: True)
+    def static_torque(self, weight):
+        return self.a2 * weight
+    def kinetic_torque_at_rest(self, weight):
+        return self.a2 * weight
+    def steepest_fall(self, weight):
+        return FACTOR * self.delta * (self.a2 - self.a1) * weight
+    def torque_and_slope(self, weight, speed, exp):
+        part = 1.0 / (1.0 + FACTOR * self.delta * speed)
+        falling = (self.a2 - self.a1) * weight * part
+        return self.a1 * weight + falling, -FACTOR * self.delta * falling * part
+"""
+
+
+def test_a_law_from_outside_is_never_stale_and_leaves_nothing_behind(tmp_path):
+    def j1(code, law):
+        (tmp_path / "outside_law.py").write_text(law)
+        path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+        env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept"), "PYTHONPATH": path}
+        env["PYTHONDONTWRITEBYTECODE"] = "1"  # the edit is within the second of a file's date
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env
+        )
+        return float(done.stdout)
+
+    steep = j1(OUTSIDE, LAW.replace("FACTOR", "3.0"))
+    assert abs(j1(OUTSIDE, LAW.replace("FACTOR", "1.0")) / steep - 1.0) > 0.01
+    (tmp_path / "outside_law.py").unlink()
+    assert not list((tmp_path / "kept").rglob("*.nb?"))

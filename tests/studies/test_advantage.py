@@ -453,8 +453,10 @@ def test_the_shipped_design():
     low, high = found.delay.kept.zero.interval_95
     assert low <= found.delay.kept.zero.delay <= high
     assert high - low < 0.05
-    assert found.delay.anew.material.delay is not None
-    assert found.delay.anew.material.interval_95[0] > 1.0
+    # Tuned for its delay it holds out far longer; to the longest, in some resamples.
+    ends = found.delay.anew.material.interval_95[0]
+    assert ends is None or ends > 1.0
+    assert (found.delay.anew.low[found.delay.anew.delays <= 1.0] > 0.0).all()
 
 
 def test_delays_are_those_of_the_design(design):

@@ -260,13 +260,13 @@ def _advance_block(
         put(measures[measured], first, at(work, r.FIRST_MEASURE + measured * WIDTH))
 
 
-def _compile() -> Any:
+def _compile(on_disk: bool) -> Any:
     # A constant of the compiled code, so that numba's disk cache, which looks at the date of
     # one file only, notices a change in any law or kernel.
     version = fingerprint(sources())
 
     # Threads are the caller's: numba's own loop in parallel compiles everything twice.
-    @njit(nogil=True, cache=True, **OPTIONS)
+    @njit(nogil=True, cache=on_disk, **OPTIONS)
     def run(
         begin: int, end: int,
         string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
@@ -297,7 +297,27 @@ def fingerprint(paths: list[Path]) -> str:
     return digest.hexdigest()[:16]
 
 
-run = _compile()
+def kernel(*laws: Any) -> Any:
+    """The kernel for these laws: `run`, or one that is never kept on disk.
+
+    numba keeps kernels by the names of the classes that they take. A law from outside this package
+    is not in the fingerprint, so that its kernel would be stale once it is edited, and a process
+    that cannot import it could not even read the list of those kept.
+    """
+    return run if all(_is_ours(law) for law in laws) else run_unkept
+
+
+def _is_ours(law: Any) -> bool:
+    """Whether a law, and whatever laws it holds, are of this package."""
+    if not isinstance(law, tuple):
+        return True
+    return type(law).__module__.startswith("drillctl.") and all(_is_ours(part) for part in law)
+
+
+run_unkept = _compile(on_disk=False)
+"""`run`, compiled anew in every process."""
+
+run = _compile(on_disk=True)
 """Advance lanes from time zero to the end: `run(begin, end, string, friction, before,
 drive, weight, program, observer, speed, start, clock, kept, measures, traces)`.
 
