@@ -1,4 +1,4 @@
-"""Links to pages outside `docs/`: for the forge; plain text in the site, which does not hold them."""
+"""Links to pages outside `docs/`: for the forge; plain text in the site, which lacks them."""
 
 from pathlib import Path
 
