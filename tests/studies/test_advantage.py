@@ -174,12 +174,12 @@ def test_known_gains_are_never_lost(design):
 
 
 def test_gains_that_are_known_do_not_hide_better_ones_elsewhere():
-    # 1.25 s late: a valley at some 2.5 kN s/rad, far from the constant weight's gains.
+    # 3 s late: a valley at some 2.7 kN s/rad, far from the constant weight's gains.
     compared = policies(drillctl.load(SHIPPED))
     constant = Optimum(np.array([632.3, 146.7]), 18.43, 0.98, (), 0)
-    found = optimum_beside(compared.real.at(DELAY, 1.25), 1000, constant)
+    found = optimum_beside(compared.real.at(DELAY, 3.0), 1000, constant)
     assert found.value < 17.0
-    assert found.values[2] > 1e3
+    assert found.values[2] > 2e3
 
 
 def test_gains_on_a_bound_are_told(result):
