@@ -1,4 +1,4 @@
-"""Links to pages outside `docs/`: for the forge; plain text in the site, which does not hold them."""
+"""Links to pages outside `docs/`: for the forge; plain words in the site, which has them not."""
 
 from pathlib import Path
 
