@@ -21,6 +21,7 @@ extensions = [
     "site_commands",
     "site_links",
     "site_surface",
+    "site_tables",
 ]
 source_suffix = {".md": "markdown"}
 

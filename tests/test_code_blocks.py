@@ -4,10 +4,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from numba.core.caching import NullCache
 
 import drillctl
-from drillctl.simulation.kernels.advance import run as run_kernel
 from tests.code_blocks import alike, blocks, compare, parse, run
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -19,8 +17,6 @@ def follow(page, slow, folder, capsys, monkeypatch):
     """Run a page from top to bottom in a folder, its Python in one namespace."""
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend(folder)
-    if page.stem == "howto-law":  # its law cannot be imported elsewhere: nothing of it is kept
-        monkeypatch.setattr(run_kernel, "_cache", NullCache())
     names = {"__name__": "__main__"}
     for block in blocks(page):
         where = f"{page.name}:{block.line}"

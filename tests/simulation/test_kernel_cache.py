@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 CODE = """
 import drillctl
 from drillctl.simulation.kernels.advance import run
@@ -66,6 +68,7 @@ class Law(NamedTuple):
 """
 
 
+@pytest.mark.slow
 def test_a_law_from_outside_is_never_stale_and_leaves_nothing_behind(tmp_path):
     def j1(code, law):
         (tmp_path / "outside_law.py").write_text(law)
