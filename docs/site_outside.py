@@ -1,8 +1,4 @@
-<<<<<<< HEAD
-"""Links to pages outside `docs/`: for the forge; plain text in the site, which lacks them."""
-=======
 """Links to pages outside `docs/`: for the forge; plain words in the site, which has them not."""
->>>>>>> docs
 
 from pathlib import Path
 
