@@ -200,6 +200,7 @@ def test_validate_reads_what_is_tuned(call):
     assert "reversed" in err
 
 
+@pytest.mark.slow
 def test_the_solver_speaks_on_stderr_and_only_if_asked():
     """In a process of its own: IPOPT prints past Python."""
     short = ["--set", "simulation.duration=10 s"]

@@ -109,6 +109,7 @@ def test_a_certificate_is_passed_when_its_interval_shows_it(found, hits, verdict
     assert ("more realizations would decide" in one.message) == (verdict == "not shown")
 
 
+@pytest.mark.slow
 def test_tolerance_ends_where_the_probability_falls(found):
     design = found.design
     fresh = Fresh(design, tuned_parameters(design))
