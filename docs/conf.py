@@ -19,7 +19,7 @@ extensions = [
     "sphinx_copybutton",
     "site_math",
     "site_commands",
-    "site_links",
+    "site_outside",
     "site_surface",
     "site_tables",
 ]
