@@ -29,12 +29,12 @@ def advantage(design: Design, options: Options) -> None:
     store.write_data(result, folder.path)
     write_advantage(result, folder.path)
     for name, picture in (
-        ("cases.png", plots.advantage_cases),
-        ("front.png", plots.advantage_front),
-        ("map.png", plots.advantage_map),
-        ("delays.png", plots.advantage_delay),
+        ("cases", plots.advantage_cases(result)),
+        ("front", plots.advantage_front(result, system=options.units)),
+        ("map", plots.advantage_map(result, system=options.units)),
+        ("delays", plots.advantage_delay(result)),
     ):
-        running.draw(picture(result, system=options.units), folder.path / name)
+        running.draw(picture, folder.path / f"{name}.png")
     if not options.json:
         printing.advantage(result, options.units)
     running.conclude(folder, result.summary(), options)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.plots.plane import origin_of, title_of
 from drillctl.plots.style import (
     BLACK,
     BLUE,
@@ -131,15 +132,13 @@ def advantage_map(
         bar = figure.colorbar(mesh, ax=panels)
         bar.set_label(f"advantage in the {_objective(result)} (s)", fontsize=SMALL)
     if ax is None:
-        figure.suptitle(_title(result), fontsize=TITLE, x=0.01, ha="left")
+        figure.suptitle(title_of(result), fontsize=TITLE, x=0.01, ha="left")
         more = "Positive: the weight that follows is better. ×: the 95 % interval holds zero."
         figure.supxlabel(_caption(result, more), fontsize=SMALL)
     return figure
 
 
-def advantage_delay(
-    result: Advantage, ax: Axes | None = None, system: units.System = "si"
-) -> Figure:
+def advantage_delay(result: Advantage, ax: Axes | None = None) -> Figure:
     """Draw the advantage against the delay of the path, with kept gains and gains tuned anew.
 
     Parameters
@@ -148,8 +147,6 @@ def advantage_delay(
         From `drillctl.advantage`.
     ax : Axes, optional
         To draw on.
-    system : {'si', 'field'}
-        Not used: seconds are seconds.
 
     Returns
     -------
@@ -188,9 +185,7 @@ def advantage_delay(
     return figure
 
 
-def advantage_cases(
-    result: Advantage, ax: Axes | None = None, system: units.System = "si"
-) -> Figure:
+def advantage_cases(result: Advantage, ax: Axes | None = None) -> Figure:
     """Draw the distribution of J1 of every case over the fresh draws.
 
     Parameters
@@ -199,8 +194,6 @@ def advantage_cases(
         From `drillctl.advantage`.
     ax : Axes, optional
         To draw on.
-    system : {'si', 'field'}
-        Not used: seconds are seconds.
 
     Returns
     -------
@@ -250,15 +243,10 @@ def _vanishes(found: Crossing, level: float) -> str:
     return f"{what} from {found.delay:.2f} s ({low} to {high})"
 
 
-def _title(result: Advantage) -> str:
-    return result.design.tables.title or result.design.name
-
-
 def _caption(result: Advantage, more: str = "") -> str:
-    tables = result.design.tables
-    origin = f"String {tables.status}. " if tables.status == "reconstructed" else ""
+    table = result.design.tables.advantage
     text = (
-        f"{origin}{tables.advantage.realizations} fresh draws, the same everywhere (seed "
-        f"{tables.advantage.seed}); intervals by resampled pairs. {more}"
+        f"{origin_of(result)}{table.realizations} fresh draws, the same everywhere (seed "
+        f"{table.seed}); intervals by resampled pairs. {more}"
     )
     return "\n".join(textwrap.wrap(text, WIDEST))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import types
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from drillctl.errors import InputError
 from drillctl.progress import SILENT
 from drillctl.studies import compare
 from drillctl.studies.advantage import advantage, write_advantage
+from drillctl.studies.advantage import delays as delays_module
 from drillctl.studies.advantage.cases import optimum_beside
 from drillctl.studies.advantage.chart import chart
 from drillctl.studies.advantage.delays import crossing, delay_curve
@@ -300,6 +302,37 @@ def test_kept_gains_turn_to_harm_and_gains_tuned_anew_do_not(result):
     assert anew.zero.interval_95[1] is None
 
 
+def test_what_small_steps_carry_over_the_end_of_a_step_is_followed(design, monkeypatch):
+    """A valley that is found from nearby gains alone: left at 0.5 s, it really ends at 1.3 s."""
+    constant = Optimum(np.array([600.0, 100.0, 0.0]), 10.0, 1.0, (), 0)
+    near = Optimum(np.array([500.0, 200.0, 0.0]), 1.0, 1.0, (), 0)
+
+    def objective(policy, gains):
+        delay = policy.design.tables.weight_on_bit.path.delay
+        return 10.0 if gains[0] == 600.0 else 1.0 + 7.0 * delay  # 10 at 1.286 s
+
+    def beside(policy, realizations, fallback, starts):
+        delay = policy.design.tables.weight_on_bit.path.delay
+        gains = np.array([500.0, 200.0, delay])
+        close = any(abs(start[2] - delay) < 0.15 and start[0] == 500.0 for start in starts)
+        value = objective(policy, gains)
+        return Optimum(gains, value, 1.0, (), 0) if close and value < 10.0 else fallback
+
+    monkeypatch.setattr(delays_module, "optimum_beside", beside)
+    monkeypatch.setattr(
+        delays_module,
+        "_measured",
+        lambda policy, gains, fresh: np.full(3, objective(policy, gains)),
+    )
+    late = design.replace({"advantage.delays": ["0 s", "0.1 s", "0.5 s", "1 s", "1.5 s"]})
+    compared = policies(late)
+    ends = types.SimpleNamespace(constant=constant, ideal=near, real=near)
+    found = delays_module._tuned_anew(compared.real, ends, None, 10.0, SILENT)
+    assert sorted(d for d in found if found[d][0][0] == 600.0) == pytest.approx([1.3, 1.4, 1.5])
+    assert {0.5, 1.0} <= set(found)
+    assert sorted(found)[-6:] == pytest.approx([1.0, 1.1, 1.2, 1.3, 1.4, 1.5])
+
+
 def test_a_crossing_is_where_the_margin_first_is_not_positive():
     delays = np.array([0.0, 1.0, 2.0, 3.0])
     margin = np.array([3.0, 1.0, -1.0, 2.0])
@@ -384,7 +417,7 @@ def test_pictures_show_the_figures(result):
     lines = {line.get_label().split(":")[0]: line for line in delays.get_lines()}
     kept = lines["gains of the ideal path"]
     np.testing.assert_allclose(kept.get_ydata(), result.delay.kept.advantage)
-    cases = plots.advantage_cases(result, system="field")
+    cases = plots.advantage_cases(result)
     assert [t.get_text() for t in cases.axes[0].get_yticklabels()] == [c.name for c in result.cases]
     cases.savefig("/dev/null", format="png", dpi=20)
 

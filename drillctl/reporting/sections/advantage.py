@@ -16,16 +16,17 @@ if TYPE_CHECKING:
 
 PICTURES = (
     ("advantage-cases", "Policies at the fresh draws, each at its robust optimum.",
-     "Spread of J1 of every policy at each of the terms.", plots.advantage_cases),
+     "Spread of J1 of every policy at each of the terms.",
+     lambda result, system: plots.advantage_cases(result)),
     ("advantage-front", "Robust J1 against the mean weight on bit.",
      "Objective of every policy against its mean weight, over nominal weights.",
-     plots.advantage_front),
+     lambda result, system: plots.advantage_front(result, system=system)),
     ("advantage-map", "Advantage over weights and set speeds.",
      "Maps of the objective of the constant weight less that of the weight that follows.",
-     plots.advantage_map),
+     lambda result, system: plots.advantage_map(result, system=system)),
     ("advantage-delays", "Advantage against the delay of the path.",
      "Advantage over the delay, with kept gains and with gains tuned at each delay.",
-     plots.advantage_delay),
+     lambda result, system: plots.advantage_delay(result)),
 )  # fmt: skip
 """Name, caption, text and function of each picture of `drillctl advantage`."""
 
@@ -51,7 +52,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
 
 
 def _drawn(draw: Callable[..., Drawn], study: Study, system: str) -> Drawn:
-    return draw(study.result, system=system)
+    return draw(study.result, system)
 
 
 def _cases(gathered: Gathered, found: dict[str, Any]) -> Table:

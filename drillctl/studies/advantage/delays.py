@@ -174,6 +174,7 @@ def _tuned_anew(
     """
     table, tune = policy.design.tables.advantage, policy.design.tables.tune
     found: dict[float, Optimum] = {}
+    measured: Points = {}
 
     def tuned(delay: float, start: Array) -> Optimum:
         # As many draws as the constant weight was tuned at: fewer would fit their own draws more.
@@ -181,32 +182,28 @@ def _tuned_anew(
             _late(policy, delay), tune.realizations, optima.constant, [optima.real.values, start]
         )
 
-    def points() -> Points:
-        return {
-            delay: (one.values, _measured(_late(policy, delay), one.values, fresh))
-            for delay, one in sorted(found.items())
-        }
+    def keep(delay: float, one: Optimum) -> Array:
+        found[delay] = one
+        measured[delay] = one.values, _measured(_late(policy, delay), one.values, fresh)
+        return one.values
 
     last = optima.real.values
     for delay in table.delays:
-        found[delay] = tuned(delay, last)
-        last = found[delay].values
+        last = keep(delay, tuned(delay, last))
         progress.advance(1)
     none = table.material * constant
     while True:
-        measured = points()
         over = [d for d in table.delays if constant - measured[d][1][0] <= none]
         before = [d for d in table.delays if over and d < over[0]]
         if not before:
             return measured
         last = found[before[-1]].values
         for delay in np.linspace(before[-1], over[0], STEPS_ANEW + 1)[1:-1].tolist():
-            found[delay] = tuned(delay, last)
-            last = found[delay].values
+            last = keep(delay, tuned(delay, last))
         again = tuned(over[0], last)
         if not again.value < found[over[0]].value:
-            return points()
-        found[over[0]] = again
+            return measured
+        keep(over[0], again)
 
 
 Points = dict[float, tuple[Array, Array]]
