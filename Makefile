@@ -22,10 +22,10 @@ demo: $(BIN)/drillctl
 	@echo "pictures, data and summaries: $(CURDIR)/$(DEMO)"
 
 test: $(BIN)/drillctl
-	$(BIN)/python -m pytest -q -n 2 --dist loadgroup -m "not slow"
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow"
 
 test-all: $(BIN)/drillctl
-	$(BIN)/python -m pytest -q -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 # The lower bounds of pyproject.toml, in an environment of their own.
 test-lowest:

@@ -1,4 +1,4 @@
-"""Figures that tests measure, noted for docs/make_verification.py."""
+"""How tests share workers; figures that they measure, noted for docs/make_verification.py."""
 
 import json
 from pathlib import Path
@@ -6,6 +6,19 @@ from pathlib import Path
 import pytest
 
 NOTED = pytest.StashKey[list]()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """A file to one worker, and all of the reports to one: fixtures are made once."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class ByFixture(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file = super()._split_scope(nodeid)
+            return "tests/reporting" if file.startswith("tests/reporting/") else file
+
+    return ByFixture(config, log)
 
 
 def pytest_addoption(parser):

@@ -154,7 +154,14 @@ def test_the_page_of_keys_leaves_no_table_out():
 
 
 @pytest.mark.parametrize(
-    "name", ["modes_and_bode", "gains_from_margins", "three_drives", "four_gain_pairs", "own_rig"]
+    "name",
+    [
+        "modes_and_bode",
+        "gains_from_margins",
+        "three_drives",
+        "own_rig",
+        pytest.param("four_gain_pairs", marks=pytest.mark.slow),
+    ],
 )
 def test_examples_run(name, tmp_path):
     done = subprocess.run(

@@ -12,8 +12,6 @@ from strict_json import strict
 import drillctl
 
 DESIGN = "monteiro-trindade-140kn"
-# One worker: the kernels of these runs are compiled once.
-pytestmark = pytest.mark.xdist_group("adaptive")
 SHORT = ["--set", "simulation.duration=10 s", "--set", "map.levels=[8.8, 9]", "--audit", "0"]
 GAINS = ["--axis", "controller.kp=0:1000:101", "--axis", "controller.ki=0:500:91"]
 ADAPTIVE = ["map", DESIGN, "--adaptive", *GAINS, *SHORT]

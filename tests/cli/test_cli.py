@@ -184,7 +184,6 @@ def test_regions_json(call):
     assert drillctl.open(f"runs/{BISTABLE}-regions-1").summary() == found
 
 
-@pytest.mark.xdist_group("regularisation")
 def test_regularisation_json(call):
     axes = ["--axis", "controller.kp=500:650:2", "--axis", "controller.ki=75:150:2"]
     code, out, _ = call("regularisation", DESIGN, "--json", *axes)

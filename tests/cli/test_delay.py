@@ -11,8 +11,6 @@ from strict_json import strict
 import drillctl
 
 SHIPPED = "dynamic-wob-delay-140kn"
-# One worker: the kernels of these runs are compiled once.
-pytestmark = pytest.mark.xdist_group("delay")
 SMALL = [
     "--set", "simulation.duration=10 s", "--realizations", "3",
     "--set", "weight_delay.gains=['0 kN*s/rad', '6 kN*s/rad']",

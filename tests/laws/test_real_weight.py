@@ -93,7 +93,6 @@ def test_an_alarm_takes_off_and_puts_on():
         {"delay": "0.5 s", "sampling_period": "1 s", "hoist_lag": "0.5 s", "rate_limit": "30 kN/s"},
     ],
 )
-@pytest.mark.xdist_group("late weight")
 def test_engines_agree_on_what_comes_late(path):
     batch, reference = both(rig(path=path))
     assert batch.j1 == pytest.approx(reference.j1, rel=2e-4)
@@ -101,7 +100,6 @@ def test_engines_agree_on_what_comes_late(path):
     assert batch.peak_bit_speed == pytest.approx(reference.peak_bit_speed, rel=1e-3)
 
 
-@pytest.mark.xdist_group("late weight")
 def test_order_2_of_what_comes_late():
     """Against the reference solver, over a run that neither sticks nor meets a limit."""
     values = {"start.speed": "100 rpm", "operating_point.weight_on_bit": "45 kN"}
@@ -115,7 +113,6 @@ def test_order_2_of_what_comes_late():
     assert orders == pytest.approx(2.0, abs=0.05)
 
 
-@pytest.mark.xdist_group("late weight")
 def test_a_constant_delay_shifts_the_weight():
     """Without lags the weight is the law of the bit speed half a second before."""
     design = rig(path={"delay": "0.5 s"}, **{"simulation.step": "5 ms"})
@@ -125,7 +122,6 @@ def test_a_constant_delay_shifts_the_weight():
     assert run.signals["weight_on_bit"][10:] == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.xdist_group("late weight")
 def test_the_hoist_keeps_its_rate_and_the_law_its_limits():
     design = rig(path={"rate_limit": "20 kN/s", "hoist_lag": "0.3 s"})
     for engine in ("batch", "reference"):

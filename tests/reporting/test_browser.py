@@ -16,7 +16,6 @@ from drillctl.reporting import Report, pdf
 CHROMIUM = "/usr/bin/chromium"
 
 pytestmark = [
-    pytest.mark.xdist_group("report"),
     pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no Chromium"),
 ]
 

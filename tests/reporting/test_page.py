@@ -10,8 +10,6 @@ from itertools import pairwise
 import pytest
 from small_report import NOTES, TITLE
 
-pytestmark = pytest.mark.xdist_group("report")  # one small report for all
-
 VOID = {"meta", "link", "img", "br", "input", "hr"}
 
 

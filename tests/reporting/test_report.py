@@ -17,8 +17,6 @@ from drillctl.errors import InputError, SimulationError
 from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, gather, making, pdf
 from drillctl.reporting.verdict import verdict
 
-pytestmark = pytest.mark.xdist_group("report")  # one small report for all
-
 
 def test_every_section_is_there_or_says_why_not(small):
     content = small.content

@@ -170,7 +170,6 @@ def check(cases, **values):
     assert len(outliers) <= 0.05 * len(found)
 
 
-@pytest.mark.xdist_group("late weight")
 def test_both_engines_agree_on_random_rigs():
     cases = [case(number, laws) for laws in FAST for number in range(5)]
     check(cases, **{"simulation.duration": "25 s"})

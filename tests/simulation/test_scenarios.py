@@ -32,7 +32,6 @@ ROCK = {"scenario.bit_rock": {"until": "30 s", "static_factor": 0.9, "sliding_fa
 
 
 @pytest.mark.parametrize("name", ["start-up", "weight step", "speed step", "rock"])
-@pytest.mark.xdist_group("programs")
 def test_engines_agree(name):
     values = {"start-up": SPEED | WEIGHT, "weight step": STEP, "speed step": JUMP, "rock": ROCK}
     design = rig(**values[name], **{"simulation.step": "5 ms"})
@@ -44,7 +43,6 @@ def test_engines_agree(name):
     assert batch.mean_weight_on_bit == pytest.approx(reference.mean_weight_on_bit, rel=1e-4)
 
 
-@pytest.mark.xdist_group("programs")
 @pytest.mark.parametrize("values", [STEP, JUMP, ROCK])
 def test_jumps_cost_no_order(values):
     expected = drillctl.simulate(rig(**values)).measures.j1
@@ -59,7 +57,6 @@ def test_jumps_cost_no_order(values):
     assert orders.mean() == pytest.approx(2.0, abs=0.3)
 
 
-@pytest.mark.xdist_group("programs")
 @pytest.mark.parametrize("engine", ["batch", "reference"])
 def test_signals_follow_the_program(engine):
     run = drillctl.simulate(rig(**(SPEED | WEIGHT)), engine=engine, interval=0.5)
@@ -72,7 +69,6 @@ def test_signals_follow_the_program(engine):
     assert run.signals["top_speed"][-1] == pytest.approx(run.design.speed, rel=0.1)
 
 
-@pytest.mark.xdist_group("programs")
 def test_a_program_that_changes_nothing_is_none():
     same = {"start": "100 rpm", "begin": "5 s", "end": "9 s"}
     still = rig(**{"scenario.speed": same})
@@ -81,7 +77,6 @@ def test_a_program_that_changes_nothing_is_none():
     assert drillctl.simulate(still, engine="batch").measures == alone
 
 
-@pytest.mark.xdist_group("programs")
 def test_maps_run_over_programs():
     axes = [{"path": "scenario.speed.end", "min": "2 s", "max": "22 s", "points": 2}]
     found = drillctl.sweep(rig(**SPEED, map={"axes": axes, "audit_cells": 0}))

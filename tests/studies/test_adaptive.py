@@ -23,8 +23,6 @@ HOLDS = (
     ),
 )
 
-# One worker: the kernels of these runs are compiled once.
-pytestmark = pytest.mark.xdist_group("adaptive")
 DESIGN = "monteiro-trindade-140kn"
 
 

@@ -59,9 +59,6 @@ SMALL = {
     "advantage.delays": ["0 s", "0.1 s", "0.5 s"],
 }
 
-# One worker: the kernels of these runs are compiled once.
-pytestmark = pytest.mark.xdist_group("advantage")
-
 
 @pytest.fixture(scope="module")
 def design():

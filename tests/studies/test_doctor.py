@@ -106,6 +106,7 @@ def test_the_sample_is_a_matter_of_its_seed(monkeypatch):
     assert first.cells.max() < 63
 
 
+@pytest.mark.slow
 def test_too_few_modes_are_not_enough_and_the_advice_is():
     found = examined(**{"simulation.duration": "40 s", "simulation.modes": 4})
     assert found.verdict == "not_reached"

@@ -9,8 +9,6 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.studies import Axis, regularisation
 
-# One worker: the kernel of the smoothed law is compiled once.
-pytestmark = pytest.mark.xdist_group("regularisation")
 DESIGN = "monteiro-trindade-140kn"
 
 

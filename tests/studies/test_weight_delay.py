@@ -42,9 +42,6 @@ LAW = {
 }
 SHORT = {"simulation.duration": "10 s"}
 
-# One worker: the kernels of these runs are compiled once.
-pytestmark = pytest.mark.xdist_group("delay")
-
 
 @pytest.fixture(scope="module")
 def design():

@@ -21,8 +21,6 @@ from drillctl.studies.robust.fresh import Fresh, FreshRuns
 from drillctl.studies.robust.tolerance import HALVINGS, LOOKED_AT
 from drillctl.studies.robust.tuned import put, tuned_parameters
 
-pytestmark = pytest.mark.xdist_group("certificate")  # one tuning for all
-
 HOLDS = (
     (
         "certificate of gains",
