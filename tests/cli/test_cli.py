@@ -312,13 +312,14 @@ def verbs_on(name):
     return verbs | ({"cycle": []} if "2dof" in name else {})
 
 
-# The same rig at other weights on bit tells nothing new in a quick run; the last six take several
-# kernels of their own.
+# The same rig at other weights on bit or draws tells nothing new in a quick run; some of these
+# take several kernels of their own.
 SLOW = (
     "monteiro-trindade-80kn", "monteiro-trindade-100kn", "monteiro-trindade-160kn",
     "pi-vs-delayed-wob-140kn", "start-up-140kn", "slip-laws-140kn", "six-drives-100kn",
     "torque-limited-140kn", "pi-vs-dynamic-wob-140kn", "monteiro-trindade-fig6-10000",
-    "five-weights-uncertain",
+    "five-weights-uncertain", "monteiro-trindade-120kn", "monteiro-trindade-fig6",
+    "robust-gains-140kn", "pi-vs-pi-dynamic-wob",
 )  # fmt: skip
 
 

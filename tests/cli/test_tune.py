@@ -187,6 +187,7 @@ def test_an_interruption_leaves_no_folder(call, monkeypatch):
     assert not Path("r").exists()
 
 
+@pytest.mark.slow
 def test_the_options_make_the_design(quick):
     quick(SHIPPED, *SMALL, "--seed", "8", "--out", "r")
     tables = drillctl.load("r/design.toml").tables.tune

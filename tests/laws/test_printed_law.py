@@ -55,13 +55,9 @@ def drift(motion, piece):
     return float(last - first) + motion.design.speed * (piece.end - piece.begin)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kp", "ki", "weight"),
-    [
-        (625, 125, 140),
-        pytest.param(200, 100, 140, marks=pytest.mark.slow),
-        pytest.param(200, 100, 120, marks=pytest.mark.slow),
-    ],
+    ("kp", "ki", "weight"), [(625, 125, 140), (200, 100, 140), (200, 100, 120)]
 )
 def test_close_to_the_set_valued_law(kp, ki, weight):
     # Measured: J1 within 6.7e-6, 3.3e-7 and 3.1e-6; time stuck 0.006, 0.022 and 0.018 s longer.

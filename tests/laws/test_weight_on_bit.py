@@ -164,6 +164,7 @@ def test_no_gain_is_constant_weight_to_rounding():
         assert a == pytest.approx(b, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_maps_take_the_gain_as_an_axis():
     design = following(1)
     axes = [{"path": "weight_on_bit.gain", "min": "0 kN*s/rad", "max": "6 kN*s/rad", "points": 4},
