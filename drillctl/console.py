@@ -55,13 +55,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
 
 class Bar:
-    """Progress as a rich bar on stderr.
-
-    Parameters
-    ----------
-    bar : rich.progress.Progress
-        Started by `progress`.
-    """
+    """Progress as a rich bar on stderr."""
 
     def __init__(self, bar: RichBar) -> None:
         self._bar = bar

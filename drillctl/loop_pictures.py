@@ -44,32 +44,12 @@ def over_gains(axes: tuple[Axis, ...]) -> bool:
 
 
 def loop_figures(result: LoopAnalysis) -> dict[str, Figure]:
-    """Figures of a loop by the name of their file; see `loop_drawings`.
-
-    Parameters
-    ----------
-    result : LoopAnalysis
-        Of one design.
-    """
+    """Figures of a loop by the name of their file; see `loop_drawings`."""
     return {name: draw() for name, draw in loop_drawings(result).items()}
 
 
 def loop_drawings(result: LoopAnalysis) -> dict[str, Callable[[], Figure]]:
-    """What draws each figure of a loop, by the name of its file.
-
-    Parameters
-    ----------
-    result : LoopAnalysis
-        Of one design.
-
-    Returns
-    -------
-    dict
-        Mobility at bit and top, of the elements and of the continuum; with a speed controller
-        Bode plot from the set speed, Nyquist, Nichols, sensitivities, root locus and boundary
-        in the plane of the gains; on a distributed string impedance and reflection of the drive.
-        Responses are computed when one of them is drawn.
-    """
+    """What draws each figure of a loop, by the name of its file."""
     design, bit = result.design, result.bit_side
     drawings: dict[str, Callable[[], Figure]] = {"mobility": partial(_mobility, design)}
     if any(design.top_drive.gains()):

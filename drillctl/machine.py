@@ -36,31 +36,18 @@ BURSTS, FEW_BURSTS = 60, 12
 
 @dataclass(frozen=True)
 class Machine:
-    """Best of several short bursts, on one core and on all at once.
+    """Best of several short bursts, on one core and on all at once."""
 
-    Attributes
-    ----------
-    cores : int
-        Cores that this process may use.
-    vector_bits : int
-        Width of vector with which the most multiply-adds are done.
-    clock : float
-        Of a core that is busy with vectors (Hz).
-    flops, flops_all : float
-        Double-precision multiply-adds, two operations each (1/s).
-    loads, loads_all : float
-        Loads from the first cache (B/s).
-    updates, updates_all : float
-        Loads plus stores of a buffer changed in place (B/s).
-    """
-
-    cores: int
-    vector_bits: int
-    clock: float
+    cores: int  # cores that this process may use
+    vector_bits: int  # width of vector with which the most multiply-adds are done
+    clock: float  # of a core that is busy with vectors (Hz)
+    # double-precision multiply-adds, two operations each (1/s)
     flops: float
     flops_all: float
+    # loads from the first cache (B/s)
     loads: float
     loads_all: float
+    # loads plus stores of a buffer changed in place (B/s)
     updates: float
     updates_all: float
 

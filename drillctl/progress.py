@@ -32,11 +32,6 @@ class Within:
 
     A task that begins anew, as a sweep does for each kernel, and tells again what is done
     already, is not counted twice.
-
-    Parameters
-    ----------
-    whole : Progress
-        Its task has begun, in parts of the same kind.
     """
 
     def __init__(self, whole: Progress) -> None:

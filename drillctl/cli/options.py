@@ -63,22 +63,7 @@ def _asked_of_all(
 def computing(
     verb: Callable[..., None], system: Literal["si", "field"] = "si"
 ) -> Callable[..., None]:
-    """A verb as the command line sees it.
-
-    Parameters
-    ----------
-    verb : callable
-        Takes `design` and `options`; on the command line these two stand for the name of a
-        design with `--set`, and for the options of every verb that computes. Its other
-        parameters are its own.
-    system : {'si', 'field'}
-        Units that it speaks unless others are asked for.
-
-    Returns
-    -------
-    callable
-        With the signature that typer reads.
-    """
+    """A verb as the command line sees it."""
     shared = dict(inspect.signature(_asked_of_all, eval_str=True).parameters)
     shared["units"] = shared["units"].replace(default=system)
     own = [

@@ -23,34 +23,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class How:
-    """How a run is carried out; its result does not depend on it.
+    """How a run is carried out; its result does not depend on it."""
 
-    Attributes
-    ----------
-    resume : bool
-        Whether there must be a run to go on with.
-    allow_mixed : bool
-        Whether processors may be of several types.
-    scheduler : str or None
-        Address of a dask.distributed scheduler.
-    interim : float or None
-        Time between interim pictures (s); None for none.
-    """
-
-    resume: bool
-    allow_mixed: bool
-    scheduler: str | None
-    interim: float | None
+    resume: bool  # whether there must be a run to go on with
+    allow_mixed: bool  # whether processors may be of several types
+    scheduler: str | None  # address of a dask.distributed scheduler
+    interim: float | None  # time between interim pictures (s); None for none
 
 
 def refuse_nothing_to_resume(out: Path | None) -> None:
-    """Refuse (`InputError`) to go on with a run that is not there.
-
-    Parameters
-    ----------
-    out : Path or None
-        Its folder, if one was given.
-    """
+    """Refuse (`InputError`) to go on with a run that is not there."""
     if out is None:
         raise InputError("goes with --out, the folder of the run to go on with", "--resume")
     if not (out / "run.json").is_file():
@@ -60,21 +42,7 @@ def refuse_nothing_to_resume(out: Path | None) -> None:
 def computed(
     design: Design, how: How, folder: RunFolder, bar: Progress, system: units.System
 ) -> Uncertainty:
-    """The result of a run in its folder.
-
-    Parameters
-    ----------
-    design : Design
-        Of the run.
-    how : How
-        Threads or cluster, interim pictures.
-    folder : RunFolder
-        Where finished blocks are kept.
-    bar : Progress
-        Told of lanes.
-    system : {'si', 'field'}
-        Units of interim pictures.
-    """
+    """The result of a run in its folder."""
     from drillctl import studies
     from drillctl.studies.uncertainty.cluster import Cluster, connect
 
@@ -115,15 +83,7 @@ class _Interim:
 
 
 def pictures(result: Uncertainty, system: units.System) -> Iterator[tuple[str, Figure]]:
-    """Pictures of a result, one after the other, each with its name.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        Over any number of parameters; maps are drawn of two, and of slices of three.
-    system : {'si', 'field'}
-        Units of the axes.
-    """
+    """Pictures of a result, one after the other, each with its name."""
     from drillctl import plots
 
     yield "convergence", plots.area_convergence(result)

@@ -14,11 +14,5 @@ class Table(BaseModel):
 
 
 def number_or_quantity(value: object) -> object:
-    """Text as it came, or a finite number: what may stand for a value at any path.
-
-    Raises
-    ------
-    InputError
-        Neither.
-    """
+    """Text as it came, or a finite number: what may stand for a value at any path."""
     return value if isinstance(value, str) else number(value)

@@ -45,15 +45,7 @@ class WeightDelayTable(Table):
 
 
 def paths_of_weight(value: object, varied: tuple[str, ...]) -> object:
-    """Values of `[weight_on_bit]` by dotted path.
-
-    Parameters
-    ----------
-    value : object
-        As the file gives them.
-    varied : tuple of str
-        Paths that a study runs over itself, and that are refused.
-    """
+    """Values of `[weight_on_bit]` by dotted path."""
     if not isinstance(value, Mapping):
         return value
     values = _leaves(value)

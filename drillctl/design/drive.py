@@ -42,13 +42,7 @@ class Controller:
 
 
 def top_drive(tables: DesignTables, string: Callable[[], Drillstring]) -> TopDriveLaw:
-    """Top-drive law with its numbers; `string` is asked for by a law that is tuned to it.
-
-    Raises
-    ------
-    InputError
-        A law tuned to the pipe on a string whose uppermost section is a lumped spring.
-    """
+    """Top-drive law with its numbers; `string` is asked for by a law that is tuned to it."""
     table = tables.controller
     try:
         controller = _controller(tables, string)
@@ -148,15 +142,7 @@ def limits(drive: DriveTable) -> tuple[float, float]:
 
 
 def tracking(kp: Any, ki: Any, drive: DriveTable) -> Any:
-    """Rate (1/s) at which a limited integral gives in, for gains that may be arrays.
-
-    Parameters
-    ----------
-    kp, ki : float or ndarray
-        Gains (N m s/rad, N m/rad).
-    drive : DriveTable
-        Says whether there is anti-windup, and how fast if that is given.
-    """
+    """Rate (1/s) at which a limited integral gives in, for gains that may be arrays."""
     if drive.anti_windup == "none":
         return np.zeros(np.broadcast_shapes(np.shape(kp), np.shape(ki)))
     if drive.tracking_time is not None:
@@ -167,22 +153,7 @@ def tracking(kp: Any, ki: Any, drive: DriveTable) -> Any:
 
 
 def refuse_weak_drive(tables: DesignTables, string: Drillstring, torque: float) -> None:
-    """Refuse a drive that cannot hold its set speed.
-
-    Parameters
-    ----------
-    tables : DesignTables
-        Of the design.
-    string : Drillstring
-        Gives the drag.
-    torque : float
-        Of the rock at the set speed (N m).
-
-    Raises
-    ------
-    InputError
-        Torque or power limit lies under what rock and drag take.
-    """
+    """Refuse a drive that cannot hold its set speed."""
     drive, speed = tables.controller.drive, tables.operating_point.speed
     if isinstance(tables.controller, ConstantTorqueTable):
         return
@@ -200,15 +171,7 @@ def refuse_weak_drive(tables: DesignTables, string: Drillstring, torque: float) 
 
 
 def warnings(tables: DesignTables, static: float) -> tuple[str, ...]:
-    """What a user should know of a drive: that it cannot free a stuck bit.
-
-    Parameters
-    ----------
-    tables : DesignTables
-        Of the design.
-    static : float
-        Static torque of the bit (N m).
-    """
+    """What a user should know of a drive: that it cannot free a stuck bit."""
     limit = tables.controller.drive.torque_limit
     if limit is None or limit >= static:
         return ()

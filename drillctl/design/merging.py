@@ -29,23 +29,6 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
     whose `law` changes, a start whose `kind` or an uncertain parameter whose `distribution`
     changes, drops what belonged to the old one; the drive around a controller and the path of a
     weight law stay.
-
-    Parameters
-    ----------
-    base, top : dict
-        Tables as TOML gives them.
-    path : str
-        Where they stand in the design.
-
-    Returns
-    -------
-    dict
-        A new tree.
-
-    Raises
-    ------
-    InputError
-        Two sections of one layer bear the same name.
     """
     if path == "start" and _changed(base, top, "kind", "turning"):
         return dict(top)
@@ -99,20 +82,7 @@ def _named(sections: list[Any]) -> bool:
 
 
 def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
-    """A new tree with single values set by dotted path, in whatever order they are given.
-
-    Parameters
-    ----------
-    tree : dict
-        The design so far, merged over its model.
-    values : dict
-        Dotted path to value, as it would stand in the file.
-
-    Raises
-    ------
-    InputError
-        No such section.
-    """
+    """A new tree with single values set by dotted path, in whatever order they are given."""
     # A law or a kind drops the numbers of the old one, so it goes before the new one's.
     first = (".law", ".kind", ".distribution")
     for path in sorted(values, key=lambda path: not path.endswith(first)):
@@ -127,22 +97,7 @@ def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
 
 
 def branch(path: str, value: object, tree: Tree) -> Tree:
-    """The smallest tree that sets `path` to `value`, to be laid over `tree`.
-
-    Parameters
-    ----------
-    path : str
-        Dotted; sections by name: `drillstring.sections.pipe.length`.
-    value : object
-        As it would stand in the file.
-    tree : dict
-        The design so far; sections must be in it.
-
-    Raises
-    ------
-    InputError
-        No such section, or a new name for one.
-    """
+    """The smallest tree that sets `path` to `value`, to be laid over `tree`."""
     keys = path.split(".")
     if keys[:2] == ["drillstring", "sections"] and len(keys) > 2:
         names = _section_names(tree)

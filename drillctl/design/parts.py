@@ -55,13 +55,7 @@ _assembled = lru_cache(maxsize=4)(assemble)
 
 
 def drillstring(tables: DesignTables) -> Drillstring:
-    """Assemble the string of a design.
-
-    Raises
-    ------
-    InputError
-        A node is left without inertia, or another reason of `refuse_impossible_string`.
-    """
+    """Assemble the string of a design."""
     table = tables.drillstring
     refuse_impossible_string(tables)
     return _assembled(
@@ -168,14 +162,7 @@ def refuse_massless_node(tables: DesignTables) -> None:
 
 
 def bit_rock(tables: DesignTables) -> BitRockLaw:
-    """Bit-rock law at the operating weight on bit.
-
-    Raises
-    ------
-    InputError
-        The weight lies outside the table and `outside_table` is `refuse`, or factors or
-        extrapolation give coefficients that no friction has.
-    """
+    """Bit-rock law at the operating weight on bit."""
     law = _friction(tables)
     _refuse_impossible_friction(law, tables)
     over = getattr(tables.bit_rock, "regularised_over", None)
@@ -196,13 +183,7 @@ def weight_moves(tables: DesignTables) -> bool:
 
 
 def bit_rock_before(tables: DesignTables) -> BitRockLaw:
-    """Bit-rock law before the rock changes.
-
-    Raises
-    ------
-    InputError
-        The law cannot be changed so.
-    """
+    """Bit-rock law before the rock changes."""
     table = tables.scenario.bit_rock
     law = bit_rock(tables)
     if table.until == 0.0:
@@ -318,13 +299,7 @@ def torque_at_set_speed(tables: DesignTables) -> float:
 
 
 def program(tables: DesignTables) -> Program:
-    """What changes by the clock in a run.
-
-    Raises
-    ------
-    InputError
-        A program without anything to start from, or one that outlasts the run.
-    """
+    """What changes by the clock in a run."""
     scenario, point = tables.scenario, tables.operating_point
     duration = tables.simulation.duration
     for name, table in (("speed", scenario.speed), ("weight_on_bit", scenario.weight_on_bit)):

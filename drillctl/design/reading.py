@@ -111,13 +111,7 @@ def parse_setting(text: str) -> tuple[str, Any]:
 
 
 def parse_axis(text: str) -> Tree:
-    """Read `path=min:max:points` of the command line into an axis table.
-
-    Raises
-    ------
-    InputError
-        Another form, or points that are not a whole number.
-    """
+    """Read `path=min:max:points` of the command line into an axis table."""
     path, equals, ends = text.partition("=")
     parts = ends.split(":")
     if not equals or len(parts) != 3:

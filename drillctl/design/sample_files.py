@@ -18,25 +18,7 @@ _KEYS = ("file", "column", "unit")
 
 
 def with_samples(tree: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """A design's tree with every `uncertain.*.file` replaced by the samples it holds.
-
-    Parameters
-    ----------
-    tree : dict
-        A design file, or part of one.
-    folder : Path
-        Where relative names start from.
-
-    Returns
-    -------
-    dict
-        A new tree where there was a file, else the same.
-
-    Raises
-    ------
-    InputError
-        No such file or column, or something in it that is not a number.
-    """
+    """A design's tree with every `uncertain.*.file` replaced by the samples it holds."""
     uncertain = tree.get("uncertain")
     if not isinstance(uncertain, Mapping):
         return tree

@@ -81,23 +81,7 @@ levels = [20, 30, 40, 50]         # of J1, in seconds
 
 
 def write_starter(name: str) -> Path:
-    """Write the starter file.
-
-    Parameters
-    ----------
-    name : str
-        Name or path; `.toml` is added if it is not there.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        The file exists already, or cannot be written.
-    """
+    """Write the starter file."""
     path = Path(name)
     if not path.name or not name.isprintable():
         raise InputError(f"{shown(name)} is not a file name")

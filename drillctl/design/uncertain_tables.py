@@ -197,16 +197,7 @@ class UncertaintyTable(Table):
 
 
 def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Distributions by dotted path, whether the paths were quoted in the file or not.
-
-    Parameters
-    ----------
-    tree : dict
-        As TOML gives `[uncertain]`: `[uncertain."bit_rock.a1_factor"]` is a key with a dot,
-        `[uncertain.bit_rock.a1_factor]` a table in a table.
-    prefix : str
-        Path of `tree` itself.
-    """
+    """Distributions by dotted path, whether the paths were quoted in the file or not."""
     found: dict[str, Any] = {}
     for key, value in tree.items():
         path = f"{prefix}{key.strip(chr(34))}"

@@ -28,20 +28,7 @@ _TYPES = {
 
 
 def validated(tree: Tree, origin: str) -> DesignTables:
-    """Validate plain TOML data.
-
-    Parameters
-    ----------
-    tree : dict
-        The whole design, already merged over its model.
-    origin : str
-        File it came from, for messages.
-
-    Raises
-    ------
-    InputError
-        The first thing wrong: file, key, what came, what is allowed, the nearest valid name.
-    """
+    """Validate plain TOML data."""
     from drillctl.design import drive, parts
 
     try:

@@ -28,13 +28,7 @@ SHORTEST_LAG = 0.1
 
 
 def weight_on_bit(tables: DesignTables) -> WeightLaw:
-    """Weight-on-bit law with its numbers.
-
-    Raises
-    ------
-    InputError
-        The nominal weight lies outside the limits of the law.
-    """
+    """Weight-on-bit law with its numbers."""
     table, nominal = tables.weight_on_bit, tables.operating_point.weight_on_bit
     match table:
         case ConstantWeightTable():

@@ -20,13 +20,7 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 
 class Banded:
-    """Mobility of a finite-element string from its matrices.
-
-    Parameters
-    ----------
-    string : Drillstring
-        Tridiagonal matrices are solved as such, by LAPACK; others densely.
-    """
+    """Mobility of a finite-element string from its matrices."""
 
     def __init__(self, string: Drillstring) -> None:
         self.string = string

@@ -46,17 +46,10 @@ WINDOW: Window = ((0.0, 1000.0), (0.0, 500.0))
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """One piece of the curve within the window.
+    """One piece of the curve within the window."""
 
-    Attributes
-    ----------
-    omega : ndarray, shape (points,)
-        Angular frequency of the poles on the axis (rad/s), increasing.
-    kp, ki : ndarray, shape (points,)
-        Gains (N m s/rad, N m/rad).
-    """
-
-    omega: Array
+    omega: Array  # shape (points,): Angular frequency of the poles on the axis (rad/s), increasing
+    # shape (points,): Gains (N m s/rad, N m/rad)
     kp: Array
     ki: Array
 

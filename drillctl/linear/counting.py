@@ -32,24 +32,7 @@ BISECTIONS = 80
 def natural_frequencies(
     parts: Parts, model: Model, count: int, top_held: bool = False, bit_held: bool = False
 ) -> Array:
-    """Undamped natural frequencies, lowest first.
-
-    Parameters
-    ----------
-    parts : Parts
-        Sections and end inertias; damping is left out.
-    model : {'finite-elements', 'wave'}
-        Elements, or the continuum.
-    count : int
-        How many; fewer where the elements have no more.
-    top_held, bit_held : bool
-        Whether that end stands still.
-
-    Returns
-    -------
-    ndarray, shape (at most count,)
-        rad/s. With both ends free the first is zero, the rigid body.
-    """
+    """Undamped natural frequencies, lowest first."""
     still = _Lossless(parts, model, top_held, bit_held)
     high = 1.0
     while still.below(np.array([high]))[0] < min(count, still.most):

@@ -101,16 +101,6 @@ def telling_grid(ends: Ends) -> Array:
     They cluster at the natural frequencies with either end free or held: whatever is put at the
     ends, resonances lie between these, and where two of them are close a response turns fast.
     Below the first they go down by decades, for slow integral action.
-
-    Parameters
-    ----------
-    ends : Ends
-        The string.
-
-    Returns
-    -------
-    ndarray
-        Increasing, the first more than zero.
     """
     return _grid_of(ends.parts, model_of(ends), count_of(ends))
 

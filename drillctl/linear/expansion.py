@@ -23,14 +23,7 @@ CHUNK = 256
 
 
 class Expansion:
-    """Mobility of a finite-element string from its undamped free-free modes.
-
-    Parameters
-    ----------
-    string : Drillstring
-        With any viscous damping. Where it couples the modes a full system is solved at each
-        frequency, else the modes are summed.
-    """
+    """Mobility of a finite-element string from its undamped free-free modes."""
 
     def __init__(self, string: Drillstring) -> None:
         self.string = string

@@ -41,26 +41,6 @@ def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearI
     torque of the law is multiplied by tanh(bit speed / width). A bit that should stand still
     creeps instead, and J1 shifts by several per cent (by up to half of it for wide ones). For
     answers use `drillctl.simulate`, which regularises nothing.
-
-    Parameters
-    ----------
-    design : Design
-        Rig and control.
-    width : float
-        Speed over which the friction changes sign (rad/s), more than zero.
-
-    Returns
-    -------
-    control.NonlinearIOSystem
-        Inputs `set_speed` (rad/s) and `weight_on_bit` (N; the coefficients of the law stay
-        those of the design's weight). Outputs those of `closed_loop` and `bit_torque` (N m).
-        States of the closed loop: twists (rad), speeds (rad/s), `integral` (rad) where the
-        drive has integral action.
-
-    Raises
-    ------
-    InputError
-        A width that is not more than zero, or laws with a memory.
     """
     import control
 
@@ -103,29 +83,7 @@ def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearI
 
 
 def write_matrices(design: Design, path: str | Path) -> Path:
-    """Write the linear models of a design for MATLAB (`.mat`) or NumPy (`.npz`).
-
-    Parameters
-    ----------
-    design : Design
-        Rig and control.
-    path : str or Path
-        File ending in `.mat` or `.npz`.
-
-    Returns
-    -------
-    Path
-        The file. It holds `plant`, `open_loop` (of an ideal drive) and `closed_loop` as A, B,
-        C, D (the last also with the slope of the rock, `closed_loop_with_slope`), M, C and K of
-        the string, the slope (N m s/rad), names of states, inputs and outputs. SI units,
-        radians. In `.mat` each system is a struct, so that `ss(plant.A, plant.B, plant.C,
-        plant.D)` is the plant; in `.npz` names are joined by a dot, as in `plant.A`.
-
-    Raises
-    ------
-    InputError
-        Another ending, or a file that cannot be written.
-    """
+    """Write the linear models of a design for MATLAB (`.mat`) or NumPy (`.npz`)."""
     path = Path(path)
     if path.suffix not in (".mat", ".npz"):
         raise InputError(f"{path.name!r}: a file ends in .mat or .npz", "export")

@@ -228,16 +228,7 @@ def _bit_side(design: Design, point: OperatingPoint) -> BitSide:
 
 
 def tolerated_slope(design: Design, speed: float) -> tuple[float, float]:
-    """Slope margin of any loop about steady drilling at a speed (rad/s).
-
-    Returns
-    -------
-    slope : float
-        D* (N m s/rad) on the scale of the slope at constant weight, unless the weight moves at
-        once; NaN for a loop that is not stable without slope, infinite for one that bears any.
-    omega : float
-        Angular frequency of the poles that decide (rad/s).
-    """
+    """Slope margin of any loop about steady drilling at a speed (rad/s)."""
     ends = ends_of(design.string)
     at_once = not isinstance(design.weight_on_bit, PATHS)
     if design.simple_loop:

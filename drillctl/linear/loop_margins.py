@@ -113,20 +113,7 @@ def disk_gain_and_phase(disk: float) -> tuple[float, float]:
 
 
 def pole_grid(ends: Ends, poles: ComplexArray) -> Array:
-    """Angular frequencies (rad/s) that resolve every pole of a loop, however near the axis.
-
-    Parameters
-    ----------
-    ends : Ends
-        The string, for what lies between the poles.
-    poles : ndarray of complex
-        Poles (1/s).
-
-    Returns
-    -------
-    ndarray
-        Increasing, the first more than zero.
-    """
+    """Angular frequencies (rad/s) that resolve every pole of a loop, however near the axis."""
     base = telling_grid(ends)
     size = np.abs(poles[np.isfinite(poles) & (poles != 0.0)])
     base = base[base > SLOWEST * size.min()]
@@ -190,22 +177,7 @@ def _largest(function: Callable[[Array], Array], grid: Array) -> tuple[float, fl
 def peak_sensitivities(
     ends: Ends, kp: Array, ki: Array, slope: Array, poles: ComplexArray
 ) -> Array:
-    """Largest sensitivity of many stable loops under PI control.
-
-    Parameters
-    ----------
-    ends : Ends
-        The string they share.
-    kp, ki, slope : ndarray, shape (loops,)
-        Gains (N m s/rad, N m/rad) and falling slope of the rock (N m s/rad).
-    poles : ndarray of complex, shape (loops, states)
-        Of each loop (1/s).
-
-    Returns
-    -------
-    ndarray, shape (loops,)
-        Of each loop its highest peak on a grid that resolves its poles, refined.
-    """
+    """Largest sensitivity of many stable loops under PI control."""
     from scipy.optimize import elementwise
 
     def small(omega: Array, kp: Array, ki: Array, slope: Array) -> Array:

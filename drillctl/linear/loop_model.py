@@ -30,14 +30,9 @@ HELD_PADE = 3
 
 @dataclass(frozen=True, eq=False)
 class Delay:
-    """x' = a x + b u, y = c x: a delay as a strictly proper rational function.
+    """x' = a x + b u, y = c x: a delay as a strictly proper rational function."""
 
-    Attributes
-    ----------
-    a, b, c : ndarray
-        Matrices, (order, order), (order,), (order,).
-    """
-
+    # matrices, (order, order), (order,), (order,)
     a: Array
     b: Array
     c: Array
@@ -151,22 +146,7 @@ class _Weight:
 
 
 def loop_model(design: Design, bit: BitSide) -> StateMatrices:
-    """The loop of a design in state space.
-
-    Parameters
-    ----------
-    design : Design
-        Any drive and weight law, without its limits. Delays are rational approximations of order
-        `PADE`; a sampled controller counts as its mean delay.
-    bit : BitSide
-        What closes the loop at the bit; `BitSide(0.0)` leaves it open.
-
-    Returns
-    -------
-    StateMatrices
-        Inputs: change of the set speed (rad/s), further torque on the bit (N m, braking). Outputs
-        as in `state_space.LOOP_OUTPUTS`. States that nothing depends on are left out.
-    """
+    """The loop of a design in state space."""
     plant = plant_matrices(design.string)
     size = len(plant.a)
     top, bit_row = plant.c[0], plant.c[1]

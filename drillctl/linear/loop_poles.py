@@ -25,23 +25,7 @@ def with_slope(matrices: StateMatrices, slope: float) -> StateMatrices:
 
 
 def loop_poles(string: Drillstring, kp: float, ki: float, slope: float) -> ComplexArray:
-    """Eigenvalues of the closed loop.
-
-    Parameters
-    ----------
-    string : Drillstring
-        The assembled string.
-    kp, ki : float
-        Gains (N m s/rad, N m/rad).
-    slope : float
-        Falling slope of the rock (N m s/rad).
-
-    Returns
-    -------
-    ndarray of complex, shape (states,)
-        By magnitude (1/s). Of an undamped string the high modes have real parts below the
-        rounding of an eigenvalue, some 1e-14 of the largest.
-    """
+    """Eigenvalues of the closed loop."""
     matrices = with_slope(closed_loop_matrices(string, kp, ki), slope)
     poles = np.linalg.eigvals(matrices.a)
     return np.asarray(poles[np.argsort(np.abs(poles), kind="stable")])
@@ -50,22 +34,7 @@ def loop_poles(string: Drillstring, kp: float, ki: float, slope: float) -> Compl
 def many_loop_poles(
     string: Drillstring, kp: ArrayLike, ki: ArrayLike, slope: ArrayLike, threads: int = 1
 ) -> ComplexArray:
-    """Eigenvalues for many gains at once.
-
-    Parameters
-    ----------
-    string : Drillstring
-        The assembled string.
-    kp, ki, slope : array_like, shape (cells,)
-        Gains and falling slope of the rock; broadcast against each other.
-    threads : int
-        Threads to use.
-
-    Returns
-    -------
-    ndarray of complex, shape (cells, states)
-        By magnitude (1/s); without integral action NaN in place of the controller's pole.
-    """
+    """Eigenvalues for many gains at once."""
     kp, ki, slope = (np.ravel(x) for x in np.broadcast_arrays(kp, ki, slope))
     # The matrix is affine in the three numbers: two controllers and one slope give its parts.
     still = closed_loop_matrices(string, 0.0, 1.0).a

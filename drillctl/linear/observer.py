@@ -25,25 +25,15 @@ SPEED_NOISE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """x' = free x + by_torque T + by_speed w; bit speed = read x; all in the turning frame.
+    """x' = free x + by_torque T + by_speed w; bit speed = read x; all in the turning frame."""
 
-    Attributes
-    ----------
-    free : ndarray, shape (states, states)
-        State matrix (1/s).
-    by_torque, by_speed : ndarray, shape (states,)
-        Input of the drive's torque, less all damping to ground at the set speed, and of the top
-        speed.
-    read : ndarray, shape (states,)
-        Bit speed per state.
-    from_angle, from_speed : ndarray, shape (states, nodes)
-        State of a string under no bit torque, per nodal angle and speed.
-    """
-
-    free: Array
+    free: Array  # shape (states, states): State matrix (1/s)
+    # shape (states,): Input of the drive's torque, less all damping to ground at the set speed,
+    # and of the top speed
     by_torque: Array
     by_speed: Array
-    read: Array
+    read: Array  # shape (states,): Bit speed per state
+    # shape (states, nodes): State of a string under no bit torque, per nodal angle and speed
     from_angle: Array
     from_speed: Array
 
@@ -69,21 +59,7 @@ class Observer:
 
 
 def observer(string: Drillstring, modes: int = MODES) -> Observer:
-    """A steady-state Kalman filter on the lowest modes of a string.
-
-    Parameters
-    ----------
-    string : Drillstring
-        The assembled string.
-    modes : int
-        Elastic modes that it follows, at most those there are.
-
-    Returns
-    -------
-    Observer
-        Its states: speed of the string as a whole, modal angles, modal speeds, bit torque (taken
-        to wander). Gains from the algebraic Riccati equation.
-    """
+    """A steady-state Kalman filter on the lowest modes of a string."""
     frequency, shapes = string.undamped_modes
     kept = min(modes, string.nodes - 1)
     frequency, shapes = frequency[1 : kept + 1], shapes[:, : kept + 1]

@@ -145,21 +145,7 @@ def cancelling_weight_gain(design: Design) -> float:
 
 
 def rock_at(friction: Any, weight: Any, speed: Any) -> tuple[Any, Any]:
-    """Torque of the rock and its slope in steady motion.
-
-    Parameters
-    ----------
-    friction, weight : NamedTuple
-        Laws with numbers, or arrays of them.
-    speed : float or ndarray
-        Of the bit, not negative (rad/s).
-
-    Returns
-    -------
-    torque, slope
-        N m and N m s/rad. The slope counts a weight that moves at once with the bit; one that
-        comes late it holds constant: see `weight_path`.
-    """
+    """Torque of the rock and its slope in steady motion."""
     if not isinstance(weight, PATHS):
         return contact(friction, weight, speed, np.exp)
     steady = weight.nominal + 0.0 * speed

@@ -24,34 +24,14 @@ DIAGONAL = 1e-10
 
 
 class Pole(NamedTuple):
-    """One pole in the upper half plane, the real axis included.
+    """One pole in the upper half plane, the real axis included."""
 
-    Attributes
-    ----------
-    value : complex
-        Of the pole (rad/s).
-    shape : ndarray, shape (nodes,)
-        Angles of the nodes, to a complex factor.
-    """
-
-    value: complex
-    shape: Shape
+    value: complex  # of the pole (rad/s)
+    shape: Shape  # shape (nodes,): Angles of the nodes, to a complex factor
 
 
 def free_free_poles(string: Drillstring) -> list[Pole]:
-    """Poles of the string with both ends free, by magnitude; the rigid body is the first.
-
-    Parameters
-    ----------
-    string : Drillstring
-        The assembled string.
-
-    Returns
-    -------
-    list of Pole
-        The free angle of the whole string as one pole at zero. Its speed is a pole of its own
-        only where damping to ground brakes it.
-    """
+    """Poles of the string with both ends free, by magnitude; the rigid body is the first."""
     frequency, shapes = string.undamped_modes
     damping = shapes.T @ (string.damping @ shapes)
     rigid = Pole(0.0, shapes[:, 0].astype(complex))
@@ -62,18 +42,7 @@ def free_free_poles(string: Drillstring) -> list[Pole]:
 
 
 def fixed_top_poles(string: Drillstring) -> list[Pole]:
-    """Poles of the string with the top drive held, by magnitude.
-
-    Parameters
-    ----------
-    string : Drillstring
-        The assembled string.
-
-    Returns
-    -------
-    list of Pole
-        Shapes are zero at the top.
-    """
+    """Poles of the string with the top drive held, by magnitude."""
     from threadpoolctl import threadpool_limits
 
     # One BLAS thread, since another count gives other bits.
@@ -104,19 +73,7 @@ def _poles(frequency: Array, damping: Array, shapes: Array) -> list[Pole]:
 
 
 def quadratic_poles(frequency: float, damping: float) -> list[complex]:
-    """Roots of s^2 + damping s + frequency^2, of a conjugate pair the upper one.
-
-    Parameters
-    ----------
-    frequency, damping : float
-        Undamped frequency (rad/s) and damping over inertia (1/s), both not negative. At zero
-        frequency the root at zero, the free angle, is left out.
-
-    Returns
-    -------
-    list of complex
-        One root, or two when both are real and not zero (1/s).
-    """
+    """Roots of s^2 + damping s + frequency^2, of a conjugate pair the upper one."""
     half = damping / 2.0
     if half < frequency:
         return [complex(-half, math.sqrt((frequency - half) * (frequency + half)))]

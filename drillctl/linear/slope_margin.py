@@ -37,52 +37,22 @@ the one of lowest frequency."""
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Slopes at which one pair of poles lies on the imaginary axis.
+    """Slopes at which one pair of poles lies on the imaginary axis."""
 
-    Attributes
-    ----------
-    slope : ndarray, shape (crossings,)
-        Falling slope (N m s/rad), lowest first.
-    omega : ndarray, shape (crossings,)
-        Angular frequency of the poles (rad/s); 0 for a real pole.
-    """
-
-    slope: Array
-    omega: Array
+    slope: Array  # shape (crossings,): Falling slope (N m s/rad), lowest first
+    omega: Array  # shape (crossings,): Angular frequency of the poles (rad/s); 0 for a real pole
 
 
 @dataclass(frozen=True, eq=False)
 class SlopeMargins:
-    """Slope margins of a number of gain pairs.
+    """Slope margins of a number of gain pairs."""
 
-    Attributes
-    ----------
-    slope : ndarray
-        D* (N m s/rad).
-    omega : ndarray
-        Angular frequency of the poles that decide (rad/s); 0 for a real pole.
-    """
-
-    slope: Array
-    omega: Array
+    slope: Array  # D* (N m s/rad)
+    omega: Array  # angular frequency of the poles that decide (rad/s); 0 for a real pole
 
 
 def crossings(ends: Ends, kp: float, ki: float) -> Crossings:
-    """All slopes at which poles reach the imaginary axis under PI control.
-
-    Parameters
-    ----------
-    ends : Ends
-        The string; of a continuum, the lowest `ends.WAVE_MODES` modes.
-    kp, ki : float
-        Gains (N m s/rad, N m/rad), not negative.
-
-    Returns
-    -------
-    Crossings
-        Lowest first; the first is D*. Without proportional gain an undamped string crosses at
-        zero.
-    """
+    """All slopes at which poles reach the imaginary axis under PI control."""
     search = _Search(ends)
     gains = np.array([[kp, ki]], dtype=float)
     refuse_gains(gains)

@@ -32,24 +32,13 @@ LOOP_OUTPUTS = (*OUTPUTS, "top_torque")
 
 
 class StateMatrices(NamedTuple):
-    """x' = A x + B u, y = C x + D u.
+    """x' = A x + B u, y = C x + D u."""
 
-    Attributes
-    ----------
-    a : ndarray, shape (states, states)
-        State matrix; entries in the units of their states and inputs, SI.
-    b : ndarray, shape (states, inputs)
-        Input matrix.
-    c : ndarray, shape (outputs, states)
-        Output matrix.
-    d : ndarray, shape (outputs, inputs)
-        Feedthrough.
-    """
-
+    # shape (states, states): State matrix; entries in the units of their states and inputs, SI
     a: Array
-    b: Array
-    c: Array
-    d: Array
+    b: Array  # shape (states, inputs): Input matrix
+    c: Array  # shape (outputs, states): Output matrix
+    d: Array  # shape (outputs, inputs): Feedthrough
 
 
 def plant_matrices(string: Drillstring) -> StateMatrices:
@@ -58,17 +47,6 @@ def plant_matrices(string: Drillstring) -> StateMatrices:
     With B the signed incidence of nodes and elements (1 above, -1 below) and k the element
     stiffnesses, the stiffness matrix is B k B^T, so that M u'' + C u' + K u = F reads
     `twist' = B^T speed`, `M speed' = F - B k twist - C speed`.
-
-    Parameters
-    ----------
-    string : Drillstring
-        The assembled string.
-
-    Returns
-    -------
-    StateMatrices
-        States: twists (rad, angle above minus angle below), then node speeds (rad/s). Inputs
-        and outputs as in `INPUTS` and `OUTPUTS`.
     """
     nodes, elements = string.nodes, string.nodes - 1
     incidence = np.eye(nodes, elements) - np.eye(nodes, elements, k=-1)
@@ -99,22 +77,7 @@ def _plant_outputs(string: Drillstring) -> Array:
 
 
 def open_loop_matrices(string: Drillstring, kp: float, ki: float) -> StateMatrices:
-    """State matrices from speed error through controller and string, the loop left open.
-
-    Parameters
-    ----------
-    string : Drillstring
-        The assembled string.
-    kp, ki : float
-        Gains of the drive (N m s/rad, N m/rad).
-
-    Returns
-    -------
-    StateMatrices
-        Inputs: speed error (rad/s) and bit torque (N m). Outputs as in `LOOP_OUTPUTS`. The
-        integral of the error (rad) is the last state where `ki` is not zero; without integral
-        action nothing depends on it, and it is left out.
-    """
+    """State matrices from speed error through controller and string, the loop left open."""
     a, b, c, d = plant_matrices(string)
     from_error = np.column_stack([kp * b[:, 0], b[:, 1]])
     c = np.vstack([c, np.zeros(len(a))])
@@ -130,22 +93,7 @@ def open_loop_matrices(string: Drillstring, kp: float, ki: float) -> StateMatric
 
 
 def closed_loop_matrices(string: Drillstring, kp: float, ki: float) -> StateMatrices:
-    """State matrices of the string closed with speed control of the top drive.
-
-    Parameters
-    ----------
-    string : Drillstring
-        The assembled string.
-    kp, ki : float
-        Gains of the drive (N m s/rad, N m/rad).
-
-    Returns
-    -------
-    StateMatrices
-        States and outputs of `open_loop_matrices`. Inputs: set speed (rad/s) and bit torque
-        (N m). The slope of the bit-rock law is not in it; for a torque that falls by D
-        (N m s/rad) add `-D b[:, 1:] @ c[1:2]` to `a`.
-    """
+    """State matrices of the string closed with speed control of the top drive."""
     a, b, c, d = open_loop_matrices(string, kp, ki)
     top_speed = c[0]
     error = b[:, 0]

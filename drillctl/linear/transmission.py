@@ -30,37 +30,14 @@ Model = Literal["finite-elements", "wave"]
 
 
 class Line(NamedTuple):
-    """One section at a number of frequencies; each array has their shape.
+    """One section at a number of frequencies; each array has their shape."""
 
-    Attributes
-    ----------
-    decay : ndarray of complex
-        exp(-G), of magnitude 1 or less.
-    series : ndarray of complex
-        Z (1 - exp(-2 G)) (N m s/rad).
-    shunt : ndarray of complex
-        (1 - exp(-2 G)) / Z (rad/(N m s)).
-    """
-
-    decay: ComplexArray
-    series: ComplexArray
-    shunt: ComplexArray
+    decay: ComplexArray  # exp(-G), of magnitude 1 or less
+    series: ComplexArray  # Z (1 - exp(-2 G)) (N m s/rad)
+    shunt: ComplexArray  # (1 - exp(-2 G)) / Z (rad/(N m s))
 
     def seen_through(self, end: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """What an impedance at one end looks like at the other.
-
-        Parameters
-        ----------
-        end : ndarray of complex
-            Impedance at the far end (N m s/rad).
-
-        Returns
-        -------
-        impedance : ndarray of complex
-            At the near end (N m s/rad).
-        transfer : ndarray of complex
-            Speed of the far end over that of the near end.
-        """
+        """What an impedance at one end looks like at the other."""
         both = 1.0 + self.decay**2
         ratio = both + end * self.shunt
         return (end * both + self.series) / ratio, 2.0 * self.decay / ratio
@@ -119,38 +96,23 @@ def _lump(section: Section, s: ComplexArray) -> ComplexArray:
 
 
 class EndMobility(NamedTuple):
-    """Speeds at the two ends per torque, and the torque that the pipe carries at its top.
+    """Speeds at the two ends per torque, and the torque that the pipe carries at its top."""
 
-    Attributes
-    ----------
-    top, bit : ndarray of complex
-        Speed of an end per forward torque on it (rad/s per N m).
-    transfer : ndarray of complex
-        Speed of either end per forward torque on the other (rad/s per N m).
-    pipe_from_top, pipe_from_bit : ndarray of complex
-        Pipe torque, positive when the top leads, per torque on either end (1).
-    """
-
+    # speed of an end per forward torque on it (rad/s per N m)
     top: ComplexArray
     bit: ComplexArray
-    transfer: ComplexArray
+    transfer: ComplexArray  # speed of either end per forward torque on the other (rad/s per N m)
+    # pipe torque, positive when the top leads, per torque on either end (1)
     pipe_from_top: ComplexArray
     pipe_from_bit: ComplexArray
 
 
 @dataclass(frozen=True)
 class Lines:
-    """A string as transmission lines between inertias.
+    """A string as transmission lines between inertias."""
 
-    Attributes
-    ----------
-    parts : Parts
-        Sections and ends; modal damping has no place in a line and must be zero.
-    model : {'finite-elements', 'wave'}
-        Whether a section is its chain of elements, or the continuum.
-    """
-
-    parts: Parts
+    parts: Parts  # sections and ends; modal damping has no place in a line and must be zero
+    # {'finite-elements', 'wave'}: Whether a section is its chain of elements, or the continuum
     model: Model
 
     def mobility(
@@ -159,21 +121,7 @@ class Lines:
         top: ComplexArray | complex = 0.0,
         bit: ComplexArray | complex = 0.0,
     ) -> EndMobility:
-        """Response to torques on the two ends.
-
-        Parameters
-        ----------
-        s : ndarray of complex
-            Complex frequencies (1/s), not zero; i omega for a frequency response.
-        top, bit : complex or ndarray of complex
-            What the top drive's controller and the rock add at the ends: torque against the
-            motion per speed (N m s/rad). A torque that falls with speed is negative.
-
-        Returns
-        -------
-        EndMobility
-            At each frequency.
-        """
+        """Response to torques on the two ends."""
         s = np.asarray(s, dtype=complex)
         above, below = self._ends(s, top, bit)
         down, transfer = self._from_bit(s, below)

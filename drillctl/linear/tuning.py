@@ -12,13 +12,7 @@ from drillctl.linear.counting import natural_frequencies
 
 
 def pipe_impedance(string: Drillstring) -> float:
-    """Characteristic impedance of the uppermost pipe (N m s/rad): J sqrt(G rho).
-
-    Raises
-    ------
-    InputError
-        The uppermost section is a lumped spring.
-    """
+    """Characteristic impedance of the uppermost pipe (N m s/rad): J sqrt(G rho)."""
     first = string.parts.sections[0]
     if first.inertia == 0.0:
         raise InputError(
@@ -41,22 +35,7 @@ def _lowest_held(parts: Parts) -> float:
 def stiff_speed(
     string: Drillstring, stiffness: float = 50.0, rate: float = 5.0
 ) -> tuple[float, float]:
-    """Gains of a stiff speed controller: Kp = 50 zeta, Ki = 5 J_d.
-
-    Parameters
-    ----------
-    string : Drillstring
-        Gives pipe impedance zeta and drive inertia J_d.
-    stiffness : float
-        Kp over zeta.
-    rate : float
-        Ki over J_d (1/s2).
-
-    Returns
-    -------
-    tuple of float
-        Kp (N m s/rad) and Ki (N m/rad), the default of a public drilling simulator (NORCE).
-    """
+    """Gains of a stiff speed controller: Kp = 50 zeta, Ki = 5 J_d."""
     return stiffness * pipe_impedance(string), rate * string.parts.top_inertia
 
 
@@ -65,23 +44,6 @@ def soft_torque(string: Drillstring, share: float = 0.25) -> tuple[float, float]
 
     With this I the drive is a pure resistor at the stick-slip frequency w_s, and reflects
     (1 - share) / (1 + share) of a wave there.
-
-    Parameters
-    ----------
-    string : Drillstring
-        Gives pipe impedance zeta, drive inertia J_d and w_s.
-    share : float
-        Pipe impedance over that of the drive, above 0 and up to 1; 0.25 is usual.
-
-    Returns
-    -------
-    tuple of float
-        Kp (N m s/rad) and Ki (N m/rad).
-
-    Raises
-    ------
-    InputError
-        A share outside its range, or a lumped string.
     """
     if not (0.0 < share <= 1.0 and math.isfinite(share)):
         raise InputError(f"must be above 0 and at most 1, got {share:g}", "share")
@@ -101,18 +63,6 @@ def z_torque(string: Drillstring, absorption: float = 1.0) -> float:
     inertia compensated, and reflects (1 - a) / (1 + a) of every wave from below. The filters of a
     public model of it: motor lag 5 ms, encoder 2 ms, high-pass 20 s, as periods (time constant:
     that over 2 pi).
-
-    Parameters
-    ----------
-    string : Drillstring
-        Gives pipe impedance zeta.
-    absorption : float
-        a, from 0 (stiff) to 1 (absorbs every wave).
-
-    Returns
-    -------
-    float
-        m (rad/s per N m).
     """
     return absorption / pipe_impedance(string)
 
@@ -123,16 +73,6 @@ def torsional_rectification(string: Drillstring) -> float:
     After Tucker & Wang, J. Sound Vib. 224 (1999) 123-165: the top speed is made to follow the set
     speed less (pipe torque - its mean) / zeta, which absorbs each up-going wave. With an ideal
     drive it is the limit of impedance matching, and runs as such here.
-
-    Parameters
-    ----------
-    string : Drillstring
-        Gives pipe impedance zeta.
-
-    Returns
-    -------
-    float
-        m (rad/s per N m).
     """
     return z_torque(string, 1.0)
 
@@ -148,16 +88,6 @@ def active_damping(string: Drillstring) -> tuple[float, float]:
     both pairs of poles coincide, which is as much damping as the softer of two modes can have.
     After Jansen & van den Steen, J. Sound Vib. 179 (1995) 647-668, who tune their drive as an
     absorber of the first mode; the rule is ours.
-
-    Parameters
-    ----------
-    string : Drillstring
-        Gives k, drive inertia J_d and w_s.
-
-    Returns
-    -------
-    tuple of float
-        c_f (N m s/rad) and k_f (N m/rad).
     """
     inertia = string.parts.top_inertia
     spring = stick_slip_frequency(string) ** 2 * inertia

@@ -28,40 +28,24 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 
 class Feedback(NamedTuple):
-    """Torque on the bit per motion: T_b' = bit w_b + top w_top + torque T_top.
+    """Torque on the bit per motion: T_b' = bit w_b + top w_top + torque T_top."""
 
-    Attributes
-    ----------
-    bit, top : ndarray of complex or float
-        Per bit speed and top speed (N m s/rad).
-    torque : ndarray of complex or float
-        Per torque of the drive.
-    """
-
+    # per bit speed and top speed (N m s/rad)
     bit: Any
     top: Any
-    torque: Any
+    torque: Any  # per torque of the drive
 
 
 @dataclass(frozen=True, eq=False)
 class WeightPath:
-    """From the bit speed, or what stands for it, to the torque of the rock.
+    """From the bit speed, or what stands for it, to the torque of the rock."""
 
-    Attributes
-    ----------
-    gain : float
-        g K_w, torque per bit speed at rest of all lags (N m s/rad).
-    delay, sensor, hoist : float
-        Total delay and the time constants of sensor and hoist (s).
-    observer : Observer or None
-        In place of a sensor.
-    """
-
-    gain: float
+    gain: float  # g K_w, torque per bit speed at rest of all lags (N m s/rad)
+    # total delay and the time constants of sensor and hoist (s)
     delay: float
     sensor: float
     hoist: float
-    observer: Observer | None
+    observer: Observer | None  # in place of a sensor
 
     def feedback(self, s: ComplexArray) -> Feedback:
         """Torque per motion at complex frequencies `s` (1/s)."""
@@ -94,18 +78,10 @@ def weight_path(design: Design, speed: float) -> WeightPath | None:
 
 @dataclass(frozen=True, eq=False)
 class BitSide:
-    """What closes the loop at the bit: the slope of the rock, and the weight that moves.
+    """What closes the loop at the bit: the slope of the rock, and the weight that moves."""
 
-    Attributes
-    ----------
-    slope : float
-        Falling slope D of the rock at constant weight (N m s/rad).
-    path : WeightPath or None
-        Of a weight that moves.
-    """
-
-    slope: float
-    path: WeightPath | None = None
+    slope: float  # falling slope D of the rock at constant weight (N m s/rad)
+    path: WeightPath | None = None  # of a weight that moves
 
     def top_impedance(self, ends: Ends, s: ComplexArray) -> ComplexArray:
         """Torque per speed at the top (N m s/rad), drive inertia included, the bit closed."""

@@ -32,22 +32,7 @@ REAL = 1e-6
 
 
 def whole_crossings(ends: Ends, drive: TopDriveLaw, bit: BitSide) -> Crossings:
-    """All slopes at which poles reach the imaginary axis.
-
-    Parameters
-    ----------
-    ends : Ends
-        The string.
-    drive : TopDriveLaw
-        Any.
-    bit : BitSide
-        Its moving weight; its slope does not matter.
-
-    Returns
-    -------
-    Crossings
-        Lowest first; slopes may be negative.
-    """
+    """All slopes at which poles reach the imaginary axis."""
 
     def impedance(omega: Array) -> NDArray[np.complex128]:
         s = 1j * omega
@@ -67,22 +52,7 @@ def whole_crossings(ends: Ends, drive: TopDriveLaw, bit: BitSide) -> Crossings:
 
 
 def weight_delay_margin(ends: Ends, drive: TopDriveLaw, bit: BitSide) -> tuple[float, float | None]:
-    """Longest further delay of a moving weight that a stable loop bears.
-
-    Parameters
-    ----------
-    ends, drive : Ends, TopDriveLaw
-        String and drive.
-    bit : BitSide
-        Slope of the rock at constant weight, and the weight's path.
-
-    Returns
-    -------
-    delay : float
-        Seconds; infinite if the loop bears any.
-    frequency : float or None
-        Of the instability (rad/s).
-    """
+    """Longest further delay of a moving weight that a stable loop bears."""
 
     def both(omega: Array) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         s = 1j * omega

@@ -89,13 +89,7 @@ def bode(
 
 
 def listed(result: Any) -> list[Any]:
-    """Results as a list, whether one was given or a sequence of them.
-
-    Raises
-    ------
-    InputError
-        An empty sequence.
-    """
+    """Results as a list, whether one was given or a sequence of them."""
     results = list(result) if isinstance(result, Sequence) else [result]
     if not results:
         raise InputError("nothing to draw: give one result or more")

@@ -351,20 +351,7 @@ def _turns(loop: ComplexArray, analysis: LoopAnalysis | None) -> str:
 
 
 def turns_about_critical(loop: ComplexArray, at_rest: int) -> int | None:
-    """How often L and its mirror go counter-clockwise about -1.
-
-    Parameters
-    ----------
-    loop : ndarray of complex, shape (frequencies,)
-        L by rising frequency.
-    at_rest : int
-        Poles of L at zero, passed on the right: each takes half a turn.
-
-    Returns
-    -------
-    int or None
-        None where the frequencies are too coarse or too few to tell.
-    """
+    """How often L and its mirror go counter-clockwise about -1."""
     step = np.diff(np.unwrap(np.angle(1.0 + loop)))
     if np.abs(step).max(initial=0.0) > 0.5 * np.pi:
         return None

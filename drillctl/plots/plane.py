@@ -30,20 +30,11 @@ NAMES = {
 
 
 class Plane(NamedTuple):
-    """Axes of a picture over two parameters.
+    """Axes of a picture over two parameters."""
 
-    Attributes
-    ----------
-    figure : Figure
-        The whole picture.
-    ax : Axes
-        Labelled and titled.
-    x, y : ndarray
-        Values of the parameters in the units people read.
-    """
-
-    figure: Figure
-    ax: Axes
+    figure: Figure  # the whole picture
+    ax: Axes  # labelled and titled
+    # values of the parameters in the units people read
     x: NDArray[np.float64]
     y: NDArray[np.float64]
 
@@ -51,26 +42,7 @@ class Plane(NamedTuple):
 def plane(
     result: Any, ax: Axes | None, height: float, system: units.System, what: str = "a map shows"
 ) -> Plane:
-    """The plane of a result over two parameters.
-
-    Parameters
-    ----------
-    result : Sweep, AdaptiveMap, ThreeRegions, LoopMap
-        Anything with `.design` and `.axes`.
-    ax : Axes, optional
-        Axes to draw on.
-    height : float
-        Of a new figure (inches).
-    system : {'si', 'field'}
-        Units of the axes.
-    what : str
-        Subject of the sentence that refuses another number of parameters.
-
-    Raises
-    ------
-    InputError
-        The result has another number of parameters than two.
-    """
+    """The plane of a result over two parameters."""
     if len(result.axes) != 2:
         raise InputError(f"{what} 2 parameters, the result has {len(result.axes)}")
     figure, ax = axes_or_new(ax, 8.0, height)

@@ -78,18 +78,7 @@ def root_locus(result: RootLocus, ax: Axes | None = None, system: units.System =
 
 
 def mirrored(poles: ComplexArray) -> ComplexArray:
-    """Tracks in the upper half plane, each pair once.
-
-    Parameters
-    ----------
-    poles : ndarray of complex, shape (values, tracks)
-        Poles (1/s).
-
-    Returns
-    -------
-    ndarray of complex, shape (values, tracks or fewer)
-        Poles of the lower half mirrored; of two tracks that then are one, the first.
-    """
+    """Tracks in the upper half plane, each pair once."""
     folded = poles.real + 1j * np.abs(poles.imag)
     kept: list[ComplexArray] = []
     for track in folded.T:

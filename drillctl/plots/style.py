@@ -36,36 +36,12 @@ GRID = "#DDDDDD"
 
 
 def figure(width: float = 7.0, height: float = 4.5) -> Figure:
-    """An empty figure with constrained layout, unknown to pyplot.
-
-    Parameters
-    ----------
-    width, height : float
-        Size (inches).
-
-    Returns
-    -------
-    Figure
-        Not shown, nor ever will be by itself.
-    """
+    """An empty figure with constrained layout, unknown to pyplot."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.5) -> tuple[Figure, Axes]:
-    """The axes given and their figure, or new ones.
-
-    Parameters
-    ----------
-    ax : Axes or None
-        Axes to draw on.
-    width, height : float
-        Size of a new figure (inches).
-
-    Returns
-    -------
-    tuple of Figure and Axes
-        The outermost figure that holds the axes.
-    """
+    """The axes given and their figure, or new ones."""
     if ax is None:
         fresh = figure(width, height)
         return fresh, fresh.add_subplot()
@@ -81,29 +57,7 @@ def grid_or_new(
     share_x: bool = False,
     share_y: bool = False,
 ) -> tuple[Figure, list[Axes]]:
-    """The panels given and their figure, or a new grid of them.
-
-    Parameters
-    ----------
-    ax : sequence of Axes or None
-        Panels to draw on, row by row.
-    rows, columns : int
-        Panels needed.
-    width, height : float
-        Size of a new figure (inches).
-    share_x, share_y : bool
-        Whether the panels of a new figure share these axes.
-
-    Returns
-    -------
-    tuple of Figure and list of Axes
-        Row by row.
-
-    Raises
-    ------
-    InputError
-        Not as many axes as panels.
-    """
+    """The panels given and their figure, or a new grid of them."""
     if ax is None:
         fresh = figure(width, height)
         grid = fresh.subplots(rows, columns, sharex=share_x, sharey=share_y, squeeze=False)
@@ -115,15 +69,7 @@ def grid_or_new(
 
 
 def dress(ax: Axes, x: str, y: str, title: str = "") -> None:
-    """Label axes and set them in the shared look.
-
-    Parameters
-    ----------
-    ax : Axes
-        To be dressed.
-    x, y, title : str
-        Labels, with the unit in brackets, and title.
-    """
+    """Label axes and set them in the shared look."""
     ax.set_xlabel(x, fontsize=LABEL)
     ax.set_ylabel(y, fontsize=LABEL)
     if title:

@@ -190,13 +190,6 @@ def border(probability: float, total: int) -> float:
     """Share of the draws between the largest out of a region and the smallest in it.
 
     A contour through a share that draws can have would be a matter of rounding.
-
-    Parameters
-    ----------
-    probability : float
-        Of the region.
-    total : int
-        Draws.
     """
     return (needed(probability, total) - 0.5) / total
 

@@ -15,15 +15,7 @@ if TYPE_CHECKING:
 
 
 def tune(result: Tune, system: units.System) -> None:
-    """Gains with their tolerance, the certificate, and what they are set beside.
-
-    Parameters
-    ----------
-    result : Tune
-        To be told.
-    system : {'si', 'field'}
-        Units of the parameters.
-    """
+    """Gains with their tolerance, the certificate, and what they are set beside."""
     _gains(result, system)
     _beside(result, system)
     _certificate(result)

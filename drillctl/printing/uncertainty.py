@@ -15,15 +15,7 @@ if TYPE_CHECKING:
 
 
 def uncertainty(result: Uncertainty, system: units.System) -> None:
-    """Areas, best cells, indices, failures and audit.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        To be told.
-    system : {'si', 'field'}
-        Units of the parameters.
-    """
+    """Areas, best cells, indices, failures and audit."""
     _areas(result)
     for one in result.slices().values():
         _areas(one)

@@ -34,23 +34,7 @@ PART = 10
 
 
 def traced(design: Design, folder: Path, progress: Progress) -> dict[str, Any]:
-    """Write what the cells of the map beside hold.
-
-    Parameters
-    ----------
-    design : Design
-        Of the map.
-    folder : Path
-        To write into; the map is in the folder `map` beside it.
-    progress : Progress
-        Told of responses.
-
-    Returns
-    -------
-    dict
-        `best` and `bad`, parameters (SI) of two cells by path, None where there is none; `own`,
-        the cell nearest to the design's own values; `traced`, the number of responses.
-    """
+    """Write what the cells of the map beside hold."""
     result = store.open(folder.parent / "map")
     own = _own(design, result.axes)
     best, bad = _best(result), _bad(result)
@@ -83,17 +67,7 @@ def traced(design: Design, folder: Path, progress: Progress) -> dict[str, Any]:
 
 
 def shown(folder: Path, result: Sweep, words: Words) -> dict[str, object]:
-    """What `traced` wrote, with axes in the units of a reader.
-
-    Parameters
-    ----------
-    folder : Path
-        That was written into.
-    result : Sweep
-        The map.
-    words : Words
-        Units of the reader.
-    """
+    """What `traced` wrote, with axes in the units of a reader."""
     held: dict[str, object] = json.loads((folder / FILE).read_text(encoding="utf-8"))
     held["axes"] = [
         {

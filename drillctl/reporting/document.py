@@ -12,18 +12,7 @@ from drillctl.reporting.sections import KINDS, SECTIONS
 
 
 def chosen_sections(asked: Iterable[str] | None) -> tuple[str, ...]:
-    """Names of sections in the order in which they are read; all if none are asked for.
-
-    Parameters
-    ----------
-    asked : iterable of str or None
-        Names.
-
-    Raises
-    ------
-    InputError
-        No section of that name, or no name at all.
-    """
+    """Names of sections in the order in which they are read; all if none are asked for."""
     if asked is None:
         return tuple(SECTIONS)
     names = [name.strip() for name in asked if name.strip()]
@@ -36,28 +25,12 @@ def chosen_sections(asked: Iterable[str] | None) -> tuple[str, ...]:
 
 
 def studies_of(sections: Iterable[str]) -> tuple[str, ...]:
-    """Studies that some sections read.
-
-    Parameters
-    ----------
-    sections : iterable of str
-        Their names.
-    """
+    """Studies that some sections read."""
     return tuple(dict.fromkeys(name for one in sections for name in SECTIONS[one].studies))
 
 
 def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> Document:
-    """The document of a design.
-
-    Parameters
-    ----------
-    gathered : Gathered
-        Its studies.
-    sections : iterable of str
-        Names of the sections that are asked for.
-    title : str or None
-        Instead of the design's own.
-    """
+    """The document of a design."""
     names = set(sections)
     made, left_out = [], []
     for kind in KINDS:

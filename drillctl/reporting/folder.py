@@ -20,26 +20,7 @@ NAMES = {"html": "report.html", "pdf": "report.pdf", "md": "report.md"}
 def write(
     document: Document, album: Album, folder: Path, formats: tuple[str, ...]
 ) -> tuple[dict[str, Path], dict[str, str]]:
-    """Write a document in some formats, and its tables.
-
-    Parameters
-    ----------
-    document : Document
-        Of a design.
-    album : Album
-        Its pictures.
-    folder : Path
-        To write into.
-    formats : tuple of str
-        Names of `NAMES`.
-
-    Returns
-    -------
-    written : dict of Path
-        By format.
-    unwritten : dict of str
-        Why a format could not be written.
-    """
+    """Write a document in some formats, and its tables."""
     written: dict[str, Path] = {}
     unwritten: dict[str, str] = {}
     _write_tables(document, folder / "tables")
@@ -60,15 +41,7 @@ def write(
 
 
 def unfinished(folder: Path, content: dict[str, Any]) -> None:
-    """Write what is known of a report that is not complete; its run goes on when asked again.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the report.
-    content : dict
-        Its summary.
-    """
+    """Write what is known of a report that is not complete; its run goes on when asked again."""
     write_json(folder / "summary.json", content)
 
 

@@ -23,13 +23,7 @@ State = Literal["done", "failed", "interrupted", "left_out", "not_asked"]
 
 
 class NotThereError(DrillctlError):
-    """A section needs a study that is not there.
-
-    Parameters
-    ----------
-    why : str
-        Reason, for the reader.
-    """
+    """A section needs a study that is not there."""
 
     def __init__(self, why: str) -> None:
         self.why = why
@@ -38,25 +32,14 @@ class NotThereError(DrillctlError):
 
 @dataclass(frozen=True)
 class Study:
-    """One study of a report.
+    """One study of a report."""
 
-    Attributes
-    ----------
-    name, title : str
-        Of its folder, and in messages.
-    state : {'done', 'failed', 'interrupted', 'left_out', 'not_asked'}
-        What became of it.
-    why : str
-        Reason, if it is not done.
-    folder : Path
-        Where it is.
-    """
-
+    # of its folder, and in messages
     name: str
     title: str
-    state: State
-    why: str
-    folder: Path
+    state: State  # {'done', 'failed', 'interrupted', 'left_out', 'not_asked'}: What became of it
+    why: str  # reason, if it is not done
+    folder: Path  # where it is
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -78,36 +61,16 @@ class Study:
 
 @dataclass(frozen=True)
 class Gathered:
-    """A design with its studies, of which the sections are made.
+    """A design with its studies, of which the sections are made."""
 
-    Attributes
-    ----------
-    design : Design
-        As the profile cuts it.
-    asked : Design
-        As it was given.
-    profile : Profile
-        What was spent.
-    words : Words
-        Units of the reader.
-    studies : dict of Study
-        By name.
-    """
-
-    design: Design
-    asked: Design
-    profile: Profile
-    words: Words
-    studies: dict[str, Study] = field(repr=False)
+    design: Design  # as the profile cuts it
+    asked: Design  # as it was given
+    profile: Profile  # what was spent
+    words: Words  # units of the reader
+    studies: dict[str, Study] = field(repr=False)  # by name
 
     def need(self, name: str) -> Study:
-        """A study that is done.
-
-        Raises
-        ------
-        NotThereError
-            It is not.
-        """
+        """A study that is done."""
         study = self.studies[name]
         if study.state != "done":
             raise NotThereError(study.why)
@@ -146,34 +109,7 @@ def gather(
     words: Words,
     progress: Progress = SILENT,
 ) -> Gathered:
-    """Read or do the studies of a report.
-
-    Parameters
-    ----------
-    design : Design
-        As it was given.
-    profile : Profile
-        What may be spent.
-    folder : Path
-        Each study is in a folder of its name below it.
-    wanted : iterable of str
-        Names of the studies.
-    words : Words
-        Units of the reader.
-    progress : Progress
-        Told of what is being done.
-
-    Returns
-    -------
-    Gathered
-        A study that fails says so in its place, and so does one that is interrupted: those after
-        it are not begun then.
-
-    Raises
-    ------
-    InputError
-        A folder holds another run.
-    """
+    """Read or do the studies of a report."""
     cut = profile.applied(design)
     names = _with_needs(wanted)
     found: dict[str, Study] = {}

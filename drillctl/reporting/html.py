@@ -21,15 +21,7 @@ SHORT = 26
 
 
 def page(document: Document, album: Album) -> str:
-    """The whole document.
-
-    Parameters
-    ----------
-    document : Document
-        Of a design.
-    album : Album
-        Its pictures.
-    """
+    """The whole document."""
 
     def drawn(figure: Figure) -> dict[str, Any]:
         picture = album.picture(figure)

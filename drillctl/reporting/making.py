@@ -30,30 +30,14 @@ FORMATS: tuple[Format, ...] = ("html", "pdf", "md")
 
 @dataclass(frozen=True)
 class Report:
-    """A report on disk.
+    """A report on disk."""
 
-    Attributes
-    ----------
-    folder : Path
-        Where it is.
-    files : dict of Path
-        Files by format: `html`, `pdf`, `md`.
-    problems : tuple of str
-        What failed or was not finished; empty for a complete report.
-    interrupted : bool
-        Whether it was interrupted; the same call goes on.
-    unwritten : dict of str
-        Formats that could not be written, with the reason.
-    content : dict
-        What `summary.json` holds.
-    """
-
-    folder: Path
-    files: dict[str, Path]
-    problems: tuple[str, ...]
-    interrupted: bool
-    unwritten: dict[str, str]
-    content: dict[str, Any]
+    folder: Path  # where it is
+    files: dict[str, Path]  # files by format: `html`, `pdf`, `md`
+    problems: tuple[str, ...]  # what failed or was not finished; empty for a complete report
+    interrupted: bool  # whether it was interrupted; the same call goes on
+    unwritten: dict[str, str]  # formats that could not be written, with the reason
+    content: dict[str, Any]  # what `summary.json` holds
 
     def summary(self) -> dict[str, Any]:
         """Verdict, problems, files and the summaries of the studies; SI units."""

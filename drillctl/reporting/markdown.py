@@ -22,15 +22,7 @@ _MARKS = re.compile(r"([\\`*_{}\[\]#|~])")
 
 
 def page(document: Document, album: Album) -> str:
-    """The whole document.
-
-    Parameters
-    ----------
-    document : Document
-        Of a design.
-    album : Album
-        Its pictures.
-    """
+    """The whole document."""
     lines = [f"# {_text(document.title)}", ""]
     if document.problems:
         lines += ["**This report is not complete.**", ""]

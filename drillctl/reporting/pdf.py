@@ -35,25 +35,7 @@ def browser() -> str | None:
 
 
 def printed(page: Path, target: Path) -> Path:
-    """Print a page.
-
-    Parameters
-    ----------
-    page : Path
-        HTML file.
-    target : Path
-        PDF file.
-
-    Returns
-    -------
-    Path
-        The target.
-
-    Raises
-    ------
-    DrillctlError
-        There is no browser, or it did not print.
-    """
+    """Print a page."""
     command = browser()
     if command is None:
         raise DrillctlError(

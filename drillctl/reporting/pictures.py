@@ -28,25 +28,15 @@ _METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture on disk.
+    """A picture on disk."""
 
-    Attributes
-    ----------
-    name : str
-        Of its files.
-    width, height : float
-        Size (points).
-    box : tuple of float
-        Its first axes: left, top, width, height as shares of the picture.
-    folder : Path
-        Where `name.svg` and `name.png` are.
-    """
-
-    name: str
+    name: str  # of its files
+    # size (points)
     width: float
     height: float
+    # its first axes: left, top, width, height as shares of the picture
     box: tuple[float, float, float, float]
-    folder: Path
+    folder: Path  # where `name.svg` and `name.png` are
 
     @property
     def svg(self) -> str:
@@ -60,15 +50,7 @@ class Picture:
 
 
 class Album:
-    """The pictures of a report in their folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-    gathered : Gathered
-        What tells whether a picture may be kept.
-    """
+    """The pictures of a report in their folder."""
 
     def __init__(self, folder: Path, gathered: Gathered) -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -164,13 +146,7 @@ _COLOURS = re.compile("|".join(_INKS), re.IGNORECASE)
 
 
 def themed(svg: str) -> str:
-    """A picture that turns light on dark ground where the reader's screen is dark.
-
-    Parameters
-    ----------
-    svg : str
-        As it was drawn, dark on white.
-    """
+    """A picture that turns light on dark ground where the reader's screen is dark."""
     svg = _COLOURS.sub(lambda found: f"var(--{_INKS[found[0].lower()][0]})", svg)
     light = "".join(f"--{name}:{colour};" for name, colour, _ in _INKS.values())
     dark = "".join(f"--{name}:{colour};" for name, _, colour in _INKS.values())

@@ -10,53 +10,26 @@ from drillctl.design import Design
 
 @dataclass(frozen=True)
 class Profile:
-    """What a report spends on its studies.
+    """What a report spends on its studies."""
 
-    Attributes
-    ----------
-    name : str
-        By which it is asked for.
-    told : str
-        One line of what it means, for people.
-    points : int or None
-        Most points along an axis of the map; None for those of the design.
-    audited : int or None
-        Cells of the map that are simulated again with the reference solver; None for as many as
-        the design says.
-    realizations : int or None
-        Most draws over the map; None for those of the design.
-    lanes : int
-        Most lanes over the map and all draws.
-    setting : int
-        Draws at the design's own setting alone.
-    drawn_audit : int or None
-        Lanes under uncertainty that are simulated again; None for as many as cells.
-    sensitivity : bool
-        Whether Sobol indices are computed where the design asks for them.
-    compared, tuned : bool
-        Whether the cases of the design are compared, and its gains tuned.
-    """
-
-    name: str
-    told: str
-    points: int | None
+    name: str  # by which it is asked for
+    told: str  # one line of what it means, for people
+    points: int | None  # most points along an axis of the map; None for those of the design
+    # cells of the map that are simulated again with the reference solver; None for as many as the
+    # design says
     audited: int | None
-    realizations: int | None
-    lanes: int
-    setting: int
+    realizations: int | None  # most draws over the map; None for those of the design
+    lanes: int  # most lanes over the map and all draws
+    setting: int  # draws at the design's own setting alone
+    # lanes under uncertainty that are simulated again; None for as many as cells
     drawn_audit: int | None
-    sensitivity: bool
+    sensitivity: bool  # whether Sobol indices are computed where the design asks for them
+    # whether the cases of the design are compared, and its gains tuned
     compared: bool
     tuned: bool
 
     def applied(self, design: Design) -> Design:
-        """The design with its map and draws cut down to what the profile spends.
-
-        Parameters
-        ----------
-        design : Design
-            As it was loaded.
-        """
+        """The design with its map and draws cut down to what the profile spends."""
         values: dict[str, Any] = {}
         if self.points is not None and any(a.points > self.points for a in design.tables.map.axes):
             values["map.axes"] = [

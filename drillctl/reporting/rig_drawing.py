@@ -30,20 +30,7 @@ class _Part(NamedTuple):
 
 
 def rig_drawing(design: Design, words: Words) -> Figure:
-    """Draw a rig, depth downward.
-
-    Parameters
-    ----------
-    design : Design
-        Whose rig.
-    words : Words
-        Units of the reader.
-
-    Returns
-    -------
-    Figure
-        Depth to scale but for sections too short to be seen; widths by outer diameter.
-    """
+    """Draw a rig, depth downward."""
     figure, ax = style.axes_or_new(None, 6.4, 6.2)
     ax.set_xlim(-0.5, 1.0)
     ax.set_ylim(1.16, -0.16)

@@ -28,21 +28,11 @@ FINE = 0.05
 
 @dataclass(frozen=True)
 class Asked:
-    """What a study is asked.
+    """What a study is asked."""
 
-    Attributes
-    ----------
-    design : Design
-        To be studied.
-    profile : Profile
-        What may be spent.
-    found : mapping of Study
-        The studies before it.
-    """
-
-    design: Design
-    profile: Profile
-    found: Found
+    design: Design  # to be studied
+    profile: Profile  # what may be spent
+    found: Found  # the studies before it
 
 
 def _applies(asked: Asked) -> str:
@@ -58,45 +48,21 @@ def _summary(result: Any) -> dict[str, Any]:
 
 
 class Recipe(NamedTuple):
-    """One study of a report.
+    """One study of a report."""
 
-    Attributes
-    ----------
-    name : str
-        Of its folder.
-    title : str
-        What it is called in messages.
-    verb : str
-        Command that would make the same folder.
-    compute : callable
-        The result, from its design, its folder and the progress.
-    missing : callable
-        Why it does not apply; empty where it does.
-    variant : callable
-        The design that is studied.
-    needs : tuple of str
-        Studies that must be done before.
-    settings : dict
-        What the result depends on beside its design.
-    growing : bool
-        Whether more draws may be added later.
-    write : bool
-        Whether the result is one that the store writes.
-    told : callable
-        The summary of a result.
-    """
-
-    name: str
-    title: str
-    verb: str
+    name: str  # of its folder
+    title: str  # what it is called in messages
+    verb: str  # command that would make the same folder
+    # the result, from its design, its folder and the progress
     compute: Callable[[Design, RunFolder, Progress], Any]
-    missing: Callable[[Asked], str] = _applies
-    variant: Callable[[Asked], Design] = _as_asked
-    needs: tuple[str, ...] = ()
+    missing: Callable[[Asked], str] = _applies  # why it does not apply; empty where it does
+    variant: Callable[[Asked], Design] = _as_asked  # the design that is studied
+    needs: tuple[str, ...] = ()  # studies that must be done before
+    # what the result depends on beside its design
     settings: Mapping[str, Any] = MappingProxyType({})
-    growing: bool = False
-    write: bool = True
-    told: Callable[[Any], dict[str, Any]] = _summary
+    growing: bool = False  # whether more draws may be added later
+    write: bool = True  # whether the result is one that the store writes
+    told: Callable[[Any], dict[str, Any]] = _summary  # the summary of a result
 
 
 def level_of(design: Design) -> float:

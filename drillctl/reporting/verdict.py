@@ -23,28 +23,14 @@ PASSES, FAILS, OPEN = "passes", "does not pass", "is not decided"
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a report says of the current setting.
+    """What a report says of the current setting."""
 
-    Attributes
-    ----------
-    word : str
-        `passes`, `does not pass` or `is not decided`.
-    checks : tuple of Check
-        What it follows from.
-    """
-
-    word: str
-    checks: tuple[Check, ...]
+    word: str  # `passes`, `does not pass` or `is not decided`
+    checks: tuple[Check, ...]  # what it follows from
 
 
 def verdict(gathered: Gathered) -> Verdict:
-    """Judge the current setting from the studies that are there.
-
-    Parameters
-    ----------
-    gathered : Gathered
-        Loop, run and draws at the setting, as far as they are done.
-    """
+    """Judge the current setting from the studies that are there."""
     checks = (_stable(gathered), _keeps_level(gathered), _probable(gathered), _strong(gathered))
     known = tuple(check for check in checks if check is not None)
     answers = [check.answer for check in known]

@@ -17,15 +17,7 @@ _INCH = 0.0254
 
 
 def number(value: float | None, digits: int = 4) -> str:
-    """A number with so many significant digits, without needless zeros.
-
-    Parameters
-    ----------
-    value : float or None
-        None and NaN are told as a dash.
-    digits : int
-        Significant digits.
-    """
+    """A number with so many significant digits, without needless zeros."""
     if value is None or math.isnan(value):
         return NOTHING
     if math.isinf(value):
@@ -63,15 +55,9 @@ def chance(share: float, interval: Iterable[float | None]) -> str:
 
 @dataclass(frozen=True)
 class Words:
-    """Quantities in a system of units.
+    """Quantities in a system of units."""
 
-    Attributes
-    ----------
-    system : {'si', 'field'}
-        Whose units.
-    """
-
-    system: units.System
+    system: units.System  # {'si', 'field'}: Whose units
 
     def quantity(self, value: float | None, si_unit: str, digits: int = 4) -> str:
         """A value in SI with the unit that people read."""

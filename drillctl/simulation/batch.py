@@ -50,48 +50,26 @@ FLOATS = (
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """What was measured of a number of lanes.
+    """What was measured of a number of lanes."""
 
-    Attributes
-    ----------
-    measures : dict of ndarray, shape (lanes,)
-        By the names of `FLOATS`; NaN where a measure is undefined.
-    status : ndarray of int8, shape (lanes,)
-        Index into `measures.STATUSES`.
-    """
-
+    # shape (lanes,): By the names of `FLOATS`; NaN where a measure is undefined
     measures: dict[str, Array]
-    status: NDArray[np.int8]
+    status: NDArray[np.int8]  # shape (lanes,): Index into `measures.STATUSES`
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A string and a scheme, ready for any number of lanes.
+    """A string and a scheme, ready for any number of lanes."""
 
-    Attributes
-    ----------
-    stepper : StringStep
-        The string's exact step.
-    scheme : Scheme
-        Step and modes.
-    duration, j1_from : float
-        Length of the run, and where the J1 window begins (s).
-    """
-
-    stepper: StringStep
-    scheme: Scheme
+    stepper: StringStep  # the string's exact step
+    scheme: Scheme  # step and modes
+    # length of the run, and where the J1 window begins (s)
     duration: float
     j1_from: float
 
 
 def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
-    """Choose step and modes and prepare the string.
-
-    Raises
-    ------
-    InputError
-        A given step is too long for the friction law, or the law is not one of this engine.
-    """
+    """Choose step and modes and prepare the string."""
     _refuse_printed_law(lanes)
     inertia = bit_inertia(lanes.string)
     period = lanes.drive.period if isinstance(lanes.drive, SampledDrive) else None
@@ -129,23 +107,7 @@ def _turns(lanes: Lanes) -> Array:
 
 
 def run_batch(lanes: Lanes, prepared: Prepared, give_up: float = math.inf) -> Batch:
-    """Simulate every lane.
-
-    Parameters
-    ----------
-    lanes : Lanes
-        On the string that was prepared.
-    prepared : Prepared
-        From `prepare`.
-    give_up : float
-        J1 (s) over which nothing more is asked of a lane: it is stopped soon after, its status
-        is `censored`, its J1 a lower bound, and it has no other measure. Infinite for none.
-
-    Returns
-    -------
-    Batch
-        The same bits for any order of lanes and any number of threads.
-    """
+    """Simulate every lane."""
     raw = [_run(part, prepared, 0, give_up)[0] for part in _chunks(lanes)]
     return _measured(np.concatenate(raw, axis=1), lanes, prepared)
 
@@ -157,24 +119,7 @@ def warm_up(lanes: Lanes, prepared: Prepared) -> None:
 
 
 def trace(lanes: Lanes, prepared: Prepared, interval: float) -> tuple[Array, dict[str, Array]]:
-    """Signals of every lane at equal intervals.
-
-    Parameters
-    ----------
-    lanes : Lanes
-        On the string that was prepared.
-    prepared : Prepared
-        From `prepare`.
-    interval : float
-        Sampling interval (s); rounded to a whole number of steps.
-
-    Returns
-    -------
-    time : ndarray, shape (samples,)
-        Sampling times (s).
-    signals : dict of ndarray, shape (samples, lanes)
-        By the names of `kernels.advance.TRACED`.
-    """
+    """Signals of every lane at equal intervals."""
     from drillctl.simulation.kernels.advance import TRACED
 
     every = max(1, round(interval / prepared.scheme.step))

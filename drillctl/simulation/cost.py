@@ -12,18 +12,11 @@ DOUBLE = 8
 
 @dataclass(frozen=True)
 class Count:
-    """What a step asks of the modal pass, per lane and mode.
+    """What a step asks of the modal pass, per lane and mode."""
 
-    Attributes
-    ----------
-    flops : float
-        Double-precision operations; a multiply-add is two.
-    bytes : float
-        Of the modal state, read and written; what is shared by lanes is not counted, nor the
-        sums, which fit in registers.
-    """
-
-    flops: float
+    flops: float  # double-precision operations; a multiply-add is two
+    # of the modal state, read and written; what is shared by lanes is not counted, nor the sums,
+    # which fit in registers
     bytes: float
 
     @property
@@ -33,13 +26,7 @@ class Count:
 
 
 def count(string: Any) -> Count:
-    """Operations and bytes of a string made ready, a mode of it.
-
-    Parameters
-    ----------
-    string : UndampedString, BlockString or DenseString
-        What the kernels take, `kernels/string_step.py`.
-    """
+    """Operations and bytes of a string made ready, a mode of it."""
     if isinstance(string, UndampedString):
         return _undamped(string)
     if isinstance(string, BlockString):

@@ -30,22 +30,13 @@ NOTHING: Array = np.empty(0)
 
 
 class Top(NamedTuple):
-    """What a drive sees of the string at a moment, in the frame.
+    """What a drive sees of the string at a moment, in the frame."""
 
-    Attributes
-    ----------
-    time : float
-        Since the start (s).
-    angle, speed : float
-        Of the top drive (rad, rad/s).
-    free, gain : float
-        Its acceleration were there no torque of the drive (rad/s2), and per torque
-        (1/(kg m2)).
-    """
-
-    time: float
+    time: float  # since the start (s)
+    # of the top drive (rad, rad/s)
     angle: float
     speed: float
+    # its acceleration were there no torque of the drive (rad/s2), and per torque (1/(kg m2))
     free: float
     gain: float
 

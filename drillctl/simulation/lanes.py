@@ -25,45 +25,24 @@ SPEEDS = 161
 
 @dataclass(frozen=True, eq=False)
 class Lanes:
-    """Any number of rigs that share a string, the types of their laws and the kind of start.
+    """Any number of rigs that share a string, the types of their laws and the kind of start."""
 
-    Attributes
-    ----------
-    string : Drillstring
-        Shared by all lanes.
-    friction, drive, weight : NamedTuple
-        Laws with an array, shape (lanes,), for each of their numbers.
-    set_speed : ndarray, shape (lanes,)
-        Final set speed (rad/s).
-    turning_speed : ndarray, shape (lanes,)
-        Speed of all nodes at time zero of a start that turns (rad/s).
-    nominal_weight : ndarray, shape (lanes,)
-        Nominal weight on bit (N).
-    table_low, table_high : ndarray, shape (lanes,)
-        Range of the friction table (N).
-    before : NamedTuple
-        Bit-rock law before the rock changes, of the type of `friction`.
-    program : Program
-        What changes by the clock, with an array for each number.
-    observer : Observer or None
-        Of the bit, shared by all lanes.
-    start : {'rest', 'turning', 'wound_up'}
-        Kind of start.
-    """
-
-    string: Drillstring
+    string: Drillstring  # shared by all lanes
+    # laws with an array, shape (lanes,), for each of their numbers
     friction: Any
     drive: Any
     weight: Any
-    set_speed: Array
+    set_speed: Array  # shape (lanes,): Final set speed (rad/s)
+    # shape (lanes,): Speed of all nodes at time zero of a start that turns (rad/s)
     turning_speed: Array
-    nominal_weight: Array
+    nominal_weight: Array  # shape (lanes,): Nominal weight on bit (N)
+    # shape (lanes,): Range of the friction table (N)
     table_low: Array
     table_high: Array
-    before: Any
-    program: Program
-    observer: Observer | None
-    start: Kind
+    before: Any  # bit-rock law before the rock changes, of the type of `friction`
+    program: Program  # what changes by the clock, with an array for each number
+    observer: Observer | None  # of the bit, shared by all lanes
+    start: Kind  # {'rest', 'turning', 'wound_up'}: Kind of start
 
     def __len__(self) -> int:
         return len(self.set_speed)
@@ -155,15 +134,7 @@ def lane_numbers(design: Design) -> dict[str, float]:
 
 
 def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
-    """Lanes on the string of `design`, with the types of its laws.
-
-    Parameters
-    ----------
-    design : Design
-        Gives string, laws' types and start.
-    numbers : dict of ndarray, shape (lanes,)
-        By the names of `lane_numbers`.
-    """
+    """Lanes on the string of `design`, with the types of its laws."""
 
     def law(part: str, like: Any) -> Any:
         return type(like)(*(np.ascontiguousarray(numbers[f"{part}.{f}"]) for f in like._fields))

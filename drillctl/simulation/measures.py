@@ -26,56 +26,31 @@ for the last 5 s; `censored`: stopped early on request; `failed`: no finite answ
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures of one run; SI units; None where a measure is undefined.
+    """Measures of one run; SI units; None where a measure is undefined."""
 
-    Attributes
-    ----------
-    j1 : float
-        Integral of abs(bit speed - set speed) / set speed over the J1 window (s).
-    j1_rate : float
-        `j1` over the length of its window.
-    stuck_time : float
-        Total time at rest (s).
-    sticks : int
-        Number of times the bit came to rest; a start at rest counts as one.
-    stick_slip_index : float or None
-        (max - min) / (2 mean) of the bit speed over the last 20 s; None if it never turned.
-    mean_bit_speed, min_bit_speed, peak_bit_speed : float
-        Over the whole run (rad/s).
-    peak_pipe_torque, peak_top_torque : float
-        Largest magnitude in the uppermost element and at the drive (N m).
-    settling_time, settling_time_wide : float or None
-        Time after which the bit speed stays within 2 % and 5 % of the set speed to the end
-        of the run (s); None if that is not so for the last 5 s.
-    mean_weight_on_bit : float
-        Time mean (N).
-    rop_proxy : float
-        Time mean of weight x abs(bit speed), over nominal weight x set speed.
-    work_at_bit : float
-        Work done on the rock (J).
-    work_per_turn : float or None
-        The same over the turns of the bit (J per revolution); None if it hardly turned.
-    time_outside_table : float
-        Time with the weight on bit outside the friction table (s).
-    """
-
-    j1: float
-    j1_rate: float
-    stuck_time: float
-    sticks: int
+    j1: float  # integral of abs(bit speed - set speed) / set speed over the J1 window (s)
+    j1_rate: float  # `j1` over the length of its window
+    stuck_time: float  # total time at rest (s)
+    sticks: int  # number of times the bit came to rest; a start at rest counts as one
+    # (max - min) / (2 mean) of the bit speed over the last 20 s; None if it never turned
     stick_slip_index: float | None
+    # over the whole run (rad/s)
     mean_bit_speed: float
     min_bit_speed: float
     peak_bit_speed: float
+    # largest magnitude in the uppermost element and at the drive (N m)
     peak_pipe_torque: float
     peak_top_torque: float
+    # time after which the bit speed stays within 2 % and 5 % of the set speed to the end of the
+    # run (s); None if that is not so for the last 5 s
     settling_time: float | None
     settling_time_wide: float | None
-    mean_weight_on_bit: float
-    rop_proxy: float
-    work_at_bit: float
+    mean_weight_on_bit: float  # time mean (N)
+    rop_proxy: float  # time mean of weight x abs(bit speed), over nominal weight x set speed
+    work_at_bit: float  # work done on the rock (J)
+    # the same over the turns of the bit (J per revolution); None if it hardly turned
     work_per_turn: float | None
-    time_outside_table: float
+    time_outside_table: float  # time with the weight on bit outside the friction table (s)
 
     def as_dict(self) -> dict[str, Any]:
         """The measures by name; None for what is undefined or not finite."""
@@ -88,24 +63,7 @@ class Measures:
 def status_of(
     finite: bool, stuck_in_window: float, window: float, settling_time_wide: float | None
 ) -> str:
-    """Judge a run.
-
-    Parameters
-    ----------
-    finite : bool
-        Whether every number of the run is finite.
-    stuck_in_window : float
-        Time stuck within the last `window` (s).
-    window : float
-        Its length (s).
-    settling_time_wide : float or None
-        Settling time to 5 % (s).
-
-    Returns
-    -------
-    str
-        One of `STATUSES`.
-    """
+    """Judge a run."""
     if not finite:
         return "failed"
     if stuck_in_window >= window * (1.0 - 1e-9):

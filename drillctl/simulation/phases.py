@@ -24,20 +24,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """Accelerations as a linear function of the motion and of the two end torques.
+    """Accelerations as a linear function of the motion and of the two end torques."""
 
-    Attributes
-    ----------
-    motion : ndarray, shape (nodes, 2 nodes)
-        Acceleration per angle (1/s2) and per speed (1/s).
-    load : ndarray, shape (nodes,)
-        Acceleration due to damping to ground at the set speed (rad/s2).
-    top, bit : ndarray, shape (nodes,)
-        Acceleration per torque at the top and per braking torque at the bit (1/(kg m2)).
-    """
-
-    motion: Array
-    load: Array
+    motion: Array  # shape (nodes, 2 nodes): Acceleration per angle (1/s2) and per speed (1/s)
+    load: Array  # shape (nodes,): Acceleration due to damping to ground at the set speed (rad/s2)
+    # shape (nodes,): Acceleration per torque at the top and per braking torque at the bit (1/(kg
+    # m2))
     top: Array
     bit: Array
 
@@ -58,21 +50,11 @@ class Phase:
 
 @dataclass(frozen=True, eq=False)
 class Reaction:
-    """Torque that holds a stuck bit, as a linear function of motion and top torque.
+    """Torque that holds a stuck bit, as a linear function of motion and top torque."""
 
-    Attributes
-    ----------
-    motion : ndarray, shape (2 nodes,)
-        Torque per angle (N m/rad) and per speed (N m s/rad).
-    load : float
-        Torque of damping to ground (N m).
-    top : float
-        Torque per top torque.
-    """
-
-    motion: Array
-    load: float
-    top: float
+    motion: Array  # shape (2 nodes,): Torque per angle (N m/rad) and per speed (N m s/rad)
+    load: float  # torque of damping to ground (N m)
+    top: float  # torque per top torque
 
     def torque(self, motion: Array, top_torque: float) -> float:
         """Reaction (N m); positive when the string pushes the bit forward."""

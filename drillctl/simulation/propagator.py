@@ -33,28 +33,18 @@ WEAKEST_SIGNAL = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class StringStep:
-    """A string ready to be stepped.
+    """A string ready to be stepped."""
 
-    Attributes
-    ----------
-    string : UndampedString, BlockString or DenseString
-        What the kernels take.
-    angle_to_state, speed_to_state : ndarray, shape (states, nodes)
-        State per nodal angle (1/rad) and per nodal speed (s/rad), both in the frame.
-    rest : ndarray, shape (nodes,)
-        Angles that damping to ground causes, per set speed (s): they are taken off before.
-    modes : int
-        Undamped modes carried, the rigid body included.
-    step : float
-        Length of the step (s).
-    """
-
-    string: UndampedString | BlockString | DenseString
+    string: UndampedString | BlockString | DenseString  # what the kernels take
+    # shape (states, nodes): State per nodal angle (1/rad) and per nodal speed (s/rad), both in
+    # the frame
     angle_to_state: Array
     speed_to_state: Array
+    # shape (nodes,): Angles that damping to ground causes, per set speed (s): they are taken off
+    # before
     rest: Array
-    modes: int
-    step: float
+    modes: int  # undamped modes carried, the rigid body included
+    step: float  # length of the step (s)
 
     def state(self, start: Start, set_speed: Array) -> Array:
         """State of lanes, shape (states, lanes), at their start.
@@ -87,22 +77,7 @@ class _Modal:
 
 
 def string_step(string: Drillstring, step: float, modes: int) -> StringStep:
-    """Prepare a string for steps of a given length.
-
-    Parameters
-    ----------
-    string : Drillstring
-        Any viscous damping.
-    step : float
-        Length of a step (s).
-    modes : int
-        Number of lowest undamped modes to carry; at most the number of nodes.
-
-    Returns
-    -------
-    StringStep
-        The same bits for the same input: one BLAS thread is used throughout.
-    """
+    """Prepare a string for steps of a given length."""
     modes = min(modes, string.nodes)
     with threadpool_limits(limits=1, user_api="blas"):
         frequency, shapes = string.undamped_modes

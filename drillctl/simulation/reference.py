@@ -30,71 +30,38 @@ MOST_PHASES = 100_000
 
 @dataclass(frozen=True)
 class Event:
-    """A change of phase.
+    """A change of phase."""
 
-    Attributes
-    ----------
-    time : float
-        When (s).
-    kind : {'stick', 'slip'}
-        The bit came to rest, or broke loose.
-    direction : int
-        +1 or -1 for a bit that breaks loose forward or backward; 0 for a stick.
-    """
-
-    time: float
-    kind: Literal["stick", "slip"]
-    direction: int
+    time: float  # when (s)
+    kind: Literal["stick", "slip"]  # {'stick', 'slip'}: The bit came to rest, or broke loose
+    direction: int  # +1 or -1 for a bit that breaks loose forward or backward; 0 for a stick
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A stretch of one phase, up to an event or a stop: its dense solution and what was found.
+    """A stretch of one phase, up to an event or a stop: its dense solution and what was found."""
 
-    Attributes
-    ----------
-    begin, end : float
-        Times (s).
-    phase : int
-        As `System` counts them.
-    direction : int
-        +1 or -1 in slip; 0 in stick.
-    solution : callable
-        Time (s), shape (n,), to the state of `System`, shape (states, n).
-    steps : ndarray
-        Times of the integrator's steps (s).
-    crossings : ndarray
-        Times at which the bit turns at exactly the set speed (s).
-    extremes : ndarray
-        Times at which the bit speed has an extreme (s).
-    """
-
+    # times (s)
     begin: float
     end: float
-    phase: int
-    direction: int
+    phase: int  # as `System` counts them
+    direction: int  # +1 or -1 in slip; 0 in stick
+    # time (s), shape (n,), to the state of `System`, shape (states, n)
     solution: Callable[[Any], Array]
-    steps: Array
-    crossings: Array
-    extremes: Array
+    steps: Array  # times of the integrator's steps (s)
+    crossings: Array  # times at which the bit turns at exactly the set speed (s)
+    extremes: Array  # times at which the bit speed has an extreme (s)
 
 
 @dataclass(frozen=True)
 class EnergyAudit:
-    """Where the energy of a run went (J).
+    """Where the energy of a run went (J)."""
 
-    Attributes
-    ----------
-    drive, bit, damping : float
-        Work of the drive, work taken by the bit, work taken by damping.
-    stored : float
-        Change of kinetic plus elastic energy.
-    """
-
+    # work of the drive, work taken by the bit, work taken by damping
     drive: float
     bit: float
     damping: float
-    stored: float
+    stored: float  # change of kinetic plus elastic energy
 
     @property
     def residual(self) -> float:
@@ -120,57 +87,19 @@ class EnergyAudit:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A whole run as the solver saw it; `trajectory.py` makes signals and measures of it.
+    """A whole run as the solver saw it; `trajectory.py` makes signals and measures of it."""
 
-    Attributes
-    ----------
-    design : Design
-        What was simulated.
-    system : System
-        Its equations.
-    pieces : tuple of Piece
-        The stretches in order.
-    events : tuple of Event
-        The changes between them.
-    energy : EnergyAudit
-        Over the whole run.
-    tolerance : float
-        Relative and absolute tolerance of the integrator.
-    method : str
-        SciPy's name of the integrator.
-    """
-
-    design: Design
-    system: System
-    pieces: tuple[Piece, ...]
-    events: tuple[Event, ...]
-    energy: EnergyAudit
-    tolerance: float
-    method: str
+    design: Design  # what was simulated
+    system: System  # its equations
+    pieces: tuple[Piece, ...]  # the stretches in order
+    events: tuple[Event, ...]  # the changes between them
+    energy: EnergyAudit  # over the whole run
+    tolerance: float  # relative and absolute tolerance of the integrator
+    method: str  # SciPy's name of the integrator
 
 
 def solve(design: Design, tolerance: float = 1e-8, method: Method = "DOP853") -> Motion:
-    """Simulate a design with located events.
-
-    Parameters
-    ----------
-    design : Design
-        Rig, control, start and duration.
-    tolerance : float
-        Relative and absolute tolerance of the integrator (angles rad, speeds rad/s).
-    method : str
-        Integrator of `scipy.integrate.solve_ivp`; an implicit one for stiff damping.
-
-    Returns
-    -------
-    Motion
-        The stretches with their dense solutions.
-
-    Raises
-    ------
-    SimulationError
-        The integrator failed, or phases followed each other without time advancing.
-    """
+    """Simulate a design with located events."""
     system = system_of(design)
     duration = design.tables.simulation.duration
     first = system.start(design)

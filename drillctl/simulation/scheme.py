@@ -28,20 +28,11 @@ FEWEST_STEPS = 20
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What a named accuracy stands for.
+    """What a named accuracy stands for."""
 
-    Attributes
-    ----------
-    step : float
-        Longest step (s).
-    steps_per_period : float
-        Fewest steps in a period of the first elastic mode, for short strings.
-    phase : float
-        Modes that turn more than this (rad) in a step are left out: a step cannot follow them.
-    """
-
-    step: float
-    steps_per_period: float
+    step: float  # longest step (s)
+    steps_per_period: float  # fewest steps in a period of the first elastic mode, for short strings
+    # modes that turn more than this (rad) in a step are left out: a step cannot follow them
     phase: float
 
 
@@ -58,24 +49,12 @@ counted in periods of the first elastic mode."""
 
 @dataclass(frozen=True)
 class Scheme:
-    """Step, number of steps and number of modes of a run.
+    """Step, number of steps and number of modes of a run."""
 
-    Attributes
-    ----------
-    step : float
-        Length of a step (s); `steps` of them are exactly the duration.
-    steps : int
-        Number of steps.
-    modes : int
-        Lowest undamped modes carried, the rigid body included.
-    sampling : int
-        Steps to a period of a sampled controller; 0 for a continuous one.
-    """
-
-    step: float
-    steps: int
-    modes: int
-    sampling: int = 0
+    step: float  # length of a step (s); `steps` of them are exactly the duration
+    steps: int  # number of steps
+    modes: int  # lowest undamped modes carried, the rigid body included
+    sampling: int = 0  # steps to a period of a sampled controller; 0 for a continuous one
 
 
 def choose_scheme(
@@ -86,30 +65,7 @@ def choose_scheme(
     period: float | None = None,
     turns: Array = NO_TURNS,
 ) -> Scheme:
-    """Step and modes from the accuracy asked for, unless they are given.
-
-    Parameters
-    ----------
-    string : Drillstring
-        Its frequencies bound the step and choose the modes.
-    table : SimulationTable
-        Duration, accuracy; step and modes if given.
-    steepest_fall : float
-        Steepest falling slope of the friction in any lane (N m s/rad).
-    bit_inertia : float
-        Inertia that the bit alone sets in motion in a short step (kg m2).
-    period : float, optional
-        Of a sampled controller (s). Steps divide it; it is itself rounded, by a part in a
-        thousand at most, to go into the run a whole number of times.
-    turns : ndarray
-        Times (s) at which something jumps or turns; steps end there if they need be shorter by no
-        more than a quarter for it.
-
-    Raises
-    ------
-    InputError
-        A given step is too long for the steepness of the friction law or for the string.
-    """
+    """Step and modes from the accuracy asked for, unless they are given."""
     accuracy = ACCURACIES[table.accuracy]
     frequency, _ = string.undamped_modes
     # Mobility over a step is about step / inertia: the bit has no time to move the string.

@@ -32,59 +32,31 @@ FORMS = {"undamped": "undamped modes", "blocks": "2 x 2 blocks", "dense": "a den
 
 @dataclass(frozen=True)
 class Bound:
-    """A bound on the step.
+    """A bound on the step."""
 
-    Attributes
-    ----------
-    name : {'accuracy', 'elastic_mode', 'friction', 'given'}
-        What bounds it.
-    step : float
-        Longest step that it allows (s).
-    reason : str
-        In words.
-    """
-
-    name: str
-    step: float
-    reason: str
+    name: str  # {'accuracy', 'elastic_mode', 'friction', 'given'}: What bounds it
+    step: float  # longest step that it allows (s)
+    reason: str  # in words
 
 
 @dataclass(frozen=True)
 class SchemeReasons:
-    """A scheme, and why it is this one.
+    """A scheme, and why it is this one."""
 
-    Attributes
-    ----------
-    scheme : Scheme
-        Step, steps and modes.
-    accuracy : {'fast', 'standard', 'fine'}
-        Asked for.
-    bounds : tuple of Bound
-        On the step; a given step stands alone.
-    decided_by : str
-        Name of the bound that decides, or 'sampling' or 'program' where the step is shorter for
-        whole steps to a period of the controller, or to what changes by the clock.
-    modes_by : {'turn', 'all', 'fewest', 'given'}
-        Modes that turn little enough in a step, all of the string, two, or as given.
-    highest_frequency : float
-        Of the modes kept (Hz).
-    turn : float
-        Of that mode in a step (rad).
-    left_out : int
-        Modes of the string that are not carried; their static share of the pipe torque is.
-    form : {'undamped', 'blocks', 'dense'}
-        What the string's step is made of.
-    """
-
-    scheme: Scheme
-    accuracy: str
-    bounds: tuple[Bound, ...]
+    scheme: Scheme  # step, steps and modes
+    accuracy: str  # {'fast', 'standard', 'fine'}: Asked for
+    bounds: tuple[Bound, ...]  # on the step; a given step stands alone
+    # name of the bound that decides, or 'sampling' or 'program' where the step is shorter for
+    # whole steps to a period of the controller, or to what changes by the clock
     decided_by: str
+    # {'turn', 'all', 'fewest', 'given'}: Modes that turn little enough in a step, all of the
+    # string, two, or as given
     modes_by: str
-    highest_frequency: float
-    turn: float
+    highest_frequency: float  # of the modes kept (Hz)
+    turn: float  # of that mode in a step (rad)
+    # modes of the string that are not carried; their static share of the pipe torque is
     left_out: int
-    form: str
+    form: str  # {'undamped', 'blocks', 'dense'}: What the string's step is made of
 
     @property
     def decisive(self) -> Bound:
@@ -111,22 +83,7 @@ class SchemeReasons:
 
 
 def explain(lanes: Lanes, table: SimulationTable, prepared: Prepared) -> SchemeReasons:
-    """Why a scheme was chosen.
-
-    Parameters
-    ----------
-    lanes : Lanes
-        That `prepare` was given.
-    table : SimulationTable
-        That `prepare` was given.
-    prepared : Prepared
-        What it returned.
-
-    Raises
-    ------
-    RuntimeError
-        The reasons lead to another scheme than was chosen: one of the two files is wrong.
-    """
+    """Why a scheme was chosen."""
     scheme, string = prepared.scheme, lanes.string
     bounds = _bounds(string, table, lanes.steepest_fall)
     asked = min(bound.step for bound in bounds)

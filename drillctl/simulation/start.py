@@ -16,24 +16,14 @@ Kind = Literal["rest", "turning", "wound_up"]
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Motion of the string at time zero: one shape along the string, times a number of each lane.
+    """Motion of the string at time zero: a shape along the string, times a number of each lane."""
 
-    Attributes
-    ----------
-    twist : ndarray, shape (nodes,)
-        Shape of the angles in the frame.
-    angle : ndarray, shape (lanes,)
-        What it is to be multiplied with (rad, or N m where the shape is a compliance).
-    turn : ndarray, shape (nodes,)
-        Shape of the speeds in the frame.
-    speed : ndarray, shape (lanes,)
-        What it is to be multiplied with (rad/s).
-    """
-
-    twist: Array
+    twist: Array  # shape (nodes,): Shape of the angles in the frame
+    # shape (lanes,): What it is to be multiplied with (rad, or N m where the shape is a
+    # compliance)
     angle: Array
-    turn: Array
-    speed: Array
+    turn: Array  # shape (nodes,): Shape of the speeds in the frame
+    speed: Array  # shape (lanes,): What it is to be multiplied with (rad/s)
 
     @property
     def angles(self) -> Array:
@@ -49,27 +39,7 @@ class Start:
 def start(
     string: Drillstring, kind: Kind, set_speed: Array, turning_speed: Array, static_torque: Array
 ) -> Start:
-    """Motion at time zero of a number of lanes.
-
-    Parameters
-    ----------
-    string : Drillstring
-        Only its compliance matters.
-    kind : {'rest', 'turning', 'wound_up'}
-        Still, untwisted and stuck; all nodes at one speed, untwisted; or stuck with the twist
-        of exactly the static torque and the top at the set speed, twist and speed spread in
-        proportion to the compliance.
-    set_speed, turning_speed : ndarray, shape (lanes,)
-        Set speed, and speed of all nodes when turning (rad/s).
-    static_torque : ndarray, shape (lanes,)
-        Largest torque on a bit at rest (N m).
-
-    Returns
-    -------
-    Start
-        The top drive is at angle zero, and so is its integral action. A bit at rest has exactly
-        minus the set speed.
-    """
+    """Motion at time zero of a number of lanes."""
     ones, none = np.ones(string.nodes), np.zeros(string.nodes)
     if kind == "rest":
         return Start(none, 0.0 * set_speed, ones, -set_speed)

@@ -142,17 +142,7 @@ def remembered(weight: Any, step: float) -> int:
 
 
 def observer_step(observer: Observer | None, step: float, start: Start) -> Any:
-    """The kernel's form of an observer.
-
-    Parameters
-    ----------
-    observer : Observer or None
-        Its continuous form.
-    step : float
-        Length of a step (s).
-    start : Start
-        Motion at time zero.
-    """
+    """The kernel's form of an observer."""
     from drillctl.simulation.kernels.observer_step import NoObserver, ObserverStep
 
     if observer is None:

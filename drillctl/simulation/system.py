@@ -30,22 +30,13 @@ WORKS = 3
 
 
 class Forces(NamedTuple):
-    """What acts on the string at a moment.
+    """What acts on the string at a moment."""
 
-    Attributes
-    ----------
-    string : Phase
-        Accelerations as a function of motion and end torques.
-    top_torque, bit_torque : float
-        Torques of drive and rock (N m).
-    drive : ndarray, shape (drive states,)
-        Rates of the drive's memory.
-    """
-
-    string: Phase
+    string: Phase  # accelerations as a function of motion and end torques
+    # torques of drive and rock (N m)
     top_torque: float
     bit_torque: float
-    drive: Array
+    drive: Array  # shape (drive states,): Rates of the drive's memory
 
 
 class System:

@@ -115,21 +115,7 @@ class Simulation:
 
 
 def sample(motion: Motion, interval: float = 0.01) -> Simulation:
-    """Signals at equal intervals and the measures of a run.
-
-    Parameters
-    ----------
-    motion : Motion
-        As the reference solver left it.
-    interval : float
-        Sampling interval of the signals (s), at most: a whole number of them is the duration.
-
-    Returns
-    -------
-    Simulation
-        J1, stuck time and bit speed extremes come from located events; peak torques, settling
-        times and `rop_proxy` from samples `FINE` apart, whatever `interval` is.
-    """
+    """Signals at equal intervals and the measures of a run."""
     design = motion.design
     duration = design.tables.simulation.duration
     fine = _grid(duration, min(FINE, duration / FEWEST_SAMPLES))

@@ -28,20 +28,7 @@ LARGEST_TURN = 2.5
 def undamped_step(
     frequency: Array, top: Array, bit: Array, below: Array, stiffness: float, step: float
 ) -> tuple[dict[str, Any], Array] | None:
-    """Fields of an `UndampedString` and the matrix from modal to block states; None if unfit.
-
-    Parameters
-    ----------
-    frequency : ndarray, shape (modes,)
-        rad/s; zero for the rigid body.
-    top, bit, below : ndarray, shape (modes,)
-        Amplitudes of mass-normalised modes at the top drive, at the bit, and at the lower end of
-        the uppermost element (1/sqrt(kg m2)).
-    stiffness : float
-        Of that element (N m/rad).
-    step : float
-        Length of a step (s).
-    """
+    """Fields of an `UndampedString` and the matrix from modal to block states; None if unfit."""
     turn = frequency * step
     if turn.max() > LARGEST_TURN or np.abs(top).min() < WEAKEST_TOP * np.abs(top).max():
         return None

@@ -29,21 +29,11 @@ LATE = 1e-9
 
 
 class Moment(NamedTuple):
-    """When it is, how fast the bit turns, and what was before.
+    """When it is, how fast the bit turns, and what was before."""
 
-    Attributes
-    ----------
-    time : float
-        Since the start (s).
-    bit : float
-        Absolute bit speed (rad/s).
-    past : callable
-        The signal at earlier times.
-    """
-
-    time: float
-    bit: float
-    past: Past
+    time: float  # since the start (s)
+    bit: float  # absolute bit speed (rad/s)
+    past: Past  # the signal at earlier times
 
 
 class WeightInTime(Protocol):

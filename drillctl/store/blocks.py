@@ -18,15 +18,9 @@ from drillctl.simulation.scheme import Scheme
 
 @dataclass(frozen=True)
 class FolderBlocks:
-    """Finished blocks as files; see `studies.blocks.Blocks`.
+    """Finished blocks as files; see `studies.blocks.Blocks`."""
 
-    Attributes
-    ----------
-    folder : Path
-        Where they lie.
-    """
-
-    folder: Path
+    folder: Path  # where they lie
 
     def prepared(self, number: int, prepare: Callable[[], Prepared]) -> Prepared:
         """The string of a group, read back if it was prepared before."""

@@ -19,22 +19,7 @@ LONGEST = 57
 
 
 def difference(path: Path, design: Design, grown: tuple[str, ...] = ()) -> str:
-    """The keys in which a design differs from a resolved one on disk, for a message.
-
-    Parameters
-    ----------
-    path : Path
-        Resolved design as TOML.
-    design : Design
-        To be told from it.
-    grown : tuple of str
-        Keys that may differ.
-
-    Returns
-    -------
-    str
-        Empty where nothing can be said.
-    """
+    """The keys in which a design differs from a resolved one on disk, for a message."""
     try:
         held = _leaves(tomllib.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError):
@@ -79,17 +64,10 @@ def _leaves(tree: Any, prefix: str = "") -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Growing:
-    """A count of a design that a finished run may be taken on to.
+    """A count of a design that a finished run may be taken on to."""
 
-    Attributes
-    ----------
-    count : int
-        How many are asked for.
-    like : Design
-        The design with another count in its place, the same for all: it identifies the run.
-    """
-
-    count: int
+    count: int  # how many are asked for
+    # the design with another count in its place, the same for all: it identifies the run
     like: Design
 
 
@@ -110,17 +88,7 @@ def growing_realizations(design: Design) -> Growing | None:
 
 
 def refuse_other_machine(held: dict[str, str], where: str, allow_mixed: bool) -> None:
-    """Refuse (`InputError`) to go on with a run of other packages or another processor.
-
-    Parameters
-    ----------
-    held : dict of str
-        Provenance of what was run so far.
-    where : str
-        Option that names its folder.
-    allow_mixed : bool
-        Whether the processor may be of another type.
-    """
+    """Refuse (`InputError`) to go on with a run of other packages or another processor."""
     here = provenance()
     other = [key for key in here if held.get(key) != here[key]]
     if allow_mixed and other == ["processor"]:

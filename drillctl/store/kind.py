@@ -25,29 +25,17 @@ def not_growing(design: Design) -> Growing | None:
 
 
 class Kind(NamedTuple):
-    """A kind of result.
+    """A kind of result."""
 
-    Attributes
-    ----------
-    verb : str
-        Command that makes it.
-    of : type
-        Class of the result.
-    read : callable
-        The result from its design, dataset and summary.
-    asked : callable
-        From a result the design that gives it again, and what was asked for beside it. Python
-        takes an engine, axes and audited cells that the design does not hold; a command that
-        runs the design itself must not take such a result for its own.
-    write : callable
-        Writes the dataset of a result into a folder.
-    growing : callable
-        From a design the count that a finished run may be taken on to, if there is one.
-    """
-
-    verb: str
-    of: type
+    verb: str  # command that makes it
+    of: type  # class of the result
+    # the result from its design, dataset and summary
     read: Callable[[Design, xarray.Dataset, dict[str, Any]], Any]
+    # from a result the design that gives it again, and what was asked for beside it. Python takes
+    # an engine, axes and audited cells that the design does not hold; a command that runs the
+    # design itself must not take such a result for its own.
     asked: Callable[[Any], tuple[Design, dict[str, Any]]] = design_alone
+    # writes the dataset of a result into a folder
     write: Callable[[Any, Path], None] = write_dataset
+    # from a design the count that a finished run may be taken on to, if there is one
     growing: Callable[[Design], Growing | None] = not_growing

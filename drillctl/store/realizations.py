@@ -36,17 +36,7 @@ FILES = {"realizations": "data.zarr", "sensitivity": "sensitivity.zarr"}
 
 
 class StoredRealizations:
-    """Finished blocks in a zarr store; see `studies.uncertainty.keeping.Keeping`.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the run.
-    name : str
-        Which part of the study.
-    job : Job
-        Whose realizations they are.
-    """
+    """Finished blocks in a zarr store; see `studies.uncertainty.keeping.Keeping`."""
 
     def __init__(self, folder: Path, name: str, job: Job) -> None:
         import zarr
@@ -110,13 +100,7 @@ class StoredRealizations:
 
 
 class FolderShelf:
-    """The parts of a study in the folder of its run.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the run.
-    """
+    """The parts of a study in the folder of its run."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -140,15 +124,7 @@ def _told(path: Path) -> Iterator[None]:
 
 
 def write_uncertainty(result: Uncertainty, folder: Path) -> None:
-    """Write a study under uncertainty: lanes that are not there yet, and what follows from them.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        To be written.
-    folder : Path
-        Of its run.
-    """
+    """Write a study under uncertainty: lanes that are not there yet, and what follows from them."""
     import zarr
 
     job = Job(result.design, result.axes, Drawn(result.seed), tuple(result.measures), None)

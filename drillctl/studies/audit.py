@@ -28,17 +28,10 @@ TOLERANCE = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Audit:
-    """Batch engine against reference solver at some cells.
+    """Batch engine against reference solver at some cells."""
 
-    Attributes
-    ----------
-    cells : ndarray of int, shape (audited,)
-        Index in the flattened map.
-    batch, reference : ndarray, shape (audited,)
-        J1 by either (s); NaN where the reference solver failed.
-    """
-
-    cells: NDArray[np.int64]
+    cells: NDArray[np.int64]  # shape (audited,): Index in the flattened map
+    # shape (audited,): J1 by either (s); NaN where the reference solver failed
     batch: Array
     reference: Array
 
@@ -72,22 +65,7 @@ class Audit:
 
 
 def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> NDArray[np.int64]:
-    """Cells to audit: a seeded random sample, spread over the levels.
-
-    Parameters
-    ----------
-    values : ndarray, shape of the map
-        J1 (s).
-    levels : tuple of float
-        Increasing. Beyond twice the highest, cells are too sensitive to tell anything.
-    count : int
-        How many; fewer if the map has no more.
-
-    Returns
-    -------
-    ndarray of int, shape (at most count,)
-        Sorted indices in the flattened map. Bands between levels take turns.
-    """
+    """Cells to audit: a seeded random sample, spread over the levels."""
     flat = np.nan_to_num(values.ravel(), nan=np.inf)
     random = np.random.default_rng(SEED)
     edges = [-np.inf, *levels, 2.0 * levels[-1]]
@@ -111,23 +89,7 @@ def audit(
     count: int,
     progress: Progress = SILENT,
 ) -> Audit:
-    """Simulate some cells of a map again with the reference solver, on all cores.
-
-    Parameters
-    ----------
-    design : Design
-        Of the map.
-    axes : tuple of Axis
-        Of the map.
-    values : ndarray, shape of the map
-        J1 by the batch engine (s).
-    levels : tuple of float
-        Levels over which the cells are spread.
-    count : int
-        How many cells; 0 for none.
-    progress : Progress
-        Told of each cell.
-    """
+    """Simulate some cells of a map again with the reference solver, on all cores."""
     cells = choose_cells(values.reshape(shape_of(axes)), levels, count)
     designs = [cell_design(design, axes, int(cell)) for cell in cells]
     reference = references(designs, progress)
@@ -137,17 +99,7 @@ def audit(
 def references(
     designs: list[Design], progress: Progress = SILENT, seconds: float = math.inf
 ) -> Array:
-    """J1 of designs by the reference solver (s), on all cores; NaN for those that fail.
-
-    Parameters
-    ----------
-    designs : list of Design
-        To be simulated.
-    progress : Progress
-        Told of each.
-    seconds : float
-        After so long (s) no further design is begun: there are then fewer values than designs.
-    """
+    """J1 of designs by the reference solver (s), on all cores; NaN for those that fail."""
     import joblib
     import numba
 

@@ -14,13 +14,7 @@ from drillctl.studies.weight_delay.lanes import following_design
 
 
 def refuse_what_studies_would(design: Design) -> None:
-    """Refuse (`InputError`) what a study would refuse: axes, draws, cases, delays, what is tuned.
-
-    Parameters
-    ----------
-    design : Design
-        What its own tables say is checked; defaults need not fit every law.
-    """
+    """Refuse (`InputError`) what a study would: axes, draws, cases, delays, what is tuned."""
     if "axes" in design.tree.get("map", {}):
         axes_of(design, design.tables.map.axes)
     if design.tables.uncertain:

@@ -68,25 +68,14 @@ SEARCHED = 4096
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """The cells of a grid that share a string and the types of their laws.
+    """The cells of a grid that share a string and the types of their laws."""
 
-    Attributes
-    ----------
-    design : Design
-        With the values of the axes that all of the cells share.
-    axes : tuple of Axis
-        The other axes, over which the cells run.
-    begins, shape : tuple of int
-        Where the part begins along each axis of the whole grid, and how far it goes.
-    whole : tuple of int
-        Shape of the whole grid.
-    """
-
-    design: Design
-    axes: tuple[Axis, ...]
+    design: Design  # with the values of the axes that all of the cells share
+    axes: tuple[Axis, ...]  # the other axes, over which the cells run
+    # where the part begins along each axis of the whole grid, and how far it goes
     begins: tuple[int, ...]
     shape: tuple[int, ...]
-    whole: tuple[int, ...]
+    whole: tuple[int, ...]  # shape of the whole grid
 
     def at(self, corner: int) -> Design:
         """The design of the first cell (0) or of the last (-1)."""
@@ -103,25 +92,14 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """The cells of a grid that share a string and the types of their laws.
+    """The cells of a grid that share a string and the types of their laws."""
 
-    Attributes
-    ----------
-    design : Design
-        Of the first cell.
-    numbers : NumberGrid
-        Lane numbers over the axes that the lanes do not share.
-    begins, shape : tuple of int
-        Where the group begins along each axis of the whole grid, and how far it goes.
-    whole : tuple of int
-        Shape of the whole grid.
-    """
-
-    design: Design
-    numbers: NumberGrid
+    design: Design  # of the first cell
+    numbers: NumberGrid  # lane numbers over the axes that the lanes do not share
+    # where the group begins along each axis of the whole grid, and how far it goes
     begins: tuple[int, ...]
     shape: tuple[int, ...]
-    whole: tuple[int, ...]
+    whole: tuple[int, ...]  # shape of the whole grid
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -177,13 +155,7 @@ class Group:
 
 
 def axis(design: Design, table: AxisTable) -> Axis:
-    """The axis that a table asks for.
-
-    Raises
-    ------
-    InputError
-        Unknown path, a wrong unit, or an axis that does not increase.
-    """
+    """The axis that a table asks for."""
     where = f"map.axes {table.path}"
     try:
         found = parameter(design, table.path)
@@ -202,13 +174,7 @@ def axis(design: Design, table: AxisTable) -> Axis:
 def axes_of(
     design: Design, tables: tuple[AxisTable, ...], kept: int = len(FLOATS)
 ) -> tuple[Axis, ...]:
-    """All axes of a grid; see `axis`. `kept`: how many measures are kept of each cell.
-
-    Raises
-    ------
-    InputError
-        An axis that does not fit the design, or a grid too large for the memory.
-    """
+    """All axes of a grid; see `axis`. `kept`: how many measures are kept of each cell."""
     refuse_too_large([table.points for table in tables], kept=kept)
     return tuple(axis(design, table) for table in tables)
 
@@ -219,13 +185,7 @@ def shape_of(axes: tuple[Axis, ...]) -> tuple[int, ...]:
 
 
 def parts(design: Design, axes: tuple[Axis, ...]) -> Iterator[Part]:
-    """The cells of a grid, string by string and kind by kind.
-
-    Raises
-    ------
-    InputError
-        A value on the grid is impossible; the message says which.
-    """
+    """The cells of a grid, string by string and kind by kind."""
     slices = [_singly(a) if a.shared else _by_kind(design, axes, a) for a in axes]
     for chosen in itertools.product(*slices):
         pairs = list(zip(axes, chosen, strict=True))
@@ -237,13 +197,7 @@ def parts(design: Design, axes: tuple[Axis, ...]) -> Iterator[Part]:
 
 
 def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
-    """The cells of a grid, group by group; the string is assembled once a group.
-
-    Raises
-    ------
-    InputError
-        A value on the grid is impossible; the message says which.
-    """
+    """The cells of a grid, group by group; the string is assembled once a group."""
     for part in parts(design, axes):
         numbers = _numbers(part.design, part.axes)
         yield Group(part.at(0), numbers, part.begins, part.shape, part.whole)
@@ -275,15 +229,7 @@ def cell_design(design: Design, axes: tuple[Axis, ...], cell: int) -> Design:
 
 
 def replaced(design: Design, values: dict[str, float]) -> Design:
-    """The design with SI values put in; an impossible one is told with its path and value.
-
-    Parameters
-    ----------
-    design : Design
-        To be changed.
-    values : dict
-        Dotted path to value (SI).
-    """
+    """The design with SI values put in; an impossible one is told with its path and value."""
     try:
         return design.replace({path: units.SI(value) for path, value in values.items()})
     except InputError as error:
@@ -292,15 +238,7 @@ def replaced(design: Design, values: dict[str, float]) -> Design:
 
 
 def cell_numbers(design: Design, axes: tuple[Axis, ...]) -> dict[str, Array]:
-    """Lane numbers of every cell, flattened.
-
-    Parameters
-    ----------
-    design : Design
-        With whatever the axes do not say.
-    axes : tuple of Axis
-        Over which the cells run.
-    """
+    """Lane numbers of every cell, flattened."""
     numbers = _numbers(design, axes)
     return numbers.of(np.arange(len(numbers)))
 

@@ -17,18 +17,11 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class NumberGrid:
-    """Every lane number over a grid.
+    """Every lane number over a grid."""
 
-    Attributes
-    ----------
-    shape : tuple of int
-        Of the grid; empty for a single cell.
-    numbers : dict of ndarray
-        By the names of `simulation.lanes.lane_numbers`; as many dimensions as the grid, of length
-        one along those over which the number is the same.
-    """
-
-    shape: tuple[int, ...]
+    shape: tuple[int, ...]  # of the grid; empty for a single cell
+    # by the names of `simulation.lanes.lane_numbers`; as many dimensions as the grid, of length
+    # one along those over which the number is the same
     numbers: dict[str, Array]
 
     def __len__(self) -> int:

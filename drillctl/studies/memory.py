@@ -19,17 +19,7 @@ MEMORY_SHARE = 0.5
 def refuse_too_large(
     points: Sequence[int], where: str = "map.axes", kept: int = len(FLOATS)
 ) -> None:
-    """Refuse (`InputError`) a grid of so many points along its axes, if memory falls short.
-
-    Parameters
-    ----------
-    points : sequence of int
-        Along each axis.
-    where : str
-        Key that asks for them.
-    kept : int
-        How many measures are kept of a cell.
-    """
+    """Refuse (`InputError`) a grid of so many points along its axes, if memory falls short."""
     cells = math.prod(points)
     refuse_more_bytes(
         cells * (BYTES_PER_CELL + kept * BYTES_PER_MEASURE),
@@ -40,19 +30,7 @@ def refuse_too_large(
 
 
 def refuse_more_bytes(needed: float, what: str, where: str, instead: str = "fewer of them") -> None:
-    """Refuse (`InputError`) what needs more memory than may be used.
-
-    Parameters
-    ----------
-    needed : float
-        Memory (bytes).
-    what : str
-        What needs it.
-    where : str
-        Key that asks for it.
-    instead : str
-        What would help.
-    """
+    """Refuse (`InputError`) what needs more memory than may be used."""
     usable = MEMORY_SHARE * _free_memory()
     if needed > usable:
         raise InputError(

@@ -210,13 +210,7 @@ def sweep(
 
 
 def kept_measures(asked: Sequence[str] | None) -> tuple[str, ...]:
-    """Names of the measures to keep, in the order of `FLOATS`; all if none are asked for.
-
-    Raises
-    ------
-    InputError
-        No measure of that name.
-    """
+    """Names of the measures to keep, in the order of `FLOATS`; all if none are asked for."""
     if asked is None:
         return FLOATS
     for name in asked:

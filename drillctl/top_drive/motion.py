@@ -38,30 +38,7 @@ def respond(
     absolute: float,
     acceleration: tuple[float, float],
 ) -> tuple[float, Array]:
-    """Torque of a `RealDrive` and the rates of its memory.
-
-    Parameters
-    ----------
-    drive : RealDrive
-        Its numbers.
-    memory : ndarray, shape (5,)
-        By `MEMORY`.
-    speed : float
-        Of the top drive in the frame (rad/s).
-    lead : float
-        Set speed of the hour less the final one (rad/s).
-    absolute : float
-        Absolute speed of the top drive (rad/s), for the power limit.
-    acceleration : tuple of float
-        Of the top drive, were there no torque of it (rad/s2), and per torque (1/(kg m2)).
-
-    Returns
-    -------
-    torque : float
-        N m.
-    rates : ndarray, shape (5,)
-        Per second.
-    """
+    """Torque of a `RealDrive` and the rates of its memory."""
     encoder, filtered, slow, integral, motor = memory.tolist()
     seen = encoder if drive.encoder > 0.0 else speed
     # The torque felt is a T + b: the motor's, less what the sensed inertia takes.

@@ -31,24 +31,12 @@ from drillctl.reporting.sections import (
 
 
 class Kind(NamedTuple):
-    """A kind of section.
+    """A kind of section."""
 
-    Attributes
-    ----------
-    name : str
-        By which it is asked for.
-    title : str
-        Its heading.
-    studies : tuple of str
-        What it reads.
-    build : callable
-        Its blocks.
-    """
-
-    name: str
-    title: str
-    studies: tuple[str, ...]
-    build: Callable[[Gathered], tuple[Block, ...]]
+    name: str  # by which it is asked for
+    title: str  # its heading
+    studies: tuple[str, ...]  # what it reads
+    build: Callable[[Gathered], tuple[Block, ...]]  # its blocks
 
 
 KINDS = (

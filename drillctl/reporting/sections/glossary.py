@@ -8,13 +8,7 @@ from drillctl.reporting.words import Words
 
 
 def entries(words: Words) -> tuple[tuple[str, str, str], ...]:
-    """Symbol or word, meaning and unit.
-
-    Parameters
-    ----------
-    words : Words
-        Units of the reader.
-    """
+    """Symbol or word, meaning and unit."""
     speed, torque, force = (words.unit(unit) for unit in ("rad/s", "N*m", "N"))
     slope, length = words.unit("N*m*s/rad"), words.unit("m")
     return (

@@ -62,37 +62,18 @@ LOOK = 64
 
 
 class Clock(NamedTuple):
-    """Time of a run.
+    """Time of a run."""
 
-    Attributes
-    ----------
-    step : float
-        Length of a step (s).
-    steps : int
-        Number of steps.
-    j1_from, window_from : float
-        Where the J1 window and the window at the end of the run begin (s).
-    every : int
-        Steps from one sample of a trace to the next; 0 for no traces.
-    sampling : int
-        Steps from one sample of the controller to the next; 0 for a continuous one.
-    remembered : int
-        Steps whose signals a weight law may ask for; 0 if none does.
-    estimated : int
-        States of the observer; 0 without one.
-    give_up : float
-        J1 (s) over which nothing more is asked of a lane; infinite for none.
-    """
-
-    step: float
-    steps: int
+    step: float  # length of a step (s)
+    steps: int  # number of steps
+    # where the J1 window and the window at the end of the run begin (s)
     j1_from: float
     window_from: float
-    every: int
-    sampling: int
-    remembered: int
-    estimated: int
-    give_up: float
+    every: int  # steps from one sample of a trace to the next; 0 for no traces
+    sampling: int  # steps from one sample of the controller to the next; 0 for a continuous one
+    remembered: int  # steps whose signals a weight law may ask for; 0 if none does
+    estimated: int  # states of the observer; 0 without one
+    give_up: float  # J1 (s) over which nothing more is asked of a lane; infinite for none
 
 
 @inlined

@@ -27,19 +27,13 @@ SLOWEST = 1e-9
 
 
 class Reduced(NamedTuple):
-    """String and drive eliminated: what the torque on the bit decides in a step.
+    """String and drive eliminated: what the torque on the bit decides in a step."""
 
-    Attributes
-    ----------
-    alone, share : row
-        Mean top torque of the step were the bit torque zero (N m), and what each of its N m adds.
-    free, gain, per_gain : row
-        Bit speed at its end were the bit torque zero (rad/s), its fall per bit torque
-        (rad/s per N m), and one over that.
-    """
-
+    # mean top torque of the step were the bit torque zero (N m), and what each of its N m adds
     alone: Any
     share: Any
+    # bit speed at its end were the bit torque zero (rad/s), its fall per bit torque (rad/s per N
+    # m), and one over that
     free: Any
     gain: Any
     per_gain: Any

@@ -19,22 +19,13 @@ from drillctl.simulation.kernels.weight_step import has_memory
 
 
 class HeldRock(NamedTuple):
-    """`OverWeight` at the weights of one step.
+    """`OverWeight` at the weights of one step."""
 
-    Attributes
-    ----------
-    rest : float
-        Static torque under the mean weight of the step (N m).
-    level, spread : float
-        Torque at high speed, and what the static torque is above it, at the end of the step (N m).
-    decay : float
-        Decay with speed (s/rad).
-    """
-
-    rest: Any
+    rest: Any  # static torque under the mean weight of the step (N m)
+    # torque at high speed, and what the static torque is above it, at the end of the step (N m)
     level: Any
     spread: Any
-    decay: Any
+    decay: Any  # decay with speed (s/rad)
 
     @property
     def set_valued(self) -> bool:

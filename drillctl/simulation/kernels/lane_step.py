@@ -42,31 +42,16 @@ NEWTON_LIMIT = 30
 
 
 class Outcome(NamedTuple):
-    """What a step ends with.
+    """What a step ends with."""
 
-    Attributes
-    ----------
-    speed : row
-        Bit speed at its end (rad/s).
-    direction : row
-        +1 or -1 turning, 0 stuck.
-    kinetic, slope : row
-        Friction torque at that speed, signed (N m), and the law's slope there (N m s/rad).
-    torque : row
-        Mean torque on the bit over the step (N m).
-    holding : row
-        Mean torque that held a bit which was stuck throughout (N m); -1 of any other.
-    stuck : row
-        Share of the step spent stuck.
-    """
-
-    speed: Any
-    direction: Any
+    speed: Any  # bit speed at its end (rad/s)
+    direction: Any  # +1 or -1 turning, 0 stuck
+    # friction torque at that speed, signed (N m), and the law's slope there (N m s/rad)
     kinetic: Any
     slope: Any
-    torque: Any
-    holding: Any
-    stuck: Any
+    torque: Any  # mean torque on the bit over the step (N m)
+    holding: Any  # mean torque that held a bit which was stuck throughout (N m); -1 of any other
+    stuck: Any  # share of the step spent stuck
 
 
 @inlined

@@ -12,19 +12,12 @@ from drillctl.simulation.measures import NARROW_BAND, WIDE_BAND
 
 
 class Before(NamedTuple):
-    """What moved as a step began.
+    """What moved as a step began."""
 
-    Attributes
-    ----------
-    bit_speed, top_speed : row
-        rad/s, the top speed in the frame.
-    load : row
-        Weight on the bit (N).
-    """
-
+    # rad/s, the top speed in the frame
     bit_speed: Any
     top_speed: Any
-    load: Any
+    load: Any  # weight on the bit (N)
 
 
 @inlined

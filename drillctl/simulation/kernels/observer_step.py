@@ -11,39 +11,22 @@ from drillctl.simulation.kernels.rows import WIDTH
 
 
 class NoObserver(NamedTuple):
-    """Nothing is estimated.
+    """Nothing is estimated."""
 
-    Attributes
-    ----------
-    unused : float
-        numba wants a number.
-    """
-
-    unused: Any
+    unused: Any  # numba wants a number
 
 
 class ObserverStep(NamedTuple):
-    """`drillctl.linear.observer.Observer` for steps of one length.
+    """`drillctl.linear.observer.Observer` for steps of one length."""
 
-    Attributes
-    ----------
-    free : ndarray, shape (states, states)
-        Propagation over a step.
-    by_torque, by_begin, by_end : ndarray, shape (states,)
-        Change by a torque held over the step, and by top speeds at its ends with a straight line
-        between.
-    read : ndarray, shape (states,)
-        Bit speed in the frame per state.
-    start : ndarray, shape (states, lanes)
-        State at time zero.
-    """
-
-    free: Any
+    free: Any  # shape (states, states): Propagation over a step
+    # shape (states,): Change by a torque held over the step, and by top speeds at its ends with a
+    # straight line between
     by_torque: Any
     by_begin: Any
     by_end: Any
-    read: Any
-    start: Any
+    read: Any  # shape (states,): Bit speed in the frame per state
+    start: Any  # shape (states, lanes): State at time zero
 
 
 def start_observer(observer: Any, memory: Any, first: int) -> None:

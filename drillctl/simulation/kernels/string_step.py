@@ -25,32 +25,14 @@ from drillctl.simulation.kernels.top_motion import asks_for_top
 
 
 class UndampedString(NamedTuple):
-    """A string without damping, mode by mode.
+    """A string without damping, mode by mode."""
 
-    Attributes
-    ----------
-    kappa : ndarray, shape (modes,)
-        4 sin(w h / 2)^2 of a mode with frequency w.
-    ratio : ndarray, shape (modes,)
-        Its amplitude at the bit over that at the top.
-    push : ndarray, shape (modes, 2)
-        Change of x and y per torque on the top.
-    bit_speed : ndarray, shape (modes, 2)
-        Bit speed per x and y (1/s).
-    pipe : ndarray, shape (modes,)
-        Pipe torque per x (N m/rad).
-    top_speed : ndarray, shape (modes, 2)
-        Top-drive speed in the frame per x and y (1/s).
-
-    The others are those of `BlockString`.
-    """
-
-    kappa: Any
-    ratio: Any
-    push: Any
-    bit_speed: Any
-    pipe: Any
-    top_speed: Any
+    kappa: Any  # shape (modes,): 4 sin(w h / 2)^2 of a mode with frequency w
+    ratio: Any  # shape (modes,): Its amplitude at the bit over that at the top
+    push: Any  # shape (modes, 2): Change of x and y per torque on the top
+    bit_speed: Any  # shape (modes, 2): Bit speed per x and y (1/s)
+    pipe: Any  # shape (modes,): Pipe torque per x (N m/rad)
+    top_speed: Any  # shape (modes, 2): Top-drive speed in the frame per x and y (1/s)
     angle_by_top: Any
     angle_by_bit: Any
     speed_by_top: Any
@@ -65,48 +47,33 @@ class UndampedString(NamedTuple):
 
 
 class BlockString(NamedTuple):
-    """A string in 2 x 2 blocks.
+    """A string in 2 x 2 blocks."""
 
-    Attributes
-    ----------
-    free : ndarray, shape (blocks, 4)
-        A of each block by rows.
-    push : ndarray, shape (blocks, 4)
-        B of each block: first state by top and bit torque, second state by the same.
-    pipe : ndarray, shape (blocks, 2)
-        Pipe torque per state (N m).
-    top_speed, bit_angle : ndarray, shape (blocks, 2)
-        Top-drive speed (rad/s) and bit angle (rad) in the frame per state; for traces.
-    angle_by_top, angle_by_bit : float
-        Top angle after one step per held torque on the top and on the bit (rad per N m);
-        a braking torque on the bit counts positive.
-    speed_by_top, speed_by_bit : float
-        Bit speed after one step per the same (rad/s per N m).
-    top_speed_by_top, top_speed_by_bit : float
-        Top speed after one step per the same.
-    drag : float
-        Torque of all damping to ground per set speed (N m s/rad).
-    pipe_offset, twist_offset : float
-        Pipe torque (N m s/rad) and twist (s) that this drag causes, per set speed.
-    pipe_by_top, pipe_by_bit : float
-        Pipe torque per held torque on the top and on the bit (braking) that the modes left out
-        carry: faster than a step, they follow at once.
-    """
-
-    free: Any
+    free: Any  # shape (blocks, 4): A of each block by rows
+    # shape (blocks, 4): B of each block: first state by top and bit torque, second state by the
+    # same
     push: Any
-    pipe: Any
+    pipe: Any  # shape (blocks, 2): Pipe torque per state (N m)
+    # shape (blocks, 2): Top-drive speed (rad/s) and bit angle (rad) in the frame per state; for
+    # traces
     top_speed: Any
     bit_angle: Any
+    # top angle after one step per held torque on the top and on the bit (rad per N m); a braking
+    # torque on the bit counts positive
     angle_by_top: Any
     angle_by_bit: Any
+    # bit speed after one step per the same (rad/s per N m)
     speed_by_top: Any
     speed_by_bit: Any
+    # top speed after one step per the same
     top_speed_by_top: Any
     top_speed_by_bit: Any
-    drag: Any
+    drag: Any  # torque of all damping to ground per set speed (N m s/rad)
+    # pipe torque (N m s/rad) and twist (s) that this drag causes, per set speed
     pipe_offset: Any
     twist_offset: Any
+    # pipe torque per held torque on the top and on the bit (braking) that the modes left out
+    # carry: faster than a step, they follow at once
     pipe_by_top: Any
     pipe_by_bit: Any
 
@@ -139,21 +106,14 @@ class DenseString(NamedTuple):
 
 
 class Swing(NamedTuple):
-    """What a pass over the string tells.
+    """What a pass over the string tells."""
 
-    Attributes
-    ----------
-    top_angle, bit_speed, top_speed : row
-        In the frame at the end of the step, were there no torque in it (rad, rad/s, rad/s); the
-        top speed where something asks for it, else zero.
-    pipe : row
-        Pipe torque at its beginning (N m).
-    """
-
+    # in the frame at the end of the step, were there no torque in it (rad, rad/s, rad/s); the top
+    # speed where something asks for it, else zero
     top_angle: Any
     bit_speed: Any
     top_speed: Any
-    pipe: Any
+    pipe: Any  # pipe torque at its beginning (N m)
 
 
 def complete_and_propagate(string: Any, drive: Any, observer: Any, state: Any, work: Any) -> Any:

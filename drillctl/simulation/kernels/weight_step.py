@@ -35,63 +35,43 @@ _next_level = inlined(AlarmWeight.next_level)
 
 
 class RealWeightStep(NamedTuple):
-    """`RealWeight` for steps of one length.
+    """`RealWeight` for steps of one length."""
 
-    Attributes
-    ----------
-    nominal, gain, set_speed, least, most : ndarray
-        As in the law.
-    back : ndarray
-        Whole steps to the older of the two signals that are seen at the end of a step, which is
-        at the soonest the one before the last.
-    share : ndarray
-        Share of the newer one; over 1 where the delay is under a step.
-    seen_keep, seen_ramp : ndarray
-        Share of its value that the sensor keeps over a step; share of the change of a straight
-        input that it has followed at the end.
-    hoist_keep, hoist_ramp : ndarray
-        The same of the hoist.
-    most_moved : ndarray
-        Largest change of the weight in a step (N).
-    """
-
+    # as in the law
     nominal: Any
     gain: Any
     set_speed: Any
     least: Any
     most: Any
+    # whole steps to the older of the two signals that are seen at the end of a step, which is at
+    # the soonest the one before the last
     back: Any
-    share: Any
+    share: Any  # share of the newer one; over 1 where the delay is under a step
+    # share of its value that the sensor keeps over a step; share of the change of a straight
+    # input that it has followed at the end
     seen_keep: Any
     seen_ramp: Any
+    # the same of the hoist
     hoist_keep: Any
     hoist_ramp: Any
-    most_moved: Any
+    most_moved: Any  # largest change of the weight in a step (N)
 
 
 class ReadWeightStep(NamedTuple):
-    """`RealWeight` with a signal that is read at equal intervals, for steps of one length.
+    """`RealWeight` with a signal that is read at equal intervals, for steps of one length."""
 
-    Attributes
-    ----------
-    nominal, gain, set_speed, least, most : ndarray
-        As in the law.
-    delay, period : ndarray
-        In steps.
-    hoist_decay : ndarray
-        By how much the hoist decays in a step, as the exponent: step over time constant.
-    seen_keep, seen_ramp, hoist_keep, hoist_ramp, most_moved : ndarray
-        As in `RealWeightStep`.
-    """
-
+    # as in the law
     nominal: Any
     gain: Any
     set_speed: Any
     least: Any
     most: Any
+    # in steps
     delay: Any
     period: Any
+    # by how much the hoist decays in a step, as the exponent: step over time constant
     hoist_decay: Any
+    # as in `RealWeightStep`
     seen_keep: Any
     seen_ramp: Any
     hoist_keep: Any
@@ -100,16 +80,9 @@ class ReadWeightStep(NamedTuple):
 
 
 class AlarmWeightStep(NamedTuple):
-    """`AlarmWeight` for steps of one length.
+    """`AlarmWeight` for steps of one length."""
 
-    Attributes
-    ----------
-    nominal, floor, delay, window, alarm, calm, reduction : ndarray
-        As in the law.
-    seen_keep, seen_ramp, hoist_keep, hoist_ramp, most_moved : ndarray
-        As in `RealWeightStep`.
-    """
-
+    # as in the law
     nominal: Any
     floor: Any
     delay: Any
@@ -117,6 +90,7 @@ class AlarmWeightStep(NamedTuple):
     alarm: Any
     calm: Any
     reduction: Any
+    # as in `RealWeightStep`
     seen_keep: Any
     seen_ramp: Any
     hoist_keep: Any
@@ -125,18 +99,12 @@ class AlarmWeightStep(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What a block of lanes remembers beside its named rows; parts of the same flat array.
+    """What a block of lanes remembers beside its named rows; parts of the same flat array."""
 
-    Attributes
-    ----------
-    ring : ndarray, shape (steps x WIDTH,)
-        Signals of the last steps, step after step; a power of two of them, so that a place in the
-        ring is a mask away. Places before the start hold the first signal.
-    estimate, moved : ndarray, shape (states x WIDTH,)
-        States of the observer, and room for them.
-    """
-
+    # shape (steps x WIDTH,): Signals of the last steps, step after step; a power of two of them,
+    # so that a place in the ring is a mask away. Places before the start hold the first signal.
     ring: Any
+    # shape (states x WIDTH,): States of the observer, and room for them
     estimate: Any
     moved: Any
 

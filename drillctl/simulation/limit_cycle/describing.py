@@ -112,22 +112,7 @@ class HarmonicCycle:
 def mean_torque_and_slope(
     design: Design, mean: ArrayLike, amplitude: ArrayLike
 ) -> tuple[Array, Array]:
-    """What the rock gives to a bit that turns at mean + amplitude cos.
-
-    Parameters
-    ----------
-    design : Design
-        Its rock and its weight on bit.
-    mean, amplitude : array_like
-        Speeds (rad/s), more than zero; broadcast against each other.
-
-    Returns
-    -------
-    mean_torque : ndarray
-        T0 (N m).
-    slope : ndarray
-        Equivalent falling slope D(A) (N m s/rad).
-    """
+    """What the rock gives to a bit that turns at mean + amplitude cos."""
     mean, amplitude = np.broadcast_arrays(
         np.asarray(mean, dtype=float), np.asarray(amplitude, dtype=float)
     )
@@ -182,18 +167,7 @@ def harmonic_cycles(design: Design, modes: int = MODES) -> tuple[HarmonicCycle, 
 
 
 def rising_crossings(design: Design) -> tuple[tuple[float, float], ...]:
-    """Crossings at which the reactance of the bit rises, by rising frequency.
-
-    Parameters
-    ----------
-    design : Design
-        String and drive.
-
-    Returns
-    -------
-    tuple of (float, float)
-        Angular frequency (rad/s) and slope (N m s/rad).
-    """
+    """Crossings at which the reactance of the bit rises, by rising frequency."""
     ends = ends_of(design.string)
     found = crossings(ends, *design.top_drive.gains())
     order = np.argsort(found.omega)

@@ -41,48 +41,26 @@ SPEED_STEP = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """One phase of a flight.
+    """One phase of a flight."""
 
-    Attributes
-    ----------
-    begin, end : float
-        Times (s).
-    direction : int
-        +1 or -1 in slip; 0 in stick.
-    solution : callable or None
-        Time (s), shape (n,), to angles and speeds in the frame, shape (2 nodes, n), where asked
-        for.
-    extremes : ndarray
-        Times at which the bit speed has an extreme (s).
-    """
-
+    # times (s)
     begin: float
     end: float
-    direction: int
+    direction: int  # +1 or -1 in slip; 0 in stick
+    # time (s), shape (n,), to angles and speeds in the frame, shape (2 nodes, n), where asked for
     solution: Callable[[Any], Array] | None
-    extremes: Array
+    extremes: Array  # times at which the bit speed has an extreme (s)
 
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Where a motion has come to.
+    """Where a motion has come to."""
 
-    Attributes
-    ----------
-    point : ndarray, shape (coordinates,)
-        At the end.
-    rates : ndarray, shape (coordinates,)
-        Its rate of change there (1/s).
-    matrix : ndarray, shape (coordinates, coordinates) or None
-        Change of the end per change of the start, where asked for.
-    legs : tuple of Leg
-        The phases on the way.
-    """
-
-    point: Array
-    rates: Array
+    point: Array  # shape (coordinates,): At the end
+    rates: Array  # shape (coordinates,): Its rate of change there (1/s)
+    # shape (coordinates, coordinates): Change of the end per change of the start, where asked for
     matrix: Array | None
-    legs: tuple[Leg, ...]
+    legs: tuple[Leg, ...]  # the phases on the way
 
 
 class Flow:
@@ -134,25 +112,7 @@ class Flow:
     def follow(
         self, point: Array, duration: float, matrix: bool = True, dense: bool = False
     ) -> Flight:
-        """Follow a motion for a given time.
-
-        Parameters
-        ----------
-        point : ndarray, shape (coordinates,)
-            Where it starts.
-        duration : float
-            For how long (s).
-        matrix : bool
-            Whether neighbours are followed too.
-        dense : bool
-            Whether the legs keep their solutions.
-
-        Raises
-        ------
-        SimulationError
-            The integrator failed, a change of phase is met at a tangent, or there is no end
-            of them.
-        """
+        """Follow a motion for a given time."""
         state = self.state(point)
         near = self.lifted.copy() if matrix else None
         direction, time = self.system.direction_at(LATER, state), 0.0

@@ -190,15 +190,7 @@ def _refuse_printed_law(design: Design) -> None:
 
 
 def expected_period(design: Design, harmonic: tuple[HarmonicCycle, ...]) -> float:
-    """A period to measure time by (s): of the lowest cycle, else of the lowest oscillation.
-
-    Parameters
-    ----------
-    design : Design
-        Rig and control.
-    harmonic : tuple of HarmonicCycle
-        Its cycles by harmonic balance.
-    """
+    """A period to measure time by (s): of the lowest cycle, else of the lowest oscillation."""
     if harmonic:
         return harmonic[0].period
     lowest = rising_crossings(design)

@@ -138,26 +138,7 @@ class Returns:
 def long_run(
     design: Design, period: float, periods: int, start: Kind | None, tolerance: float
 ) -> Returns:
-    """Simulate for many expected periods and take the returns of the second half.
-
-    Parameters
-    ----------
-    design : Design
-        Rig and control.
-    period : float
-        Expected period (s).
-    periods : int
-        Length of the run, in expected periods.
-    start : {'rest', 'turning', 'wound_up'} or None
-        Where it starts; None for the design's own start.
-    tolerance : float
-        Of the reference solver.
-
-    Raises
-    ------
-    SimulationError
-        The reference solver could not finish.
-    """
+    """Simulate for many expected periods and take the returns of the second half."""
     values: dict[str, Any] = {
         "simulation.duration": f"{period * periods!r} s",
         "simulation.j1_from": "0 s",
@@ -169,17 +150,7 @@ def long_run(
 
 
 def take_returns(motion: Motion, period: float, level: float | None = None) -> Returns:
-    """The returns in the second half of a run.
-
-    Parameters
-    ----------
-    motion : Motion
-        As the reference solver left it.
-    period : float
-        Expected period (s).
-    level : float, optional
-        Bit speed (rad/s) through which a return rises, instead of the mean.
-    """
+    """The returns in the second half of a run."""
     trace = _Trace(motion)
     duration = motion.pieces[-1].end
     begin = 0.5 * duration
@@ -212,22 +183,7 @@ def take_returns(motion: Motion, period: float, level: float | None = None) -> R
 
 
 def judge(design: Design, returns: Returns) -> tuple[str, Orbit | None]:
-    """What a long run comes to.
-
-    Parameters
-    ----------
-    design : Design
-        What was simulated.
-    returns : Returns
-        Of its second half.
-
-    Returns
-    -------
-    status : str
-        One of `STATUSES`.
-    orbit : Orbit or None
-        Where it is periodic.
-    """
+    """What a long run comes to."""
     if returns.stalled:
         return "stalled", None
     if returns.settled:

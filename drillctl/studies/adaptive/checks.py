@@ -31,22 +31,13 @@ ONE_CELL = 1.0 + 1e-9
 
 @dataclass(frozen=True, eq=False)
 class SelfCheck:
-    """A random sample of the cells that were left out, simulated after all.
+    """A random sample of the cells that were left out, simulated after all."""
 
-    Attributes
-    ----------
-    cells : ndarray of int, shape (checked,)
-        In the flattened map.
-    said, found : ndarray of int8, shape (checked,)
-        Band of each cell, as the contours said and as it turned out.
-    followed : int
-        Cells simulated to follow the contours that a mismatch had betrayed.
-    """
-
-    cells: Cells
+    cells: Cells  # shape (checked,): In the flattened map
+    # shape (checked,): Band of each cell, as the contours said and as it turned out
     said: Bands
     found: Bands
-    followed: int
+    followed: int  # cells simulated to follow the contours that a mismatch had betrayed
 
     @property
     def mismatches(self) -> Cells:
@@ -84,17 +75,7 @@ class SelfCheck:
 
 
 def self_check(found: ContourSearch, lattice: Lattice, count: int) -> SelfCheck:
-    """Simulate a sample of the cells that a search left out, and follow what it missed.
-
-    Parameters
-    ----------
-    found : ContourSearch
-        Finished; it takes up the sample, and the contours that come to light with it.
-    lattice : Lattice
-        The grid itself.
-    count : int
-        Cells of the sample; fewer if no more were left out.
-    """
+    """Simulate a sample of the cells that a search left out, and follow what it missed."""
     left = np.flatnonzero(~found.seen.ravel())
     random = np.random.default_rng(SEED)
     cells = np.sort(random.choice(left, min(count, len(left)), replace=False)).astype(np.int64)
@@ -108,26 +89,16 @@ def self_check(found: ContourSearch, lattice: Lattice, count: int) -> SelfCheck:
 
 @dataclass(frozen=True)
 class Mismatch:
-    """An adaptive region beside that of the full grid.
+    """An adaptive region beside that of the full grid."""
 
-    Attributes
-    ----------
-    cells : int
-        In one region and not in the other.
-    area_fraction : float
-        Their share of the map.
-    farthest : float
-        Largest distance of one of them from the edge of the full grid's region (cells along the
-        axis where it is larger): 1 for a cell next to one of the other side; 0 without any,
-        infinite where that region has no edge.
-    hausdorff : float
-        Distance of the outlines from each other (cells): no point of either is farther from the
-        other. 0 where both are empty, infinite where one is.
-    """
-
-    cells: int
-    area_fraction: float
+    cells: int  # in one region and not in the other
+    area_fraction: float  # their share of the map
+    # largest distance of one of them from the edge of the full grid's region (cells along the
+    # axis where it is larger): 1 for a cell next to one of the other side; 0 without any,
+    # infinite where that region has no edge
     farthest: float
+    # distance of the outlines from each other (cells): no point of either is farther from the
+    # other. 0 where both are empty, infinite where one is.
     hausdorff: float
 
     @property
@@ -148,21 +119,11 @@ class Mismatch:
 
 @dataclass(frozen=True, eq=False)
 class FullAudit:
-    """The full grid beside an adaptive map.
+    """The full grid beside an adaptive map."""
 
-    Attributes
-    ----------
-    j1 : ndarray, shape of the map
-        Of every cell (s); NaN where it failed.
-    mismatches : dict of float to Mismatch
-        By level.
-    trajectories : int
-        Cells that were simulated for it.
-    """
-
-    j1: Array
-    mismatches: dict[float, Mismatch]
-    trajectories: int
+    j1: Array  # shape of the map: Of every cell (s); NaN where it failed
+    mismatches: dict[float, Mismatch]  # by level
+    trajectories: int  # cells that were simulated for it
 
     @property
     def verdict(self) -> str:
@@ -179,19 +140,7 @@ class FullAudit:
 
 
 def full_audit(values: Array, j1: Array, levels: tuple[float, ...], trajectories: int) -> FullAudit:
-    """Set the regions of an adaptive map beside those of the full grid.
-
-    Parameters
-    ----------
-    values : ndarray, shape of the map
-        J1 where it was simulated, any value of the cell's band elsewhere (s).
-    j1 : ndarray, shape of the map
-        Of every cell (s); NaN where it failed.
-    levels : tuple of float
-        Increasing (s).
-    trajectories : int
-        Cells that were simulated for the audit.
-    """
+    """Set the regions of an adaptive map beside those of the full grid."""
     # Over the indices of the grid, where a cell is 1 by 1.
     axes = tuple(Axis(str(n), "", np.arange(k, dtype=float)) for n, k in enumerate(j1.shape))
     compared = {
@@ -201,13 +150,7 @@ def full_audit(values: Array, j1: Array, levels: tuple[float, ...], trajectories
 
 
 def mismatch(found: Region, full: Region) -> Mismatch:
-    """Set a region beside that of the full grid.
-
-    Parameters
-    ----------
-    found, full : Region
-        Of the adaptive map and of the full grid, over the indices of the grid.
-    """
+    """Set a region beside that of the full grid."""
     wrong = found.mask != full.mask
     return Mismatch(
         cells=int(wrong.sum()),

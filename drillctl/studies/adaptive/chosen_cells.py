@@ -24,28 +24,6 @@ class ChosenCells:
 
     A cell has the same bits as in a sweep of the whole grid: string, step and modes are those of
     all its lanes.
-
-    Parameters
-    ----------
-    design : Design
-        What is varied.
-    axes : tuple of Axis
-        Of the grid.
-    progress : Progress
-        Told of lanes.
-    blocks : Blocks, optional
-        Where finished blocks are kept and found again; cells must then be asked for in the same
-        order.
-
-    Attributes
-    ----------
-    seconds : float
-        Spent in the lanes alone (s).
-
-    Raises
-    ------
-    InputError
-        A value on the grid is impossible.
     """
 
     def __init__(
@@ -77,18 +55,7 @@ class ChosenCells:
         return next(iter(found)) if len(found) == 1 else (None, None)
 
     def simulate(self, cells: Cells) -> Batch:
-        """Simulate cells.
-
-        Parameters
-        ----------
-        cells : ndarray of int, shape (cells,)
-            In the flattened grid.
-
-        Returns
-        -------
-        Batch
-            In the order of the cells.
-        """
+        """Simulate cells."""
         measures = {name: np.full(len(cells), np.nan) for name in FLOATS}
         status = np.empty(len(cells), dtype=np.int8)
         numbers = [int(number) for number in np.unique(self._group[cells])]

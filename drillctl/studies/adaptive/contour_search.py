@@ -52,47 +52,23 @@ UNKNOWN = -1
 
 
 def bands_of(values: Array, levels: tuple[float, ...]) -> Bands:
-    """Band of each value: how many levels it lies above; above all of them where it is NaN.
-
-    Parameters
-    ----------
-    values : ndarray
-        Of the function.
-    levels : tuple of float
-        Increasing.
-    """
+    """Band of each value: how many levels it lies above; above all of them where it is NaN."""
     told = np.where(np.isnan(values), np.inf, values)
     return np.searchsorted(np.asarray(levels), told, side="left").astype(np.int8)
 
 
 @dataclass(eq=False)
 class ContourSearch:
-    """What is known of a function on a grid; it grows while the contours are looked for.
+    """What is known of a function on a grid; it grows while the contours are looked for."""
 
-    Attributes
-    ----------
-    look : callable
-        Values of the function at cells of the flattened grid; NaN where there is none.
-    shape : tuple of int
-        Of the grid.
-    levels : tuple of float
-        Whose contours are looked for, increasing.
-    values : ndarray, shape of the grid
-        Where it was looked, NaN elsewhere.
-    seen : ndarray of bool, shape of the grid
-        Where it was looked.
-    bands : ndarray of int8, shape of the grid
-        Number of levels that a cell lies above.
-    order : list of ndarray of int
-        Cells as they were looked at, one array each time.
-    """
-
+    # values of the function at cells of the flattened grid; NaN where there is none
     look: Callable[[Cells], Array]
-    shape: tuple[int, int]
-    levels: tuple[float, ...]
-    values: Array = field(init=False)
-    seen: Mask = field(init=False)
-    bands: Bands = field(init=False)
+    shape: tuple[int, int]  # of the grid
+    levels: tuple[float, ...]  # whose contours are looked for, increasing
+    values: Array = field(init=False)  # shape of the grid: Where it was looked, NaN elsewhere
+    seen: Mask = field(init=False)  # shape of the grid: Where it was looked
+    bands: Bands = field(init=False)  # shape of the grid: Number of levels that a cell lies above
+    # cells as they were looked at, one array each time
     order: list[Cells] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
@@ -204,24 +180,7 @@ def search(
     levels: tuple[float, ...],
     intervals: int = INTERVALS,
 ) -> ContourSearch:
-    """Look for the contours of a function on a grid.
-
-    Parameters
-    ----------
-    look : callable
-        Takes cells of the flattened grid, gives the values there; NaN counts as above all levels.
-    shape : tuple of int
-        Of the grid, at least two points along each axis.
-    levels : tuple of float
-        Whose contours are looked for, increasing.
-    intervals : int
-        Of the coarsest lattice along an axis, at least.
-
-    Returns
-    -------
-    ContourSearch
-        With every cell in its band.
-    """
+    """Look for the contours of a function on a grid."""
     found = ContourSearch(look, shape, levels)
     found.run(nested_lattices(shape, intervals))
     return found

@@ -13,19 +13,12 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Some rows and some columns of a grid, the first and the last of both among them.
+    """Some rows and some columns of a grid, the first and the last of both among them."""
 
-    Attributes
-    ----------
-    rows, columns : ndarray of int
-        Increasing indices along the first and the second axis of the grid.
-    steps : tuple of int
-        Spacing along either axis; the last one may be shorter.
-    """
-
+    # increasing indices along the first and the second axis of the grid
     rows: Indices
     columns: Indices
-    steps: tuple[int, int]
+    steps: tuple[int, int]  # spacing along either axis; the last one may be shorter
 
     @property
     def points(self) -> tuple[Indices, Indices]:
@@ -40,21 +33,7 @@ class Lattice:
 
 
 def nested_lattices(shape: tuple[int, int], intervals: int) -> tuple[Lattice, ...]:
-    """The lattices of a grid, from the coarsest to the grid itself.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Points of the grid along either axis.
-    intervals : int
-        The coarsest lattice has at least as many intervals along an axis; the whole axis where
-        the grid has no more.
-
-    Returns
-    -------
-    tuple of Lattice
-        Along each axis the spacing halves from one to the next until it is 1.
-    """
+    """The lattices of a grid, from the coarsest to the grid itself."""
     steps = [_coarsest_step(points, intervals) for points in shape]
     made = [_lattice(shape, steps)]
     while max(steps) > 1:
@@ -79,19 +58,7 @@ def _lattice(shape: tuple[int, int], steps: list[int]) -> Lattice:
 
 
 def around(coarse: Lattice, fine: Lattice) -> tuple[tuple[Indices, Indices], ...]:
-    """The coarse points around every fine one.
-
-    Parameters
-    ----------
-    coarse, fine : Lattice
-        Neighbours in `nested_lattices`.
-
-    Returns
-    -------
-    tuple of four pairs of ndarray
-        Each an index into an array of the coarse lattice, of the shape of the fine one. A fine
-        point between two coarse ones is given each twice, one that is coarse itself four times.
-    """
+    """The coarse points around every fine one."""
     below, above = zip(
         *(
             (np.searchsorted(old, new, "right") - 1, np.searchsorted(old, new, "left"))
@@ -104,19 +71,7 @@ def around(coarse: Lattice, fine: Lattice) -> tuple[tuple[Indices, Indices], ...
 
 
 def in_quads(quads: Mask, coarse: Lattice, fine: Lattice) -> Mask:
-    """Fine points inside or on the rim of some quads of the coarse lattice.
-
-    Parameters
-    ----------
-    quads : ndarray of bool, shape of the coarse lattice less one along each axis
-        The quads, each by its lowest corner.
-    coarse, fine : Lattice
-        Neighbours in `nested_lattices`.
-
-    Returns
-    -------
-    ndarray of bool, shape of the fine lattice
-    """
+    """Fine points inside or on the rim of some quads of the coarse lattice."""
     ringed = np.pad(quads, 1)  # quad (i, j) stands at (i + 1, j + 1): no quads beyond the rim
     found = np.zeros(fine.shape, dtype=bool)
     sides = []
@@ -131,17 +86,7 @@ def in_quads(quads: Mask, coarse: Lattice, fine: Lattice) -> Mask:
 
 
 def corners(values: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Values at the corners of every quad of an array of points.
-
-    Parameters
-    ----------
-    values : ndarray, shape (rows, columns)
-        At the points.
-
-    Returns
-    -------
-    ndarray, shape (4, rows - 1, columns - 1)
-    """
+    """Values at the corners of every quad of an array of points."""
     return np.stack([values[:-1, :-1], values[1:, :-1], values[:-1, 1:], values[1:, 1:]])
 
 

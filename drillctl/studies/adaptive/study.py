@@ -208,23 +208,7 @@ class AdaptiveMap:
 
 
 def banded(bands: Bands, levels: tuple[float, ...], cells: Cells, j1: Array) -> Array:
-    """Values in the bands of their cells, those of J1 where it is known.
-
-    Parameters
-    ----------
-    bands : ndarray of int8, shape of the map
-        Number of levels that each cell lies above.
-    levels : tuple of float
-        Increasing (s).
-    cells : ndarray of int, shape (trajectories,)
-        Simulated cells of the flattened map.
-    j1 : ndarray, shape (trajectories,)
-        Of these (s).
-
-    Returns
-    -------
-    ndarray, shape of the map
-    """
+    """Values in the bands of their cells, those of J1 where it is known."""
     between = [0.5 * (low + high) for low, high in pairwise(levels)]
     stand_in = np.array([0.5 * levels[0], *between, 2.0 * levels[-1]])
     values = stand_in[bands]

@@ -34,39 +34,19 @@ PATHS = (KP, KI, GAIN)
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A policy at its robust optimum on some terms, at fresh draws.
+    """A policy at its robust optimum on some terms, at fresh draws."""
 
-    Attributes
-    ----------
-    policy, terms : str
-        Names.
-    gains : dict
-        Path to value (SI).
-    at_bounds : tuple of str
-        Gains that lie on a bound.
-    shift : float
-        Added to the nominal weight (N).
-    off : float
-        What the terms' mean is off by at that shift, over that of the constant weight.
-    tuned_value : float
-        Objective at the draws of the tuning (s), which flatters.
-    objective : Estimate
-        At the fresh draws (s).
-    objective_less : Estimate
-        Less that of the constant weight, by resampled pairs (s).
-    measures : dict of ndarray, shape (realizations,)
-        By the names of `MEASURES` (SI); NaN where undefined.
-    """
-
+    # names
     policy: str
     terms: str
-    gains: dict[str, float]
-    at_bounds: tuple[str, ...]
-    shift: float
-    off: float
-    tuned_value: float
-    objective: Estimate
-    objective_less: Estimate
+    gains: dict[str, float]  # path to value (SI)
+    at_bounds: tuple[str, ...]  # gains that lie on a bound
+    shift: float  # added to the nominal weight (N)
+    off: float  # what the terms' mean is off by at that shift, over that of the constant weight
+    tuned_value: float  # objective at the draws of the tuning (s), which flatters
+    objective: Estimate  # at the fresh draws (s)
+    objective_less: Estimate  # less that of the constant weight, by resampled pairs (s)
+    # shape (realizations,): By the names of `MEASURES` (SI); NaN where undefined
     measures: dict[str, Array]
 
     @property
@@ -131,14 +111,9 @@ class Case:
 
 @dataclass(frozen=True)
 class Optima:
-    """Optima at the design's own weight and speed, at equal nominal weight.
+    """Optima at the design's own weight and speed, at equal nominal weight."""
 
-    Attributes
-    ----------
-    constant, ideal, real : Optimum
-        Of the policies.
-    """
-
+    # of the policies
     constant: Optimum
     ideal: Optimum
     real: Optimum
@@ -163,19 +138,7 @@ STARTS = (0.0, 500.0, 1500.0)
 def optimum_beside(
     policy: Policy, realizations: int, constant: Optimum, starts: Sequence[Array] = ()
 ) -> Optimum:
-    """The optimum of a policy that contains the constant weight, whose gains it starts from.
-
-    Parameters
-    ----------
-    policy : Policy
-        One whose weight does not follow is the constant weight itself.
-    realizations : int
-        Draws.
-    constant : Optimum
-        Of the constant weight, at the same weight and speed.
-    starts : sequence of ndarray
-        Further gains that are known to be good somewhere near (SI).
-    """
+    """The optimum of a policy that contains the constant weight, whose gains it starts from."""
     if not policy.follows:
         return constant
     own = [np.append(constant.values, gain) for gain in STARTS]
@@ -183,19 +146,7 @@ def optimum_beside(
 
 
 def cases(compared: Policies, optima: Optima, fresh: Fresh, progress: Progress) -> tuple[Case, ...]:
-    """The table's cases, the constant weight first.
-
-    Parameters
-    ----------
-    compared : Policies
-        At the design's own weight and speed.
-    optima : Optima
-        At equal nominal weight.
-    fresh : Fresh
-        Draws.
-    progress : Progress
-        Told of cases.
-    """
+    """The table's cases, the constant weight first."""
     baseline = compared.constant.with_gains(optima.constant.values)
     ground = fresh.run(baseline)
     below = ground.resampled(fresh)

@@ -27,23 +27,12 @@ the constant weight less its own."""
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Every policy at every weight and speed, each time at its own robust optimum.
+    """Every policy at every weight and speed, each time at its own robust optimum."""
 
-    Attributes
-    ----------
-    weights : ndarray, shape (weights,)
-        Nominal weight (N).
-    speeds : ndarray, shape (speeds,)
-        Set speed (rad/s).
-    policies : tuple of str
-        Names, the constant weight first.
-    figures : dict of ndarray, shape (policies, weights, speeds)
-        By the names of `FIGURES` (SI); NaN where unknown.
-    """
-
-    weights: Array
-    speeds: Array
-    policies: tuple[str, ...]
+    weights: Array  # shape (weights,): Nominal weight (N)
+    speeds: Array  # shape (speeds,): Set speed (rad/s)
+    policies: tuple[str, ...]  # names, the constant weight first
+    # shape (policies, weights, speeds): By the names of `FIGURES` (SI); NaN where unknown
     figures: dict[str, Array]
 
     def at_speed(self, speed: float) -> Chart | None:
@@ -64,19 +53,7 @@ def chart(
     compared: Policies, weights: Sequence[float], speeds: Sequence[float], fresh: Fresh,
     progress: Progress,
 ) -> Chart:  # fmt: skip
-    """Tune every policy at every weight and speed, and measure it at the fresh draws.
-
-    Parameters
-    ----------
-    compared : Policies
-        What is tuned.
-    weights, speeds : sequence of float
-        Nominal weights (N) and set speeds (rad/s).
-    fresh : Fresh
-        Draws that the gains found are measured at.
-    progress : Progress
-        Told of gains found.
-    """
+    """Tune every policy at every weight and speed, and measure it at the fresh draws."""
     shape = (len(compared), len(weights), len(speeds))
     figures = {name: np.full(shape, np.nan) for name in FIGURES}
     known: dict[tuple[int, int, int], Optimum] = {}

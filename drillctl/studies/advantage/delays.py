@@ -33,21 +33,12 @@ STEPS_ANEW = 5
 
 @dataclass(frozen=True)
 class Crossing:
-    """Delay at which an advantage first falls to a threshold.
+    """Delay at which an advantage first falls to a threshold."""
 
-    Attributes
-    ----------
-    delay : float or None
-        On straight lines between the delays (s); None if it never does.
-    interval_95 : tuple of float or None
-        Percentiles over resampled draws; None for an end beyond the longest delay.
-    within : float
-        Share of the resamples in which it does.
-    """
-
-    delay: float | None
+    delay: float | None  # on straight lines between the delays (s); None if it never does
+    # percentiles over resampled draws; None for an end beyond the longest delay
     interval_95: tuple[float | None, float | None]
-    within: float
+    within: float  # share of the resamples in which it does
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values."""
@@ -56,31 +47,17 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class DelayLine:
-    """One choice of gains over the delays, at the same fresh draws.
+    """One choice of gains over the delays, at the same fresh draws."""
 
-    Attributes
-    ----------
-    delays : ndarray, shape (delays,)
-        Increasing (s), closer together where the advantage vanishes.
-    gains : ndarray, shape (delays, 3)
-        kp, ki and the gain of the weight (SI).
-    objective : ndarray, shape (delays,)
-        At the fresh draws (s).
-    advantage, low, high : ndarray, shape (delays,)
-        Objective of the constant weight less that, and its 95 % interval (s).
-    zero : Crossing
-        Where the advantage first is none.
-    material : Crossing
-        Where it first falls under the stated share of the constant weight's objective.
-    """
-
-    delays: Array
-    gains: Array
-    objective: Array
+    delays: Array  # shape (delays,): Increasing (s), closer together where the advantage vanishes
+    gains: Array  # shape (delays, 3): kp, ki and the gain of the weight (SI)
+    objective: Array  # shape (delays,): At the fresh draws (s)
+    # shape (delays,): Objective of the constant weight less that, and its 95 % interval (s)
     advantage: Array
     low: Array
     high: Array
-    zero: Crossing
+    zero: Crossing  # where the advantage first is none
+    # where it first falls under the stated share of the constant weight's objective
     material: Crossing
 
     @property
@@ -92,24 +69,14 @@ class DelayLine:
 
 @dataclass(frozen=True, eq=False)
 class DelayCurve:
-    """The advantage against the delay of the path.
+    """The advantage against the delay of the path."""
 
-    Attributes
-    ----------
-    delays : ndarray, shape (delays,)
-        Of the way from the bit to the driller (s); lags and limits are the same at all.
-    constant : float
-        Objective of the constant weight (s).
-    kept : DelayLine
-        Gains of the ideal path.
-    anew : DelayLine
-        Gains tuned at each delay.
-    """
-
+    # shape (delays,): Of the way from the bit to the driller (s); lags and limits are the same at
+    # all
     delays: Array
-    constant: float
-    kept: DelayLine
-    anew: DelayLine
+    constant: float  # objective of the constant weight (s)
+    kept: DelayLine  # gains of the ideal path
+    anew: DelayLine  # gains tuned at each delay
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values, SI."""
@@ -132,19 +99,7 @@ class DelayCurve:
 
 
 def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Progress) -> DelayCurve:
-    """Advantage of the real path over the delays of the design's `[advantage]` table.
-
-    Parameters
-    ----------
-    compared : Policies
-        At the design's own weight and speed.
-    optima : Optima
-        There.
-    fresh : Fresh
-        Draws.
-    progress : Progress
-        Told of delays.
-    """
+    """Advantage of the real path over the delays of the design's `[advantage]` table."""
     ground = fresh.run(compared.constant.with_gains(optima.constant.values))
     constant = np.append(ground.value, ground.resampled(fresh))
     table = compared.real.design.tables.advantage
@@ -261,15 +216,7 @@ def _line(points: Points, constant: Array, share: float) -> DelayLine:
 
 
 def crossing(delays: Array, margin: Array) -> Crossing:
-    """Where a margin first is not positive.
-
-    Parameters
-    ----------
-    delays : ndarray, shape (delays,)
-        Increasing (s).
-    margin : ndarray, shape (delays, 1 + resamples)
-        Of the draws first, then of each resample.
-    """
+    """Where a margin first is not positive."""
     found = [first_not_negative(delays, -column) for column in margin.T]
     again = np.sort([np.inf if delay is None else delay for delay in found[1:]])
     tail = 0.5 * (1.0 - CONFIDENCE)

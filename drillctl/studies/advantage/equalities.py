@@ -29,18 +29,11 @@ STILL = 1e-3
 
 
 class Terms(NamedTuple):
-    """On what terms a policy is compared.
+    """On what terms a policy is compared."""
 
-    Attributes
-    ----------
-    name : str
-        What they are called.
-    measure : str or None
-        Whose mean over the draws is made that of the constant weight; None for the same nominal
-        weight.
-    """
-
-    name: str
+    name: str  # what they are called
+    # whose mean over the draws is made that of the constant weight; None for the same nominal
+    # weight
     measure: str | None
 
 
@@ -51,37 +44,15 @@ ALL_TERMS = (NOMINAL, MEAN, ROP)
 
 
 class OnTerms(NamedTuple):
-    """Gains found on some terms.
+    """Gains found on some terms."""
 
-    Attributes
-    ----------
-    found : Optimum
-        At the nominal weight with its shift.
-    shift : float
-        Added to the nominal weight (N), at the draws of the tuning.
-    rounds : int
-        Turns of gains and shift.
-    """
-
-    found: Optimum
-    shift: float
-    rounds: int
+    found: Optimum  # at the nominal weight with its shift
+    shift: float  # added to the nominal weight (N), at the draws of the tuning
+    rounds: int  # turns of gains and shift
 
 
 def tuned_on_terms(policy: Policy, terms: Terms, baseline: Design, first: Optimum) -> OnTerms:
-    """Gains of a policy on some terms, tuned at the shifted weight.
-
-    Parameters
-    ----------
-    policy : Policy
-        A weight that follows the bit speed, or a constant one, which is never shifted.
-    terms : Terms
-        What is made equal.
-    baseline : Design
-        The constant weight at its gains.
-    first : Optimum
-        Gains of the policy at equal nominal weight.
-    """
+    """Gains of a policy on some terms, tuned at the shifted weight."""
     table, own = policy.design.tables.tune, policy.design.tables.operating_point.weight_on_bit
     if terms.measure is None or not policy.follows:
         return OnTerms(first, 0.0, 0)
@@ -100,25 +71,7 @@ def tuned_on_terms(policy: Policy, terms: Terms, baseline: Design, first: Optimu
 def fresh_shift(
     policy: Policy, terms: Terms, lanes: DrawnLanes, baseline: Measured
 ) -> tuple[float, float]:
-    """The shift at which a policy is on the terms at fresh draws.
-
-    Parameters
-    ----------
-    policy : Policy
-        Whose lanes they are.
-    terms : Terms
-        What is made equal.
-    lanes : DrawnLanes
-        Of the policy at its gains.
-    baseline : Measured
-        The constant weight at the same draws.
-
-    Returns
-    -------
-    tuple of float
-        Shift (N), and what the mean is still off by, over that of the constant weight: limits of
-        the law, or a constant weight that hardly drills, may leave more than a rounding.
-    """
+    """The shift at which a policy is on the terms at fresh draws."""
     if terms.measure is None or not policy.follows:
         return 0.0, 0.0
     return matching_shift(lanes, len(baseline.j1), terms.measure, baseline.mean(terms.measure))

@@ -23,18 +23,10 @@ RESAMPLES = 1000
 
 
 class Estimate(NamedTuple):
-    """A number found from draws.
+    """A number found from draws."""
 
-    Attributes
-    ----------
-    value : float or None
-        Of these draws; None where it is not finite.
-    interval : tuple of float, or None
-        Percentiles of the bootstrap; None where a resample is not finite.
-    """
-
-    value: float | None
-    interval: Interval | None
+    value: float | None  # of these draws; None where it is not finite
+    interval: Interval | None  # percentiles of the bootstrap; None where a resample is not finite
 
     @property
     def excludes_zero(self) -> bool:
@@ -59,13 +51,7 @@ def estimate(value: float, resampled: Array) -> Estimate:
 
 
 class Fresh:
-    """Fresh draws of a design, the same numbers for every policy, weight and speed.
-
-    Parameters
-    ----------
-    design : Design
-        Its `[advantage]` gives number and seed.
-    """
+    """Fresh draws of a design, the same numbers for every policy, weight and speed."""
 
     def __init__(self, design: Design) -> None:
         table = design.tables.advantage
@@ -89,21 +75,11 @@ class Fresh:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A design at fresh draws.
+    """A design at fresh draws."""
 
-    Attributes
-    ----------
-    runs : DrawnRuns
-        Measures and statuses.
-    objective : Objective
-        That it was tuned to.
-    failures : tuple of Failures
-        Why draws came to nothing.
-    """
-
-    runs: DrawnRuns
-    objective: Objective
-    failures: tuple[Failures, ...]
+    runs: DrawnRuns  # measures and statuses
+    objective: Objective  # that it was tuned to
+    failures: tuple[Failures, ...]  # why draws came to nothing
 
     @property
     def j1(self) -> Array:

@@ -37,42 +37,18 @@ AT_BOUND = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Gains with the least objective found.
+    """Gains with the least objective found."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (parameters,)
-        SI.
-    value : float
-        Objective at the realizations of the search (s).
-    share : float
-        Share of them with J1 at or under the level.
-    at_bounds : tuple of str
-        Paths of gains that lie on a bound: the objective may be less beyond it.
-    trajectories : int
-        Runs that it took.
-    """
-
-    values: Array
-    value: float
-    share: float
+    values: Array  # shape (parameters,): SI
+    value: float  # objective at the realizations of the search (s)
+    share: float  # share of them with J1 at or under the level
+    # paths of gains that lie on a bound: the objective may be less beyond it
     at_bounds: tuple[str, ...]
-    trajectories: int
+    trajectories: int  # runs that it took
 
 
 def optimum(policy: Policy, realizations: int, starts: Sequence[Array] = ()) -> Optimum:
-    """Search the gains of a policy with the least objective.
-
-    Parameters
-    ----------
-    policy : Policy
-        Its design's `[tune]` says to what end. Step and modes are those of accuracy `fast` unless
-        the design gives a step.
-    realizations : int
-        Draws, from `tune.seed`.
-    starts : sequence of ndarray, shape (parameters,)
-        Gains that are known to be good somewhere near (SI); cut to the bounds.
-    """
+    """Search the gains of a policy with the least objective."""
     judge = _judge(policy, realizations)
     known = [judge.values(judge.shares(np.asarray(start, dtype=float))) for start in starts]
     points = spread(policy.tuned, LOOK[len(policy.tuned)])

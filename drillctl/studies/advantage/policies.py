@@ -33,21 +33,11 @@ CONSTANT, IDEAL, REAL = "constant weight", "dynamic, ideal path", "dynamic, real
 
 @dataclass(frozen=True)
 class Policy:
-    """A law of the weight on bit, and what is tuned.
+    """A law of the weight on bit, and what is tuned."""
 
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    design : Design
-        With the law in place.
-    tuned : tuple of Tuned
-        kp, ki and, where the weight follows, its gain.
-    """
-
-    name: str
-    design: Design
-    tuned: tuple[Tuned, ...]
+    name: str  # what it is called
+    design: Design  # with the law in place
+    tuned: tuple[Tuned, ...]  # kp, ki and, where the weight follows, its gain
 
     @property
     def follows(self) -> bool:
@@ -79,12 +69,6 @@ def policies(design: Design) -> Policies:
     """The policies of a design's `[advantage]` table.
 
     A gain that may only be zero is a constant weight: all three are the same then.
-
-    Raises
-    ------
-    InputError
-        A controller that is not a PI, a weight law that does not follow the bit speed, impossible
-        values or bounds, or something drawn that the study sets itself.
     """
     if design.tables.controller.law != "pi":
         raise InputError(

@@ -29,34 +29,17 @@ INDEPENDENT = Scatter(1)
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """J1 of one policy over the gains of the drive.
+    """J1 of one policy over the gains of the drive."""
 
-    Attributes
-    ----------
-    policy : str
-        Name.
-    gain : float
-        Of the weight (N s/rad).
-    kp, ki : ndarray, shape (points,)
-        Axes: the bounds of the tuning (SI).
-    j1 : ndarray, shape (kp, ki, realizations)
-        J1 at fresh draws (s); infinite where one failed.
-    nominal : ndarray, shape (kp, ki)
-        J1 without draws (s); NaN where it failed.
-    levels : tuple of float
-        Levels of J1 (s).
-    seed : int
-        Of the resampling.
-    """
-
-    policy: str
-    gain: float
+    policy: str  # name
+    gain: float  # of the weight (N s/rad)
+    # shape (points,): Axes: the bounds of the tuning (SI)
     kp: Array
     ki: Array
-    j1: Array
-    nominal: Array
-    levels: tuple[float, ...]
-    seed: int
+    j1: Array  # shape (kp, ki, realizations): J1 at fresh draws (s); infinite where one failed
+    nominal: Array  # shape (kp, ki): J1 without draws (s); NaN where it failed
+    levels: tuple[float, ...]  # levels of J1 (s)
+    seed: int  # of the resampling
 
     @cached_property
     def areas(self) -> dict[float, dict[str, Area]]:

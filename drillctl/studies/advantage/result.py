@@ -28,35 +28,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Advantage:
-    """PI against PI with a weight that follows the bit speed, each at its own robust optimum.
+    """PI against PI with a weight that follows the bit speed, each at its own robust optimum."""
 
-    Attributes
-    ----------
-    design : Design
-        Its `[advantage]` and `[tune]` tables say what was compared and to what end.
-    cases : tuple of Case
-        At the design's own weight and speed; the constant weight first.
-    regions : tuple of Regions
-        Of every policy, over the gains of the drive.
-    front : Chart
-        Over weights at the design's own speed.
-    chart : Chart
-        Over weights and speeds.
-    delay : DelayCurve
-        Against the delay of the real path.
-    total_seconds : float
-        From call to return (s).
-    provenance : dict of str
-        Versions and processor it came from.
-    """
-
-    design: Design
-    cases: tuple[Case, ...]
-    regions: tuple[Regions, ...]
-    front: Chart
-    chart: Chart
-    delay: DelayCurve
-    total_seconds: float
+    design: Design  # its `[advantage]` and `[tune]` tables say what was compared and to what end
+    cases: tuple[Case, ...]  # at the design's own weight and speed; the constant weight first
+    regions: tuple[Regions, ...]  # of every policy, over the gains of the drive
+    front: Chart  # over weights at the design's own speed
+    chart: Chart  # over weights and speeds
+    delay: DelayCurve  # against the delay of the real path
+    total_seconds: float  # from call to return (s)
+    # versions and processor it came from
     provenance: dict[str, str] = field(default_factory=provenance)
 
     @property

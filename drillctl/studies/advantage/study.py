@@ -76,13 +76,7 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
 
 
 def checked(compared: Policies) -> None:
-    """Refuse (`InputError`) what would be refused in the midst of the work.
-
-    Parameters
-    ----------
-    compared : Policies
-        From `policies`.
-    """
+    """Refuse (`InputError`) what would be refused in the midst of the work."""
     design = compared.constant.design
     table, where = design.tables.advantage, f"{design.origin}: " if design.origin else ""
     for key, path, values in (

@@ -18,13 +18,6 @@ def write_advantage(result: Advantage, folder: Path) -> None:
     `cases.csv`, a row a case and figure; `shares.csv`, a row a case and level; `areas.csv`, a row
     a policy and level; `front.csv` and `map.csv`, a row a policy, weight and speed; `delays.csv`,
     a row a choice of gains and delay.
-
-    Parameters
-    ----------
-    result : Advantage
-        What was computed.
-    folder : Path
-        Where to.
     """
     apart = ["difference", "difference_low", "difference_high"]
     ends = ["value", "low", "high"]

@@ -13,13 +13,7 @@ ALONE = "as designed"
 
 
 def case_designs(design: Design) -> dict[str, Design]:
-    """The cases of a design's `[compare]` table, the baseline first.
-
-    Raises
-    ------
-    InputError
-        A case changes a value that does not exist, or to an impossible one.
-    """
+    """The cases of a design's `[compare]` table, the baseline first."""
     cases = design.tables.compare.cases
     if not cases:
         return {ALONE: design}
@@ -33,23 +27,7 @@ def case_designs(design: Design) -> dict[str, Design]:
 
 
 def refuse_unequal(cases: Mapping[str, Design]) -> tuple[Uncertain, ...]:
-    """Refuse cases that are not on equal terms: other starts, other runs, other draws.
-
-    Parameters
-    ----------
-    cases : dict of Design
-        By name, the baseline first.
-
-    Returns
-    -------
-    tuple of Uncertain
-        What is uncertain in the baseline, and so in all of them.
-
-    Raises
-    ------
-    InputError
-        No case, or one that differs from the baseline in what must be the same.
-    """
+    """Refuse cases that are not on equal terms: other starts, other runs, other draws."""
     if not cases:
         raise InputError("at least one case is needed", "compare.cases")
     baseline = next(iter(cases.values()))
@@ -93,17 +71,7 @@ def _refuse_other_draws(design: Design, baseline: Design, expected: tuple[Uncert
 
 
 def in_case(error: InputError, design: Design, name: str) -> InputError:
-    """The same error with the case in front of its key, after the file.
-
-    Parameters
-    ----------
-    error : InputError
-        Met in a case.
-    design : Design
-        Of the case.
-    name : str
-        Of the case.
-    """
+    """The same error with the case in front of its key, after the file."""
     key = error.where.removeprefix(design.origin).removeprefix(": ")
     where = f"{design.origin}: " if design.origin else ""
     return InputError(error.problem, f"{where}compare.cases {name!r}: {key}".removesuffix(": "))

@@ -36,21 +36,11 @@ WEIGHT = "operating_point.weight_on_bit"
 
 @dataclass(frozen=True, eq=False)
 class Nominal:
-    """A case at its own values, nothing drawn.
+    """A case at its own values, nothing drawn."""
 
-    Attributes
-    ----------
-    map : Sweep or None
-        J1 and the other measures over the two axes of the comparison, not audited.
-    no_map : str or None
-        Why there is none; None where there is one.
-    response : Simulation
-        By the batch engine, sampled about every `INTERVAL`.
-    """
-
-    map: Sweep | None
-    no_map: str | None
-    response: Simulation
+    map: Sweep | None  # J1 and the other measures over the two axes of the comparison, not audited
+    no_map: str | None  # why there is none; None where there is one
+    response: Simulation  # by the batch engine, sampled about every `INTERVAL`
 
     def summary(self) -> dict[str, Any]:
         """Measures and scheme of the response, map or why there is none; SI."""
@@ -64,13 +54,7 @@ class Nominal:
 
 
 def nominal_design(design: Design, shift: float) -> Design:
-    """The design with its nominal weight on bit shifted (N).
-
-    Raises
-    ------
-    InputError
-        The friction table cannot be extrapolated so far.
-    """
+    """The design with its nominal weight on bit shifted (N)."""
     if shift == 0.0:
         return design
     weight = design.tables.operating_point.weight_on_bit + shift
@@ -87,27 +71,7 @@ def nominal_runs(
     axes: tuple[AxisTable, ...] | None,
     progress: Progress = SILENT,
 ) -> list[Nominal]:
-    """Map and response of every case.
-
-    Parameters
-    ----------
-    cases : dict of Design
-        By name.
-    axes : tuple of AxisTable, or None
-        What the maps of all cases run over; None for no maps.
-    progress : Progress
-        Told of the cells of all maps.
-
-    Returns
-    -------
-    list of Nominal
-        A case that the axes do not fit has no map, and tells why.
-
-    Raises
-    ------
-    InputError
-        Maps too large for the memory, or a case that cannot be simulated at its own values.
-    """
+    """Map and response of every case."""
     if axes is not None:
         refuse_too_large([len(cases), *(table.points for table in axes)])
     fitting = {name: _axes_or_reason(design, axes) for name, design in cases.items()}
@@ -153,21 +117,7 @@ def map_dimension(path: str, drawn: Sequence[str]) -> str:
 
 
 def labelled(cases: Sequence[Nominal], drawn: Sequence[str]) -> dict[str, Any]:
-    """Variables and coordinates of the maps and responses of all cases.
-
-    Parameters
-    ----------
-    cases : sequence of Nominal
-        In the order of the dimension `case`.
-    drawn : sequence of str
-        Paths of the uncertain parameters, which are variables of the same dataset.
-
-    Returns
-    -------
-    dict
-        As `xarray.Dataset` takes it. `map_<measure>` over case and both axes is NaN for a case
-        without map; `response_<signal>` over case and `sample` is NaN after its end.
-    """
+    """Variables and coordinates of the maps and responses of all cases."""
     return _maps(cases, drawn) | _responses(cases)
 
 

@@ -57,40 +57,21 @@ NO_ANSWER = "no finite answer"
 
 @dataclass(frozen=True, eq=False)
 class ComparedCase:
-    """One case at all draws.
+    """One case at all draws."""
 
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    design : Design
-        What was simulated, but for the draws and the shift.
-    drawn : dict of ndarray, shape (realizations,)
-        Values of the uncertain parameters by path (SI).
-    measures : dict of ndarray, shape (realizations,)
-        By the names of `MEASURES` (SI); NaN where undefined.
-    status : ndarray of int8, shape (realizations,)
-        Index into `simulation.measures.STATUSES`.
-    failures : tuple of Failures
-        Why draws came to nothing.
-    weight_shift : float
-        Added to the nominal weight on bit for the sake of equal means (N).
-    step, modes : float and int, or None
-        Scheme of the batch engine; None where it differs from draw to draw.
-    nominal : Nominal
-        Map and motion at its own values, the weight shifted as for the draws.
-    """
-
-    name: str
-    design: Design
+    name: str  # what it is called
+    design: Design  # what was simulated, but for the draws and the shift
+    # shape (realizations,): Values of the uncertain parameters by path (SI)
     drawn: dict[str, Array]
+    # shape (realizations,): By the names of `MEASURES` (SI); NaN where undefined
     measures: dict[str, Array]
-    status: NDArray[np.int8]
-    failures: tuple[Failures, ...]
-    weight_shift: float
+    status: NDArray[np.int8]  # shape (realizations,): Index into `simulation.measures.STATUSES`
+    failures: tuple[Failures, ...]  # why draws came to nothing
+    weight_shift: float  # added to the nominal weight on bit for the sake of equal means (N)
+    # scheme of the batch engine; None where it differs from draw to draw
     step: float | None
     modes: int | None
-    nominal: Nominal
+    nominal: Nominal  # map and motion at its own values, the weight shifted as for the draws
 
     def distribution(self, measure: str) -> dict[str, Any]:
         """Mean, standard deviation, quantiles (SI) and number of draws that define a measure."""
@@ -152,21 +133,11 @@ class ComparedCase:
 
 @dataclass(frozen=True)
 class Difference:
-    """Mean of a measure of one case less that of the baseline, draw by draw.
+    """Mean of a measure of one case less that of the baseline, draw by draw."""
 
-    Attributes
-    ----------
-    difference : float or None
-        Mean over the pairs (SI); None without pairs.
-    interval : tuple of float, or None
-        Bootstrap interval; None for fewer than two pairs.
-    pairs : int
-        Draws at which both cases define the measure.
-    """
-
-    difference: float | None
-    interval: Interval | None
-    pairs: int
+    difference: float | None  # mean over the pairs (SI); None without pairs
+    interval: Interval | None  # bootstrap interval; None for fewer than two pairs
+    pairs: int  # draws at which both cases define the measure
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values."""

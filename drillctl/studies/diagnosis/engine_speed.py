@@ -30,44 +30,21 @@ SHORT = 0.05
 
 @dataclass(frozen=True)
 class Speed:
-    """Speed of the engine on lanes of a design, the kernel warm.
+    """Speed of the engine on lanes of a design, the kernel warm."""
 
-    Attributes
-    ----------
-    threads : int
-        Used.
-    lanes : int
-        In a timed run.
-    seconds : float
-        It took (s).
-    lanes_per_second : float
-        Whole lanes, from their start to the end of their horizon.
-    lane_step_ns : float
-        Processor time of a step of a lane (ns).
-    mode_ns, laws_ns : float or None
-        Of which a mode, and all but the modes: laws, inclusion and measures; None where the cost
-        cannot be told apart.
-    flops_per_step : float
-        Operations of the modal pass in a step of a lane.
-    peak_flops : float
-        Of one core, measured (1/s).
-    share_of_peak : float
-        Operations of the modal pass over the time of whole steps, of that peak.
-    pass_share_of_peak : float or None
-        The same over the time of the modal pass.
-    """
-
-    threads: int
-    lanes: int
-    seconds: float
-    lanes_per_second: float
-    lane_step_ns: float
+    threads: int  # used
+    lanes: int  # in a timed run
+    seconds: float  # it took (s)
+    lanes_per_second: float  # whole lanes, from their start to the end of their horizon
+    lane_step_ns: float  # processor time of a step of a lane (ns)
+    # of which a mode, and all but the modes: laws, inclusion and measures; None where the cost
+    # cannot be told apart
     mode_ns: float | None
     laws_ns: float | None
-    flops_per_step: float
-    peak_flops: float
-    share_of_peak: float
-    pass_share_of_peak: float | None
+    flops_per_step: float  # operations of the modal pass in a step of a lane
+    peak_flops: float  # of one core, measured (1/s)
+    share_of_peak: float  # operations of the modal pass over the time of whole steps, of that peak
+    pass_share_of_peak: float | None  # the same over the time of the modal pass
 
     def summary(self) -> dict[str, Any]:
         """By name."""
@@ -75,15 +52,7 @@ class Speed:
 
 
 def engine_speed(lanes: Lanes, prepared: Prepared) -> Speed:
-    """Measure for about two seconds.
-
-    Parameters
-    ----------
-    lanes : Lanes
-        Of the design; repeated until a run is long enough.
-    prepared : Prepared
-        Their scheme.
-    """
+    """Measure for about two seconds."""
     warm_up(lanes, prepared)
     many = lanes
     while (seconds := _best(many, prepared, 1)[0]) < SECONDS and len(many) < MOST_LANES:

@@ -33,14 +33,9 @@ UNLIKELY = 0.025
 
 @dataclass(frozen=True)
 class Promise:
-    """What a named accuracy promises of the relative error of J1, over the paper's map.
+    """What a named accuracy promises of the relative error of J1, over the paper's map."""
 
-    Attributes
-    ----------
-    median, p99 : float or None
-        Median and 99th percentile; None for no promise.
-    """
-
+    # median and 99th percentile; None for no promise
     median: float | None
     p99: float
 
@@ -73,17 +68,10 @@ PROMISES = {
 
 @dataclass(frozen=True)
 class Errors:
-    """Relative errors of J1 over a sample of lanes.
+    """Relative errors of J1 over a sample of lanes."""
 
-    Attributes
-    ----------
-    lanes : int
-        Lanes that have one.
-    median, p90, p99, worst : float
-        Percentiles, and the largest.
-    """
-
-    lanes: int
+    lanes: int  # lanes that have one
+    # percentiles, and the largest
     median: float
     p90: float
     p99: float
@@ -105,14 +93,10 @@ def errors_of(values: Array) -> Errors:
 
 @dataclass(frozen=True, eq=False)
 class ErrorEstimate:
-    """J1 of a sample of lanes at a scheme and at finer ones.
+    """J1 of a sample of lanes at a scheme and at finer ones."""
 
-    Attributes
-    ----------
-    j1 : ndarray, shape (3, lanes)
-        At the scheme, at half and at a quarter of its step (s); NaN where a lane failed.
-    """
-
+    # shape (3, lanes): At the scheme, at half and at a quarter of its step (s); NaN where a lane
+    # failed
     j1: Array
 
     @cached_property
@@ -154,19 +138,7 @@ class ErrorEstimate:
 
 
 def refined(string: Drillstring, table: SimulationTable, prepared: Prepared, parts: int) -> Any:
-    """The same run with each step in parts, and as many times the modes.
-
-    Parameters
-    ----------
-    string : Drillstring
-        Of the lanes.
-    table : SimulationTable
-        Its accuracy says how far a mode may turn in a step.
-    prepared : Prepared
-        The scheme.
-    parts : int
-        Steps to a step of the scheme.
-    """
+    """The same run with each step in parts, and as many times the modes."""
     if parts == 1:
         return prepared
     old = prepared.scheme

@@ -17,13 +17,7 @@ AT_A_TIME = 2_000_000
 
 
 def share_interval(hits: int, total: int) -> Interval:
-    """Clopper-Pearson interval of a probability, given `hits` of `total` independent draws.
-
-    Parameters
-    ----------
-    hits, total : int
-        How many of how many; `total` is positive.
-    """
+    """Clopper-Pearson interval of a probability, given `hits` of `total` independent draws."""
     low, high = share_intervals(np.array([hits]), total)
     return float(low[0]), float(high[0])
 
@@ -35,20 +29,6 @@ def share_intervals(
 
     Clopper & Pearson, Biometrika 26 (1934) 404-413: each holds the probability with at least
     the confidence, whatever the probability is.
-
-    Parameters
-    ----------
-    hits : ndarray of int
-        How many of the draws, for each probability.
-    total : int
-        Independent draws; positive.
-    confidence : float
-        Of each interval.
-
-    Returns
-    -------
-    tuple of ndarray, shape of `hits`
-        Lower and upper ends.
     """
     from scipy.special import betaincinv
 
@@ -66,18 +46,6 @@ def mean_interval(values: Array, seed: int) -> Interval | None:
     Efron & Tibshirani, An Introduction to the Bootstrap (1993), section 14.3; of a mean the
     acceleration, which they take from the jackknife, is a sixth of the skewness of the values
     over the root of their number.
-
-    Parameters
-    ----------
-    values : ndarray, shape (draws,)
-        Independent draws, finite.
-    seed : int
-        Of the resampling.
-
-    Returns
-    -------
-    tuple of float, or None
-        None for fewer than two values; of no width where all are equal.
     """
     from scipy.special import ndtr, ndtri
 

@@ -18,78 +18,33 @@ from drillctl.studies.grid import SHARED
 
 @dataclass(frozen=True, eq=False)
 class DrawnGroup:
-    """Draws that share a string.
+    """Draws that share a string."""
 
-    Attributes
-    ----------
-    design : Design
-        Of the first of them.
-    lanes : Lanes
-        One a draw.
-    numbers : ndarray of int, shape (lanes,)
-        Position of each among all draws.
-    """
-
-    design: Design
-    lanes: Lanes
-    numbers: NDArray[np.int64]
+    design: Design  # of the first of them
+    lanes: Lanes  # one a draw
+    numbers: NDArray[np.int64]  # shape (lanes,): Position of each among all draws
 
 
 @dataclass(frozen=True)
 class Failures:
-    """Draws that came to nothing, for one reason.
+    """Draws that came to nothing, for one reason."""
 
-    Attributes
-    ----------
-    reason : str
-        Key or cause.
-    count : int
-        How many draws.
-    example : str
-        What was said of the first of them.
-    """
-
-    reason: str
-    count: int
-    example: str
+    reason: str  # key or cause
+    count: int  # how many draws
+    example: str  # what was said of the first of them
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnLanes:
-    """All draws of a design.
+    """All draws of a design."""
 
-    Attributes
-    ----------
-    groups : tuple of DrawnGroup
-        The possible ones; a single group unless a draw changes the string or a law's type.
-    failures : tuple of Failures
-        The impossible ones.
-    """
-
+    # the possible ones; a single group unless a draw changes the string or a law's type
     groups: tuple[DrawnGroup, ...]
-    failures: tuple[Failures, ...]
+    failures: tuple[Failures, ...]  # the impossible ones
 
 
 def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
-    """Lanes of a design at every draw.
-
-    Parameters
-    ----------
-    design : Design
-        Into which the drawn values are put.
-    draws : Draws
-        Of its uncertain parameters.
-
-    Returns
-    -------
-    DrawnLanes
-        A drawn weight on bit may lie outside the friction table, which is then extrapolated.
-
-    Raises
-    ------
-    InputError
-        Every draw is impossible; the message is that of the first.
-    """
+    """Lanes of a design at every draw."""
     design = beyond_the_table(design, tuple(draws.values))
     apart = any(path.startswith(SHARED) for path in draws.values)
     possible: list[_Drawn] = []
@@ -124,15 +79,7 @@ class _Drawn(NamedTuple):
 
 
 def beyond_the_table(design: Design, drawn: tuple[str, ...]) -> Design:
-    """The design with its friction table extrapolated, if the weight on bit is drawn.
-
-    Parameters
-    ----------
-    design : Design
-        Of any law of the rock.
-    drawn : tuple of str
-        Paths of what is uncertain.
-    """
+    """The design with its friction table extrapolated, if the weight on bit is drawn."""
     table = getattr(design.tables.bit_rock, "table", None)
     if table is None or "operating_point.weight_on_bit" not in drawn:
         return design
@@ -146,13 +93,7 @@ def _group(part: list[_Drawn]) -> DrawnGroup:
 
 
 def told(errors: list[InputError]) -> tuple[Failures, ...]:
-    """Errors counted by the key that they name: their numbers differ from draw to draw.
-
-    Parameters
-    ----------
-    errors : list of InputError
-        One a draw.
-    """
+    """Errors counted by the key that they name: their numbers differ from draw to draw."""
     by_key: dict[str, list[InputError]] = {}
     for error in errors:
         by_key.setdefault(error.where, []).append(error)

@@ -51,36 +51,20 @@ FAR = 8.0
 
 @dataclass(frozen=True)
 class Uncertain:
-    """An uncertain parameter, its numbers read and checked.
+    """An uncertain parameter, its numbers read and checked."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted path of the parameter.
-    unit : str
-        Unit of its values, empty for factors.
-    distribution : {'lognormal', 'normal', 'uniform', 'beta', 'triangular', 'samples'}
-        Family.
-    mean, cov : float or None
-        Mean (SI) and coefficient of variation; None for a distribution between limits.
-    low, high, mode : float or None
-        Limits and mode (SI); None for a distribution without limits, or without mode.
-    own_mean : bool
-        Whether the mean is the design's own value, not one that was written.
-    samples : tuple of float
-        Increasing (SI), of a distribution that is these.
-    """
-
-    path: str
-    unit: str
-    distribution: str
+    path: str  # dotted path of the parameter
+    unit: str  # unit of its values, empty for factors
+    distribution: str  # {'lognormal', 'normal', 'uniform', 'beta', 'triangular', 'samples'}: Family
+    # mean (SI) and coefficient of variation; None for a distribution between limits
     mean: float | None
     cov: float | None
+    # limits and mode (SI); None for a distribution without limits, or without mode
     low: float | None
     high: float | None
     mode: float | None
-    own_mean: bool
-    samples: tuple[float, ...] = ()
+    own_mean: bool  # whether the mean is the design's own value, not one that was written
+    samples: tuple[float, ...] = ()  # increasing (SI), of a distribution that is these
 
     def law(self) -> Any:
         """The distribution as SciPy has it, frozen; samples have none."""
@@ -184,20 +168,7 @@ def refuse_dependent(design: Design) -> None:
 
 
 def drawing(design: Design, seed: int) -> Callable[[int, int], Draws]:
-    """A function of count and first that draws; what it draws from is read once.
-
-    Parameters
-    ----------
-    design : Design
-        As for `draw`.
-    seed : int
-        What draws follow from.
-
-    Raises
-    ------
-    InputError
-        As for `draw`.
-    """
+    """A function of count and first that draws; what it draws from is read once."""
     found = uncertain_parameters(design)
     table = design.tables.uncertainty
     paths = tuple(p.path for p in found)

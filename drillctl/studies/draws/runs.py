@@ -32,21 +32,13 @@ MOST_SHIFTS = 40
 
 @dataclass(frozen=True, eq=False)
 class DrawnRuns:
-    """What was measured at every draw.
+    """What was measured at every draw."""
 
-    Attributes
-    ----------
-    measures : dict of ndarray, shape (draws,)
-        By the names of `simulation.batch.FLOATS`, and `mean_weight_after_start` (N); NaN where
-        undefined.
-    status : ndarray of int8, shape (draws,)
-        Index into `simulation.measures.STATUSES`.
-    step, modes : float and int, or None
-        Scheme; None where it differs from draw to draw.
-    """
-
+    # shape (draws,): By the names of `simulation.batch.FLOATS`, and `mean_weight_after_start`
+    # (N); NaN where undefined
     measures: dict[str, Array]
-    status: NDArray[np.int8]
+    status: NDArray[np.int8]  # shape (draws,): Index into `simulation.measures.STATUSES`
+    # scheme; None where it differs from draw to draw
     step: float | None
     modes: int | None
 
@@ -57,22 +49,7 @@ def start_up(duration: float) -> float:
 
 
 def run_draws(drawn: DrawnLanes, count: int, shift: float = 0.0) -> DrawnRuns:
-    """Simulate a design at every draw with the batch engine.
-
-    Parameters
-    ----------
-    drawn : DrawnLanes
-        The possible draws.
-    count : int
-        All draws; the impossible ones have the status `failed` and no measures.
-    shift : float
-        Added to the nominal weight of a law that moves the weight on bit (N).
-
-    Raises
-    ------
-    InputError
-        A given step is too long for the friction at some draw.
-    """
+    """Simulate a design at every draw with the batch engine."""
     measures = {name: np.full(count, np.nan) for name in (*FLOATS, "mean_weight_after_start")}
     status = np.full(count, STATUSES.index("failed"), dtype=np.int8)
     schemes = set()
@@ -118,23 +95,6 @@ def equalising_shift(drawn: DrawnLanes, count: int) -> float:
     """Shift of the nominal weight (N) at which the mean weight on bit is the nominal one.
 
     Means over the draws; that of the weight over each run after its start.
-
-    Parameters
-    ----------
-    drawn : DrawnLanes
-        The possible draws.
-    count : int
-        All draws.
-
-    Returns
-    -------
-    float
-        0 for a law that does not move the weight.
-
-    Raises
-    ------
-    InputError
-        The limits of the law, or jumps of the mean, do not let it come within `EQUAL_TO`.
     """
     if isinstance(drawn.groups[0].lanes.weight, ConstantWeight):
         return 0.0
@@ -152,29 +112,7 @@ def equalising_shift(drawn: DrawnLanes, count: int) -> float:
 def matching_shift(
     drawn: DrawnLanes, count: int, measure: str, target: float
 ) -> tuple[float, float]:
-    """Shift of the nominal weight at which the mean of a measure over the draws is a given one.
-
-    Parameters
-    ----------
-    drawn : DrawnLanes
-        The possible draws, of a law that moves the weight.
-    count : int
-        All draws.
-    measure : str
-        Of `DrawnRuns`, one that grows with the weight.
-    target : float
-        Its mean, positive (SI).
-
-    Returns
-    -------
-    tuple of float
-        The shift (N), and by what share of the target the mean is off there.
-
-    Raises
-    ------
-    InputError
-        No draw gives a finite answer.
-    """
+    """Shift of the nominal weight at which the mean of a measure over the draws is a given one."""
     low, high = _allowed(drawn)
 
     def excess(shift: float) -> float:

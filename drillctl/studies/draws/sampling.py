@@ -32,25 +32,15 @@ _EDGE = 2.0**-53
 
 @dataclass(frozen=True)
 class Sampling:
-    """Which points are drawn.
+    """Which points are drawn."""
 
-    Attributes
-    ----------
-    kind : {'monte-carlo', 'sobol', 'latin-hypercube'}
-        Method.
-    seed : int
-        What they follow from.
-    replicates : int
-        Independent point sets that take turns; realization i is of set i mod replicates. 1 for
-        Monte Carlo, whose draws are all independent.
-    total : int
-        Number of points of a Latin hypercube; the others have no end.
-    """
-
+    # {'monte-carlo', 'sobol', 'latin-hypercube'}: Method
     kind: Literal["monte-carlo", "sobol", "latin-hypercube"]
-    seed: int
+    seed: int  # what they follow from
+    # independent point sets that take turns; realization i is of set i mod replicates. 1 for
+    # Monte Carlo, whose draws are all independent.
     replicates: int
-    total: int
+    total: int  # number of points of a Latin hypercube; the others have no end
 
     @property
     def extendable(self) -> bool:
@@ -58,13 +48,7 @@ class Sampling:
         return self.kind != "latin-hypercube"
 
     def points(self, paths: tuple[str, ...], count: int, first: int = 0) -> dict[str, Array]:
-        """Numbers strictly between 0 and 1 for each parameter, by path.
-
-        Raises
-        ------
-        InputError
-            More points of a Latin hypercube than it has.
-        """
+        """Numbers strictly between 0 and 1 for each parameter, by path."""
         if self.kind == "monte-carlo":
             return {path: probabilities(self.seed, path, count, first) for path in paths}
         if not self.extendable and first + count > self.total:
@@ -104,15 +88,7 @@ class Sampling:
 
 
 def sampling_of(table: UncertaintyTable, seed: int | None = None) -> Sampling:
-    """The sampling that a design asks for.
-
-    Parameters
-    ----------
-    table : UncertaintyTable
-        Of the design.
-    seed : int, optional
-        Instead of its own.
-    """
+    """The sampling that a design asks for."""
     replicates = 1 if table.sampling == "monte-carlo" else table.replicates
     return Sampling(
         table.sampling, table.seed if seed is None else seed, replicates, table.realizations
@@ -120,23 +96,7 @@ def sampling_of(table: UncertaintyTable, seed: int | None = None) -> Sampling:
 
 
 def probabilities(seed: int, path: str, count: int, first: int = 0) -> Array:
-    """Independent uniform numbers of a parameter, strictly between 0 and 1.
-
-    Parameters
-    ----------
-    seed : int
-        Not negative, less than 2^32.
-    path : str
-        Parameter that they are for; each has a stream of its own.
-    count, first : int
-        How many, from which on.
-
-    Returns
-    -------
-    ndarray, shape (count,)
-        The same for the same seed, path and number, on any machine: Philox, counter-based, its
-        raw bits turned into numbers here and not by a method that a release of NumPy may change.
-    """
+    """Independent uniform numbers of a parameter, strictly between 0 and 1."""
     words = hashlib.sha256(path.encode()).digest()[:8]
     bits = np.random.Philox(np.random.SeedSequence([seed, int.from_bytes(words)]))
     bits.advance(first // _PER_COUNTER)
@@ -147,21 +107,7 @@ def probabilities(seed: int, path: str, count: int, first: int = 0) -> Array:
 
 
 def correlation_root(table: UncertaintyTable, paths: tuple[str, ...]) -> Array | None:
-    """Lower Cholesky factor of the correlation matrix of all parameters; None if independent.
-
-    Parameters
-    ----------
-    table : UncertaintyTable
-        Its `correlations`.
-    paths : tuple of str
-        Uncertain parameters, in the order of the rows.
-
-    Raises
-    ------
-    InputError
-        A parameter that is not uncertain, a pair named twice, or a matrix that is not positive
-        definite.
-    """
+    """Lower Cholesky factor of the correlation matrix of all parameters; None if independent."""
     from drillctl.errors import nearest
 
     if not table.correlations:
@@ -188,15 +134,7 @@ def correlation_root(table: UncertaintyTable, paths: tuple[str, ...]) -> Array |
 
 
 def correlated(points: Mapping[str, Array], root: Array) -> dict[str, Array]:
-    """Points with the dependence of a Gaussian copula.
-
-    Parameters
-    ----------
-    points : mapping of ndarray, shape (count,)
-        Independent, by path, in the order of the rows of `root`.
-    root : ndarray, shape (parameters, parameters)
-        From `correlation_root`.
-    """
+    """Points with the dependence of a Gaussian copula."""
     from scipy.special import ndtr, ndtri
 
     scores = [ndtri(column) for column in points.values()]

@@ -41,26 +41,13 @@ MOST_AXES = 2
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Gains or a law beside those that were found.
+    """Gains or a law beside those that were found."""
 
-    Attributes
-    ----------
-    name : str
-        What it is.
-    told : dict
-        Its gains by path (SI); of another law its name alone.
-    runs : FreshRuns or None
-        At the fresh draws; None where it does not apply.
-    reason : str
-        Why it does not.
-    found : dict
-        Of a search of its own: value (s) where it searched, trajectories, seconds.
-    """
-
-    name: str
-    told: dict[str, Any]
-    runs: FreshRuns | None
-    reason: str
+    name: str  # what it is
+    told: dict[str, Any]  # its gains by path (SI); of another law its name alone
+    runs: FreshRuns | None  # at the fresh draws; None where it does not apply
+    reason: str  # why it does not
+    # of a search of its own: value (s) where it searched, trajectories, seconds
     found: dict[str, float]
 
     def summary(self) -> dict[str, Any]:
@@ -79,19 +66,7 @@ class Baseline:
 def baselines(
     design: Design, fresh: Fresh, exhaustive: Judge | None, progress: Progress = SILENT
 ) -> tuple[Baseline, ...]:
-    """What the found gains are compared with.
-
-    Parameters
-    ----------
-    design : Design
-        As it was asked for.
-    fresh : Fresh
-        Runs at the fresh draws.
-    exhaustive : Judge or None
-        Realizations of the search, where a grid is to be gone through at them.
-    progress : Progress
-        Told of each baseline.
-    """
+    """What the found gains are compared with."""
     made = [
         ("as designed", lambda: _own(design, fresh)),
         ("paper's gains", lambda: _paper(design, fresh)),

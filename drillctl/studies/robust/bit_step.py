@@ -36,18 +36,7 @@ class Met(NamedTuple):
 
 
 def meet_rock(friction: Any, weight: Any, free: Any, gain: Any, bit: Bit) -> Met:
-    """The step of a bit under a set-valued law.
-
-    Parameters
-    ----------
-    friction, weight : NamedTuple
-        Laws with numbers or symbols.
-    free, gain : casadi.SX
-        Bit speed at the end of the step were there no torque on it (rad/s), and its fall per
-        torque (rad/s per N m).
-    bit : Bit
-        Before.
-    """
+    """The step of a bit under a set-valued law."""
     import casadi as ca
 
     at_rest = weight.weight(0.0 * free)

@@ -41,51 +41,23 @@ MARGINS = (
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """What fresh draws say of gains.
+    """What fresh draws say of gains."""
 
-    Attributes
-    ----------
-    runs : FreshRuns
-        J1 at each draw.
-    required : float
-        Probability that is asked for.
-    seed : int
-        Of the draws.
-    drawn : dict of ndarray, shape (draws,)
-        Drawn values by path (SI).
-    failures : tuple of Failures
-        Draws that no rig has: they count as over the level.
-    violations : dict
-        Requirements that are missed at the fresh draws, over their limits.
-    margins : dict
-        Figures of the linear loop, see `drillctl.loop`; empty where there is none.
-    no_margins : str
-        Why there are none.
-    audit : Audit
-        A sample of the draws by the reference solver; `cells` are numbers of draws.
-    tolerances : tuple of Tolerance
-        How far each parameter may drift alone.
-    neighbourhood : Neighbourhood
-        Probability about the optimum.
-    trajectories : int
-        Runs of the batch engine.
-    seconds : float
-        Time that it took (s).
-    """
-
-    runs: FreshRuns
-    required: float
-    seed: int
-    drawn: dict[str, Array]
-    failures: tuple[Failures, ...]
+    runs: FreshRuns  # J1 at each draw
+    required: float  # probability that is asked for
+    seed: int  # of the draws
+    drawn: dict[str, Array]  # shape (draws,): Drawn values by path (SI)
+    failures: tuple[Failures, ...]  # draws that no rig has: they count as over the level
+    # requirements that are missed at the fresh draws, over their limits
     violations: dict[str, float]
+    # figures of the linear loop, see `drillctl.loop`; empty where there is none
     margins: dict[str, Any]
-    no_margins: str
-    audit: Audit
-    tolerances: tuple[Tolerance, ...]
-    neighbourhood: Neighbourhood
-    trajectories: int
-    seconds: float
+    no_margins: str  # why there are none
+    audit: Audit  # A sample of the draws by the reference solver; `cells` are numbers of draws
+    tolerances: tuple[Tolerance, ...]  # how far each parameter may drift alone
+    neighbourhood: Neighbourhood  # probability about the optimum
+    trajectories: int  # runs of the batch engine
+    seconds: float  # time that it took (s)
 
     @property
     def passed(self) -> bool:
@@ -193,24 +165,7 @@ def _of(one: Tolerance) -> dict[str, Any]:
 def certified(
     design: Design, fresh: Fresh, values: Array, progress: Progress = SILENT
 ) -> Certificate:
-    """Certify gains.
-
-    Parameters
-    ----------
-    design : Design
-        With the gains put in.
-    fresh : Fresh
-        Runs at the fresh draws.
-    values : ndarray, shape (parameters,)
-        The gains (SI).
-    progress : Progress
-        Told of audited draws and of parameters.
-
-    Returns
-    -------
-    Certificate
-        A failed one is an answer.
-    """
+    """Certify gains."""
     begin, before = time.perf_counter(), fresh.trajectories
     table, judge = design.tables.tune, fresh.judge
     point, runs = fresh.of_gains(values)

@@ -20,21 +20,11 @@ ALIKE = 1.05
 
 
 class Crossing(NamedTuple):
-    """A slope at which poles of a loop reach the imaginary axis.
+    """A slope at which poles of a loop reach the imaginary axis."""
 
-    Attributes
-    ----------
-    slope : float
-        N m s/rad.
-    omega : float
-        rad/s.
-    circle : Circle
-        The string about it.
-    """
-
-    slope: float
-    omega: float
-    circle: Circle
+    slope: float  # N m s/rad
+    omega: float  # rad/s
+    circle: Circle  # the string about it
 
 
 class Seen(NamedTuple):
@@ -70,15 +60,7 @@ def least_seen(loop: Loop, values: Mapping[str, float]) -> float:
 
 
 def crossings_of(loop: Loop, values: Mapping[str, float]) -> list[Crossing]:
-    """The lowest crossings of a loop, refined, by rising slope; negative ones too.
-
-    Parameters
-    ----------
-    loop : Loop
-        One loop.
-    values : dict
-        Tuned values (SI) by path.
-    """
+    """The lowest crossings of a loop, refined, by rising slope; negative ones too."""
     seen = seen_on_grid(loop, values)
     size = np.abs(seen.slope)
     order = np.argsort(size, kind="stable")

@@ -21,36 +21,20 @@ class Line(NamedTuple):
 
 
 class Top(NamedTuple):
-    """The top of the string in a step: what it was, and what it would be without torques.
+    """The top of the string in a step: what it was, and what it would be without torques."""
 
-    Attributes
-    ----------
-    angle, speed : casadi.SX
-        At the beginning, in the frame (rad, rad/s).
-    free_angle, free_speed : casadi.SX
-        At the end, were the torques of drive and bit zero but the drag.
-    set_speed : casadi.SX
-        rad/s.
-    bit_torque : casadi.SX
-        Mean of the last step (N m).
-    """
-
+    # at the beginning, in the frame (rad, rad/s)
     angle: Any
     speed: Any
+    # at the end, were the torques of drive and bit zero but the drag
     free_angle: Any
     free_speed: Any
-    set_speed: Any
-    bit_torque: Any
+    set_speed: Any  # rad/s
+    bit_torque: Any  # mean of the last step (N m)
 
 
 class Ideal:
-    """A drive without memory.
-
-    Parameters
-    ----------
-    step : float
-        Length of a step (s).
-    """
+    """A drive without memory."""
 
     size = 0
 
@@ -74,15 +58,7 @@ class Ideal:
 
 
 class Real(Ideal):
-    """A `RealDrive`: speed seen, torque felt, its slow part, integral, motor torque.
-
-    Parameters
-    ----------
-    step : float
-        Length of a step (s).
-    lags : tuple of bool
-        Whether encoder, torque filter and motor have a lag: a choice of equations, not a number.
-    """
+    """A `RealDrive`: speed seen, torque felt, its slow part, integral, motor torque."""
 
     size = 5
 

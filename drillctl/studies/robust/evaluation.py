@@ -47,22 +47,6 @@ class Evaluation:
 
     The realizations are the first of one sequence, the same for all gains: what is compared is
     compared under the same conditions, and more of them begin with the same ones.
-
-    Parameters
-    ----------
-    design : Design
-        With its `[tune]` and `[uncertain]` tables.
-    tuned : tuple of Tuned
-        What differs.
-    realizations, seed : int
-        Draws.
-
-    Attributes
-    ----------
-    trajectories : int
-        Runs so far, those that were stopped early included.
-    failures : tuple of Failures
-        Draws that no rig has; they are left out.
     """
 
     def __init__(
@@ -88,25 +72,7 @@ class Evaluation:
         self, points: Array, names: tuple[str, ...], first: int = 0, last: int | None = None,
         give_up: float = math.inf,
     ) -> dict[str, Array]:  # fmt: skip
-        """Measures of points at realizations.
-
-        Parameters
-        ----------
-        points : ndarray, shape (points, parameters)
-            Tuned values (SI).
-        names : tuple of str
-            Measures of `simulation.batch`, or `effort`.
-        first, last : int
-            Which of the realizations; by default all.
-        give_up : float
-            J1 (s) over which nothing more is asked of a run: what is then told of it is a lower
-            bound of J1, and NaN for anything else.
-
-        Returns
-        -------
-        dict of ndarray, shape (points, realizations)
-            SI; an infinite J1, and NaN for what else is undefined, of a run without an answer.
-        """
+        """Measures of points at realizations."""
         chosen = self.numbers[first:last]
         found = {name: np.full((len(points), len(chosen)), np.nan) for name in names}
         if not self._at_once:

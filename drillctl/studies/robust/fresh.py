@@ -23,21 +23,13 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
 
 @dataclass(frozen=True, eq=False)
 class FreshRuns:
-    """J1 of one rig at the fresh draws.
+    """J1 of one rig at the fresh draws."""
 
-    Attributes
-    ----------
-    j1 : ndarray, shape (draws,)
-        Seconds; infinite for a run without an answer, NaN for a draw that no rig has.
-    value : float
-        Objective of `[tune]` over the draws that a rig can have (s).
-    level : float
-        Of J1 (s).
-    """
-
+    # shape (draws,): Seconds; infinite for a run without an answer, NaN for a draw that no rig
+    # has
     j1: Array
-    value: float
-    level: float
+    value: float  # objective of `[tune]` over the draws that a rig can have (s)
+    level: float  # of J1 (s)
 
     @property
     def hits(self) -> int:
@@ -85,22 +77,7 @@ def fresh_design(design: Design) -> Design:
 
 
 class Fresh:
-    """Runs of any gains and any law at the fresh draws of a design.
-
-    Parameters
-    ----------
-    design : Design
-        As it was asked for; its own accuracy counts.
-    tuned : tuple of Tuned
-        What was tuned.
-
-    Attributes
-    ----------
-    judge : Judge
-        Of the tuned parameters at the fresh draws.
-    trajectories : int
-        Runs so far.
-    """
+    """Runs of any gains and any law at the fresh draws of a design."""
 
     def __init__(self, design: Design, tuned: tuple[Tuned, ...]) -> None:
         self.design = fresh_design(design)
@@ -133,13 +110,7 @@ class Fresh:
         return point, self._spread(self.judge.runs, point.measures["j1"], point.value)
 
     def of_design(self, design: Design) -> FreshRuns:
-        """A design of any law, at the same draws.
-
-        Raises
-        ------
-        InputError
-            No draw is possible with it.
-        """
+        """A design of any law, at the same draws."""
         table, objective = self.judge.table, self.judge.objective
         sampled = design.replace({"uncertainty.sampling": "monte-carlo"})
         runs = Evaluation(sampled, (), table.realizations, table.seed)
@@ -149,15 +120,7 @@ class Fresh:
         return self._spread(runs, measures["j1"][0], value)
 
     def shares(self, points: Array, realizations: int | None = None) -> Array:
-        """Share of the first draws, all by default, with J1 at or under the level.
-
-        Parameters
-        ----------
-        points : ndarray, shape (points, parameters)
-            Tuned values (SI).
-        realizations : int, optional
-            How many draws.
-        """
+        """Share of the first draws, all by default, with J1 at or under the level."""
         level, judge = self.judge.table.level, self.judge
         count = self.count if realizations is None else min(realizations, self.count)
         possible = int(np.searchsorted(judge.runs.numbers, count))

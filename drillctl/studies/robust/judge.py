@@ -27,28 +27,15 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Gains as they were judged.
+    """Gains as they were judged."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (parameters,)
-        SI.
-    measures : dict of ndarray, shape (realizations,)
-        SI.
-    value : float
-        Objective (s).
-    merit : float
-        What a search compares (s): the objective, a quantile smoothed, with what requirements are
-        missed by.
-    share : float
-        Share of realizations with J1 at or under the level.
-    """
-
-    values: Array
-    measures: dict[str, Array]
-    value: float
+    values: Array  # shape (parameters,): SI
+    measures: dict[str, Array]  # shape (realizations,): SI
+    value: float  # objective (s)
+    # what a search compares (s): the objective, a quantile smoothed, with what requirements are
+    # missed by
     merit: float
-    share: float
+    share: float  # share of realizations with J1 at or under the level
 
     @property
     def realizations(self) -> int:
@@ -57,24 +44,7 @@ class Point:
 
 
 class Judge:
-    """Judges gains.
-
-    Parameters
-    ----------
-    design : Design
-        With its `[tune]` and `[uncertain]` tables.
-    tuned : tuple of Tuned
-        What differs.
-
-    Attributes
-    ----------
-    runs : Evaluation
-        Realizations, and the runs so far.
-    objective : Objective
-        What is lowered.
-    trajectories : int
-        Runs so far, those of derivatives included.
-    """
+    """Judges gains."""
 
     def __init__(self, design: Design, tuned: tuple[Tuned, ...]) -> None:
         self.design, self.tuned, self.table = design, tuned, design.tables.tune

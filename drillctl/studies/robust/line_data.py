@@ -68,30 +68,14 @@ def _inertia(ends: Ends) -> float:
 
 
 class Grid(NamedTuple):
-    """A string on a frequency grid.
+    """A string on a frequency grid."""
 
-    Attributes
-    ----------
-    omega : ndarray, shape (frequencies,)
-        rad/s, increasing.
-    chain : Chain
-        Of arrays of that shape.
-    """
-
-    omega: Array
-    chain: Chain
+    omega: Array  # shape (frequencies,): rad/s, increasing
+    chain: Chain  # of arrays of that shape
 
 
 def grid_of(ends: Ends, apart: float = math.inf) -> Grid:
-    """The string where nothing of it goes unseen.
-
-    Parameters
-    ----------
-    ends : Ends
-        The string.
-    apart : float
-        Largest distance of two frequencies (rad/s), for the turns of a delay.
-    """
+    """The string where nothing of it goes unseen."""
     omega = telling_grid(ends)
     if math.isfinite(apart):
         omega = np.union1d(omega, np.arange(apart, omega[-1], apart))
@@ -99,21 +83,11 @@ def grid_of(ends: Ends, apart: float = math.inf) -> Grid:
 
 
 class Circle(NamedTuple):
-    """A string near one complex frequency: power series of its chain parameters.
+    """A string near one complex frequency: power series of its chain parameters."""
 
-    Attributes
-    ----------
-    centre : complex
-        Where (1/s).
-    radius : float
-        Of the circle it was read on (1/s).
-    terms : ndarray of complex, shape (4, TERMS)
-        Coefficients over powers of (s - centre) / radius.
-    """
-
-    centre: complex
-    radius: float
-    terms: ComplexArray
+    centre: complex  # where (1/s)
+    radius: float  # of the circle it was read on (1/s)
+    terms: ComplexArray  # shape (4, TERMS): Coefficients over powers of (s - centre) / radius
 
 
 def circles(ends: Ends, centres: ComplexArray) -> list[Circle]:
@@ -130,15 +104,7 @@ def circles(ends: Ends, centres: ComplexArray) -> list[Circle]:
 
 
 def chain_at(terms: tuple[Any, Any], u: Pair) -> Chain:
-    """Chain parameters at centre + radius u, symbolically.
-
-    Parameters
-    ----------
-    terms : tuple of casadi.SX, shape (4, TERMS)
-        Real and imaginary parts of a circle's coefficients.
-    u : Pair
-        Within `WITHIN`.
-    """
+    """Chain parameters at centre + radius u, symbolically."""
     real, imaginary = terms
     values = []
     for row in range(4):

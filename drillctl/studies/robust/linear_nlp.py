@@ -59,15 +59,7 @@ class Point(NamedTuple):
 
 
 class LinearProgram:
-    """Programs about given gains.
-
-    Parameters
-    ----------
-    problem : Loops
-        What gains must hold for.
-    verbose : bool
-        Let IPOPT print.
-    """
+    """Programs about given gains."""
 
     def __init__(self, problem: Loops, verbose: bool = False) -> None:
         self.problem, self.verbose = problem, verbose

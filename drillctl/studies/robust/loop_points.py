@@ -28,27 +28,19 @@ CONSTANTS = 6
 
 @dataclass(frozen=True, eq=False)
 class PointFunctions:
-    """CasADi functions of loops of one kind.
+    """CasADi functions of loops of one kind."""
 
-    Attributes
-    ----------
-    crossing : casadi.Function
-        (values, constants, circle, u) -> slope at which poles lie at centre + i radius u, and its
-        imaginary part, zero at a crossing (N m s/rad).
-    pole : casadi.Function
-        (values, constants, circle, u), u a pair -> characteristic function (2,) over a size, and
-        the damping ratio of a pole there.
-    late : casadi.Function
-        (values, constants, circle, (u, delay)) -> characteristic function (2,) over a size with
-        the drive later by a delay (s), on the axis.
-    sensitivity : casadi.Function
-        (values, constants, chain, omega) -> squares of numerator and denominator of the
-        sensitivity at the top torque, over a size.
-    """
-
+    # (values, constants, circle, u) -> slope at which poles lie at centre + i radius u, and its
+    # imaginary part, zero at a crossing (N m s/rad)
     crossing: Any
+    # (values, constants, circle, u), u a pair -> characteristic function (2,) over a size, and
+    # the damping ratio of a pole there
     pole: Any
+    # (values, constants, circle, (u, delay)) -> characteristic function (2,) over a size with the
+    # drive later by a delay (s), on the axis
     late: Any
+    # (values, constants, chain, omega) -> squares of numerator and denominator of the sensitivity
+    # at the top torque, over a size
     sensitivity: Any
 
 

@@ -38,49 +38,25 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class WeightSide:
-    """A weight on bit that follows the bit speed.
+    """A weight on bit that follows the bit speed."""
 
-    Attributes
-    ----------
-    torque : float
-        Torque of the rock per weight at constant speed (m).
-    gain : float
-        K_w (N s/rad).
-    path : WeightPath
-        Its lags.
-    """
-
+    # torque of the rock per weight at constant speed (m)
     torque: Any  # these two may be symbols
-    gain: Any
-    path: WeightPath
+    gain: Any  # K_w (N s/rad)
+    path: WeightPath  # its lags
 
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """One loop that gains must hold for.
+    """One loop that gains must hold for."""
 
-    Attributes
-    ----------
-    design : Design
-        With the tuned parameters halfway, which gives laws their types.
-    ends : Ends
-        Its string.
-    grid : Grid
-        The string on a frequency grid.
-    string : StringNumbers
-        What drives are tuned to.
-    slope : float
-        Falling slope of the rock at constant weight (N m s/rad).
-    weight : WeightSide or None
-        Of a weight that follows the bit speed.
-    """
-
-    design: Design
-    ends: Ends
-    grid: Grid
-    string: StringNumbers
+    design: Design  # with the tuned parameters halfway, which gives laws their types
+    ends: Ends  # its string
+    grid: Grid  # the string on a frequency grid
+    string: StringNumbers  # what drives are tuned to
+    # falling slope of the rock at constant weight (N m s/rad)
     slope: Any  # may be a symbol
-    weight: WeightSide | None
+    weight: WeightSide | None  # of a weight that follows the bit speed
 
     def drive(self, values: Mapping[str, Any], s: Any) -> Any:
         """Impedance of the drive (N m s/rad) at `s`, with tuned values by path."""
@@ -127,20 +103,7 @@ def refuse_not_linear(design: Design, tuned: tuple[Tuned, ...]) -> None:
 
 
 def loops_of(designs: Iterable[Design], tuned: tuple[Tuned, ...]) -> list[Loop]:
-    """Loops of a number of realizations of a design.
-
-    Parameters
-    ----------
-    designs : iterable of Design
-        The realizations.
-    tuned : tuple of Tuned
-        What is tuned.
-
-    Returns
-    -------
-    list of Loop
-        Of realizations that differ in the slope of the rock alone, the steepest.
-    """
+    """Loops of a number of realizations of a design."""
     found: dict[tuple[Any, ...], Loop] = {}
     strings: dict[Any, tuple[Ends, Grid, StringNumbers]] = {}
     for design in designs:

@@ -36,22 +36,7 @@ KERNEL = 0.02
 
 
 def rank_weights(kind: str, quantile: float, count: int) -> Array:
-    """Weights of sorted values, lowest first.
-
-    Parameters
-    ----------
-    kind : {'mean', 'quantile', 'cvar', 'worst'}
-        Statistic.
-    quantile : float
-        Of the quantile and of CVaR.
-    count : int
-        How many values.
-
-    Returns
-    -------
-    ndarray, shape (count,)
-        They sum to one. A quantile is interpolated as `numpy.quantile` does.
-    """
+    """Weights of sorted values, lowest first."""
     weights = np.zeros(count)
     if kind == "mean":
         weights[:] = 1.0 / count
@@ -82,21 +67,11 @@ def smooth_weights(kind: str, quantile: float, count: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """Statistic of J1, weights of other measures, and limits of the runs.
+    """Statistic of J1, weights of other measures, and limits of the runs."""
 
-    Attributes
-    ----------
-    table : TuneTable
-        As the design has it.
-    static : float
-        Static torque of the bit (N m), the measure of torques.
-    nominal : float
-        Nominal weight on bit (N), the measure of weights.
-    """
-
-    table: TuneTable
-    static: float
-    nominal: float
+    table: TuneTable  # as the design has it
+    static: float  # static torque of the bit (N m), the measure of torques
+    nominal: float  # nominal weight on bit (N), the measure of weights
 
     @property
     def needs(self) -> tuple[str, ...]:

@@ -10,11 +10,6 @@ class Pair:
 
     Enough arithmetic for the laws' `impedance(s)` and for `np.exp`, so that the linear design
     calls the very functions that the rest of the package calls with arrays.
-
-    Parameters
-    ----------
-    re, im : float or casadi.SX
-        Real and imaginary part.
     """
 
     __array_priority__ = 2000  # numbers of NumPy leave the operation to this class

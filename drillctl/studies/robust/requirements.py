@@ -47,29 +47,16 @@ class Late:
 
 @dataclass(frozen=True, eq=False)
 class LoopState:
-    """One loop at given gains.
+    """One loop at given gains."""
 
-    Attributes
-    ----------
-    loop : Loop
-        Which.
-    crossings : list of Crossing
-        The lowest, by rising slope.
-    stable : bool
-        Whether it is stable without slope.
-    poles : ndarray of complex
-        Of the first modes (1/s), upper half plane; asked for where damping is required.
-    peaks : list of Peak
-        Highest ones; asked for where the sensitivity is limited.
-    delays : list of Late
-        The shortest that the loop does not bear; asked for where one is required.
-    """
-
-    loop: Loop
-    crossings: list[Crossing]
-    stable: bool
+    loop: Loop  # which
+    crossings: list[Crossing]  # the lowest, by rising slope
+    stable: bool  # whether it is stable without slope
+    # of the first modes (1/s), upper half plane; asked for where damping is required
     poles: ComplexArray = field(default_factory=lambda: np.empty(0, dtype=complex))
+    # highest ones; asked for where the sensitivity is limited
     peaks: list[Peak] = field(default_factory=list)
+    # the shortest that the loop does not bear; asked for where one is required
     delays: list[Late] = field(default_factory=list)
 
     @property
@@ -95,21 +82,11 @@ class LoopState:
 
 @dataclass(frozen=True, eq=False)
 class Loops:
-    """What gains must hold for, and what is asked of them.
+    """What gains must hold for, and what is asked of them."""
 
-    Attributes
-    ----------
-    tuned : tuple of Tuned
-        What is tuned.
-    loops : list of Loop
-        Their slope margin is what counts.
-    asked : TuneConstraintsTable
-        Requirements.
-    """
-
-    tuned: tuple[Tuned, ...]
-    loops: list[Loop]
-    asked: TuneConstraintsTable
+    tuned: tuple[Tuned, ...]  # what is tuned
+    loops: list[Loop]  # their slope margin is what counts
+    asked: TuneConstraintsTable  # requirements
 
     @property
     def scale(self) -> float:
@@ -175,21 +152,11 @@ class Loops:
 
 @dataclass(frozen=True, eq=False)
 class LoopsState:
-    """All loops at given gains.
+    """All loops at given gains."""
 
-    Attributes
-    ----------
-    problem : Loops
-        What is asked.
-    values : ndarray, shape (parameters,)
-        Tuned values (SI).
-    loops : list of LoopState
-        As in `Loops`.
-    """
-
-    problem: Loops
-    values: Array
-    loops: list[LoopState]
+    problem: Loops  # what is asked
+    values: Array  # shape (parameters,): Tuned values (SI)
+    loops: list[LoopState]  # as in `Loops`
 
     @property
     def excess(self) -> float:

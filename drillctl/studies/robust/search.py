@@ -196,15 +196,7 @@ def search(
 
 
 def searching_judge(design: Design, tuned: tuple[Tuned, ...]) -> Judge:
-    """What a search judges gains by: its realizations, at accuracy `fast` unless a step is given.
-
-    Parameters
-    ----------
-    design : Design
-        With its `[tune]` and `[uncertain]` tables.
-    tuned : tuple of Tuned
-        What differs.
-    """
+    """What a search judges gains by: its realizations, `fast` unless a step is given."""
     if design.tables.simulation.step is None:
         design = design.replace({"simulation.accuracy": "fast"})
     return Judge(design, tuned)

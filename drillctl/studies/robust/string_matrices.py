@@ -14,26 +14,15 @@ Array = NDArray[np.float64]
 
 
 class StringMatrices(NamedTuple):
-    """z(t + h) = free z(t) + push [T_top, T_bit], and what is read off z.
+    """z(t + h) = free z(t) + push [T_top, T_bit], and what is read off z."""
 
-    Attributes
-    ----------
-    free : ndarray, shape (states, states)
-        Sparse but for a dense string: blocks of two states.
-    push : ndarray, shape (states, 2)
-        Per torque on the top, and per braking torque on the bit.
-    top_angle, bit_speed, top_speed : ndarray, shape (states,)
-        Rows that read angle (rad) and speeds (rad/s) in the frame.
-    pipe : ndarray, shape (states,)
-        Row that reads the pipe torque (N m).
-    """
-
-    free: Array
-    push: Array
+    free: Array  # shape (states, states): Sparse but for a dense string: blocks of two states
+    push: Array  # shape (states, 2): Per torque on the top, and per braking torque on the bit
+    # shape (states,): Rows that read angle (rad) and speeds (rad/s) in the frame
     top_angle: Array
     bit_speed: Array
     top_speed: Array
-    pipe: Array
+    pipe: Array  # shape (states,): Row that reads the pipe torque (N m)
 
 
 def string_matrices(string: Any) -> StringMatrices:

@@ -40,69 +40,37 @@ LEAST_HALF = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Tolerance:
-    """How far one parameter may drift alone.
+    """How far one parameter may drift alone."""
 
-    Attributes
-    ----------
-    path, unit : str
-        Of the parameter.
-    value : float
-        At the optimum (SI).
-    low, high : float
-        Between these the probability is never below the required one (SI); both the value
-        itself where it is so at the optimum already.
-    low_at_bound, high_at_bound : bool
-        Whether that end is the bound of the search: how far it goes on is not known.
-    values, probability : ndarray, shape (points,)
-        Points that were looked at (SI, increasing), and the probability there.
-    """
-
+    # of the parameter
     path: str
     unit: str
-    value: float
+    value: float  # at the optimum (SI)
+    # between these the probability is never below the required one (SI); both the value itself
+    # where it is so at the optimum already
     low: float
     high: float
+    # whether that end is the bound of the search: how far it goes on is not known
     low_at_bound: bool
     high_at_bound: bool
+    # shape (points,): Points that were looked at (SI, increasing), and the probability there
     values: Array
     probability: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbourhood:
-    """Probability about the optimum over the first one or two parameters.
+    """Probability about the optimum over the first one or two parameters."""
 
-    Attributes
-    ----------
-    axes : tuple of Axis
-        One or two.
-    probability : ndarray, shape of the axes
-        Share of the draws with J1 at or under the level.
-    realizations : int
-        How many draws.
-    """
-
-    axes: tuple[Axis, ...]
-    probability: Array
-    realizations: int
+    axes: tuple[Axis, ...]  # one or two
+    probability: Array  # shape of the axes: Share of the draws with J1 at or under the level
+    realizations: int  # how many draws
 
 
 def tolerances(
     fresh: Fresh, values: Array, probability: float, progress: Progress
 ) -> tuple[Tolerance, ...]:
-    """Tolerance of each parameter.
-
-    Parameters
-    ----------
-    fresh : Fresh
-        Runs.
-    values : ndarray, shape (parameters,)
-        The optimum (SI).
-    probability : float
-        There.
-    progress : Progress
-        Told of each parameter.
-    """
+    """Tolerance of each parameter."""
     progress.begin("tolerance of the gains", len(values))
     found = []
     for k in range(len(values)):
@@ -173,17 +141,7 @@ def _moved(values: Array, k: int, others: Array) -> Array:
 
 
 def neighbourhood(fresh: Fresh, values: Array, found: tuple[Tolerance, ...]) -> Neighbourhood:
-    """Probability over the first two parameters, or the only one, about the optimum.
-
-    Parameters
-    ----------
-    fresh : Fresh
-        Runs.
-    values : ndarray, shape (parameters,)
-        The optimum (SI); the other parameters stay there.
-    found : tuple of Tolerance
-        Says how far about.
-    """
+    """Probability over the first two parameters, or the only one, about the optimum."""
     some = min(2, len(values))
     points = POINTS if some == 2 else LINE_POINTS
     axes = tuple(

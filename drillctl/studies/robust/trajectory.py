@@ -45,17 +45,10 @@ the root mean square of the mean top torque of each step less its steady value (
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Measures of lanes and their derivatives.
+    """Measures of lanes and their derivatives."""
 
-    Attributes
-    ----------
-    values : dict of ndarray, shape (lanes,)
-        By the names of `MEASURED` (SI).
-    slopes : dict of ndarray, shape (lanes, parameters)
-        Their derivatives over the tuned values (SI).
-    """
-
-    values: dict[str, Array]
+    values: dict[str, Array]  # shape (lanes,): By the names of `MEASURED` (SI)
+    # shape (lanes, parameters): Their derivatives over the tuned values (SI)
     slopes: dict[str, Array]
 
 

@@ -45,17 +45,10 @@ GOOD, POOR = 0.5, 0.1
 
 @dataclass(eq=False)
 class Derivatives:
-    """Derivatives of the measures at the realizations of a search.
+    """Derivatives of the measures at the realizations of a search."""
 
-    Attributes
-    ----------
-    judge : Judge
-        Whose count of trajectories they add to.
-    parts : list of tuple
-        Trajectories of each string, and the positions of its lanes among the realizations.
-    """
-
-    judge: Judge
+    judge: Judge  # whose count of trajectories they add to
+    # trajectories of each string, and the positions of its lanes among the realizations
     parts: list[tuple[Trajectories, NDArray[np.int64]]]
 
     @classmethod
@@ -109,17 +102,7 @@ MOST_STRINGS = 32
 
 
 def descended(judge: Judge, derivatives: Derivatives, start: Point) -> Point:
-    """The end of a search by trust regions from a point.
-
-    Parameters
-    ----------
-    judge : Judge
-        Runs the steps, at as many realizations as the start has met.
-    derivatives : Derivatives
-        Of the measures.
-    start : Point
-        Where it begins.
-    """
+    """The end of a search by trust regions from a point."""
     best, region = start, FIRST_REGION
     known: Sensitivities | None = None
     for _ in range(STEPS):

@@ -19,11 +19,6 @@ def dataset(result: Tune) -> xarray.Dataset:
 
     That is the drawn values, the audited draws, the lines that tolerances were read from, and
     the probability about the optimum.
-
-    Parameters
-    ----------
-    result : Tune
-        What was found.
     """
     import xarray
 

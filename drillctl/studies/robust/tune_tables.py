@@ -18,13 +18,6 @@ def write_tune_tables(result: Tune, folder: Path) -> None:
 
     `baselines.csv`, a row the found gains and each baseline; `tolerance.csv`, a row a parameter;
     `neighbourhood.csv`, a row a cell; `draws.csv`, a row a fresh realization.
-
-    Parameters
-    ----------
-    result : Tune
-        What was found.
-    folder : Path
-        Where to.
     """
     paths = [t.path for t in result.tuning.tuned]
     quantiles = list(result.certificate.runs.quantiles)

@@ -147,24 +147,12 @@ def middle(design: Design, tuned: tuple[Tuned, ...]) -> Design:
 
 
 class StringNumbers(NamedTuple):
-    """What drives are tuned to of a string.
+    """What drives are tuned to of a string."""
 
-    Attributes
-    ----------
-    pipe : float
-        Impedance of the uppermost pipe (N m s/rad); NaN of a lumped spring.
-    inertia : float
-        Of the top drive (kg m2).
-    spring : float
-        w_s^2 J_d, with w_s the lowest frequency with the top held (N m/rad).
-    damper : float
-        Of active damping by its own rule (N m s/rad).
-    """
-
-    pipe: Any
-    inertia: Any
-    spring: Any
-    damper: Any
+    pipe: Any  # impedance of the uppermost pipe (N m s/rad); NaN of a lumped spring
+    inertia: Any  # of the top drive (kg m2)
+    spring: Any  # w_s^2 J_d, with w_s the lowest frequency with the top held (N m/rad)
+    damper: Any  # of active damping by its own rule (N m s/rad)
 
 
 def string_numbers(string: Drillstring) -> StringNumbers:
@@ -179,28 +167,7 @@ def string_numbers(string: Drillstring) -> StringNumbers:
 def drive_numbers(
     design: Design, values: Mapping[str, Any], string: StringNumbers
 ) -> dict[str, Any]:
-    """Numbers of the drive law of a design with some of the controller's numbers replaced.
-
-    Parameters
-    ----------
-    design : Design
-        Its `[controller]` gives the law and what is not replaced.
-    values : dict
-        Path to number, array or symbol; paths that are not the controller's are left alone.
-    string : StringNumbers
-        What a drive is tuned to; may be symbols.
-
-    Returns
-    -------
-    dict
-        Of the fields `kp`, `ki`, `mobility`, `corner` and `tracking`, or `level` and
-        `feedforward`, those that the law's tables set.
-
-    Raises
-    ------
-    InputError
-        A path of the controller that is not a number of its law.
-    """
+    """Numbers of the drive law of a design with some of the controller's numbers replaced."""
     table = design.tables.controller
     refuse_other_paths(table.law, values)
     given = {k.removeprefix("controller."): v for k, v in values.items() if "controller." in k}

@@ -27,21 +27,12 @@ TRACED_LANES = 128
 
 @dataclass(frozen=True, eq=False)
 class Ended:
-    """How runs from one start ended.
+    """How runs from one start ended."""
 
-    Attributes
-    ----------
-    attracted : ndarray of bool, shape (lanes,)
-        Bit speed within the band of the operating speed throughout the last window.
-    sticking : ndarray of bool, shape (lanes,)
-        The bit stood still at some time in that window.
-    failed : ndarray of bool, shape (lanes,)
-        No finite answer; neither of the others holds then.
-    """
-
+    # shape (lanes,): Bit speed within the band of the operating speed throughout the last window
     attracted: Mask
-    sticking: Mask
-    failed: Mask
+    sticking: Mask  # shape (lanes,): The bit stood still at some time in that window
+    failed: Mask  # shape (lanes,): No finite answer; neither of the others holds then
 
 
 def long_runs(group: Group) -> Prepared:
@@ -56,17 +47,6 @@ def ends_from(kind: Kind, lanes: Lanes, operating_speed: Array, prepared: Prepar
     A drive without any speed control has no set speed, only a frame: there the operating speed
     takes its place, also as the speed of the top of a wound-up string. Proportional control
     alone has a set speed that it never holds, and it cannot be moved: those lanes are traced.
-
-    Parameters
-    ----------
-    kind : {'rest', 'turning', 'wound_up'}
-        Start.
-    lanes : Lanes
-        On the string that was prepared.
-    operating_speed : ndarray, shape (lanes,)
-        Speed of steady drilling (rad/s); NaN where there is none: nothing is attracted there.
-    prepared : Prepared
-        For runs over `HORIZON`.
     """
     kp, ki = gains_of(lanes)
     steady = np.isfinite(operating_speed)

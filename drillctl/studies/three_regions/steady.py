@@ -21,37 +21,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Steady:
-    """Steady drilling of a number of lanes.
+    """Steady drilling of a number of lanes."""
 
-    Attributes
-    ----------
-    speed : ndarray, shape (lanes,)
-        Of top and bit (rad/s); NaN where drive, drag and rock balance at no speed.
-    slope : ndarray, shape (lanes,)
-        Falling slope of the rock there (N m s/rad); NaN at the same lanes.
-    """
-
+    # shape (lanes,): Of top and bit (rad/s); NaN where drive, drag and rock balance at no speed
     speed: Array
+    # shape (lanes,): Falling slope of the rock there (N m s/rad); NaN at the same lanes
     slope: Array
 
 
 def steady_drilling(design: Design, axes: tuple[Axis, ...], group: Group) -> Steady:
-    """Operating speed of each cell of a group and the slope there.
-
-    Parameters
-    ----------
-    design : Design
-        Of the grid.
-    axes : tuple of Axis
-        Of the grid.
-    group : Group
-        Cells that share a string.
-
-    Returns
-    -------
-    Steady
-        Of each cell what `drillctl.linear.operating_point` says of it.
-    """
+    """Operating speed of each cell of a group and the slope there."""
     lanes = group.lanes
     speed = lanes.set_speed.copy()
     for lane in np.flatnonzero(gains_of(lanes)[1] == 0.0):

@@ -35,18 +35,10 @@ NEVER = 1e-10
 
 
 class Area(NamedTuple):
-    """Share of the cells of a map in a region, with its sampling error.
+    """Share of the cells of a map in a region, with its sampling error."""
 
-    Attributes
-    ----------
-    value : float
-        Share of the cells.
-    interval : tuple of float
-        Interval of the confidence asked for.
-    """
-
-    value: float
-    interval: Interval
+    value: float  # share of the cells
+    interval: Interval  # interval of the confidence asked for
 
 
 def region_areas(
@@ -56,21 +48,7 @@ def region_areas(
     seed: int,
     confidence: float = CONFIDENCE,
 ) -> list[Area]:
-    """Areas where levels are kept with a probability, with their intervals.
-
-    Parameters
-    ----------
-    j1 : ndarray, shape (realizations, cells)
-        J1 (s), as it was counted.
-    asked : sequence of tuple of ProbabilityMap and float
-        Level and probability of each region.
-    scatter : Scatter
-        Which realizations are independent.
-    seed : int
-        Of the resampling.
-    confidence : float
-        Of each interval.
-    """
+    """Areas where levels are kept with a probability, with their intervals."""
     if scatter.independent:
         intervals = _bootstrap(j1, asked, seed, confidence)
     else:

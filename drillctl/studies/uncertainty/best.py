@@ -40,70 +40,34 @@ NEEDS_FULL = "lanes were stopped at the highest level: run with --full"
 
 @dataclass(frozen=True, eq=False)
 class Best:
-    """The best cell of a map by one objective.
+    """The best cell of a map by one objective."""
 
-    Attributes
-    ----------
-    name : str
-        Of the objective.
-    cell : int
-        In the flattened map.
-    value : float
-        Objective there: s, or a probability.
-    interval : tuple of float or None
-        95 % interval of the value in that cell, which was chosen on the same realizations;
-        None for an end that is not known.
-    alike : ndarray of bool, shape (cells,), or None
-        Cells that cannot be told apart from it, itself included; None if lanes were stopped or
-        realizations are too few to say.
-    """
-
-    name: str
-    cell: int
-    value: float
+    name: str  # of the objective
+    cell: int  # in the flattened map
+    value: float  # objective there: s, or a probability
+    # 95 % interval of the value in that cell, which was chosen on the same realizations; None for
+    # an end that is not known
     interval: tuple[float | None, float | None]
+    # shape (cells,): Cells that cannot be told apart from it, itself included; None if lanes were
+    # stopped or realizations are too few to say
     alike: Mask | None
 
 
 @dataclass(frozen=True, eq=False)
 class Values:
-    """An objective in every cell.
+    """An objective in every cell."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (cells,)
-        What is known at least; NaN in a cell where a lane failed.
-    certain : ndarray of bool, shape (cells,)
-        Where no stopped lane enters the value.
-    """
-
-    values: Array
-    certain: Mask
+    values: Array  # shape (cells,): What is known at least; NaN in a cell where a lane failed
+    certain: Mask  # shape (cells,): Where no stopped lane enters the value
 
 
 def objectives(levels: tuple[float, ...]) -> tuple[Objective, ...]:
-    """What the best cells are looked for by.
-
-    Parameters
-    ----------
-    levels : tuple of float
-        Levels of J1 (s).
-    """
+    """What the best cells are looked for by."""
     return (Mean(), Quantile(), TailMean(), *(Exceedance(level) for level in levels))
 
 
 def values_of(asked: Iterable[Objective], j1: Array, censored: Mask) -> dict[str, Values]:
-    """Objectives in every cell, by name.
-
-    Parameters
-    ----------
-    asked : iterable of Objective
-        Which.
-    j1 : ndarray, shape (realizations, cells)
-        J1 (s) of the realizations that a rig can have.
-    censored : ndarray of bool, shape (realizations, cells)
-        Lanes whose J1 is a lower bound.
-    """
+    """Objectives in every cell, by name."""
     asked, cells = tuple(asked), j1.shape[1]
     values = {one.name: np.empty(cells) for one in asked}
     bound = np.full(cells, np.inf)
@@ -135,28 +99,7 @@ def best_cells(
     scatter: Scatter,
     seed: int,
 ) -> dict[str, Best | InputError]:
-    """The best cell by each objective, or why it is not known.
-
-    Parameters
-    ----------
-    asked : iterable of Objective
-        Smaller is better.
-    found : mapping of Values
-        Their values, from `values_of`.
-    j1 : ndarray, shape (realizations, cells)
-        J1 (s) of the realizations that a rig can have.
-    censored : ndarray of bool, shape (realizations, cells)
-        Lanes whose J1 is a lower bound.
-    scatter : Scatter
-        Which realizations are independent.
-    seed : int
-        Of resampling.
-
-    Returns
-    -------
-    dict of Best or InputError
-        The error where every cell has failed lanes, or too many lanes were stopped to know.
-    """
+    """The best cell by each objective, or why it is not known."""
     asked = tuple(asked)
     cells: dict[str, int | InputError] = {
         one.name: _cell(one, found[one.name], j1) for one in asked
@@ -255,20 +198,6 @@ def quantile_interval(
     """Interval of a quantile by order statistics, whatever the distribution.
 
     David & Nagaraja, Order Statistics (2003), section 7.1.
-
-    Parameters
-    ----------
-    ordered : ndarray, shape (realizations,)
-        Increasing and independent.
-    probability : float
-        Of the quantile.
-    bound : float
-        From which on values are not known.
-
-    Returns
-    -------
-    tuple of float or None
-        None for an end that so few realizations do not bound.
     """
     from scipy.stats import binom
 

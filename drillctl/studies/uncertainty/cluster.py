@@ -29,15 +29,7 @@ DEATHS = 20
 
 
 class Cluster:
-    """Blocks on the workers of a dask.distributed cluster.
-
-    Parameters
-    ----------
-    client : distributed.Client
-        Connected to it.
-    allow_mixed : bool
-        Whether processors may be of several types; results then differ in the last bits.
-    """
+    """Blocks on the workers of a dask.distributed cluster."""
 
     def __init__(self, client: Client, allow_mixed: bool = False) -> None:
         self._client, self._allow_mixed = client, allow_mixed
@@ -119,18 +111,7 @@ ANSWER = 10.0
 
 
 def connect(address: str) -> Client:
-    """A client of a scheduler.
-
-    Parameters
-    ----------
-    address : str
-        As dask tells it, for instance `tcp://node1:8786`.
-
-    Raises
-    ------
-    InputError
-        dask.distributed is not installed, or nobody answers.
-    """
+    """A client of a scheduler."""
     try:
         from distributed import Client
     except ImportError:

@@ -18,34 +18,15 @@ FEWEST = 16
 
 
 class Convergence(NamedTuple):
-    """Areas of the inner regions against the number of realizations.
+    """Areas of the inner regions against the number of realizations."""
 
-    Attributes
-    ----------
-    counts : tuple of int
-        Realizations, from the first on.
-    areas : dict of float to tuple of Area
-        By level, one a count, with 95 % intervals of that count by itself.
-    """
-
-    counts: tuple[int, ...]
+    counts: tuple[int, ...]  # realizations, from the first on
+    # by level, one a count, with 95 % intervals of that count by itself
     areas: dict[float, tuple[Area, ...]]
 
 
 def convergence(j1: Array, levels: tuple[float, ...], scatter: Scatter, seed: int) -> Convergence:
-    """Areas of the inner regions at doubling numbers of realizations.
-
-    Parameters
-    ----------
-    j1 : ndarray, shape (realizations, cells)
-        J1 (s).
-    levels : tuple of float
-        Levels of J1 (s).
-    scatter : Scatter
-        Which realizations are independent.
-    seed : int
-        Of resampling.
-    """
+    """Areas of the inner regions at doubling numbers of realizations."""
     counts, count = [], max(FEWEST, 2 * scatter.replicates)
     while count < len(j1):
         counts.append(count)

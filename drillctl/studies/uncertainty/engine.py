@@ -9,16 +9,5 @@ from drillctl.simulation.lanes import Lanes
 
 
 def simulate(lanes: Lanes, prepared: Prepared, censor: float | None) -> Batch:
-    """Simulate lanes that need not be known beyond a level of J1.
-
-    Parameters
-    ----------
-    lanes : Lanes
-        On the string that was prepared.
-    prepared : Prepared
-        String and scheme.
-    censor : float or None
-        Level (s) from which on a lane may stop, with status `censored` and a J1 that is a lower
-        bound above the level; None where every lane is to be known to its end.
-    """
+    """Simulate lanes that need not be known beyond a level of J1."""
     return run_batch(lanes, prepared, math.inf if censor is None else censor)

@@ -41,15 +41,9 @@ class Source(Protocol):
 
 @dataclass(frozen=True)
 class Drawn:
-    """Realizations drawn as the design says.
+    """Realizations drawn as the design says."""
 
-    Attributes
-    ----------
-    seed : int
-        What they follow from.
-    """
-
-    seed: int
+    seed: int  # what they follow from
 
     def drawing(self, design: Design) -> Drawing:
         """Draws by their numbers."""
@@ -59,15 +53,9 @@ class Drawn:
 
 @dataclass(frozen=True, eq=False)
 class Listed:
-    """Realizations given one by one.
+    """Realizations given one by one."""
 
-    Attributes
-    ----------
-    columns : dict of ndarray, shape (realizations,)
-        Values (SI) by path.
-    """
-
-    columns: dict[str, Array]
+    columns: dict[str, Array]  # shape (realizations,): Values (SI) by path
 
     def drawing(self, design: Design) -> Drawing:
         """Rows by their numbers."""
@@ -78,51 +66,27 @@ class Listed:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """What was measured of some realizations.
+    """What was measured of some realizations."""
 
-    Attributes
-    ----------
-    first : int
-        Number of the first of them.
-    measures : dict of ndarray, shape (realizations, cells)
-        By the names of `simulation.batch.FLOATS`; NaN where undefined.
-    status : ndarray of int8, shape (realizations, cells)
-        Index into `simulation.measures.STATUSES`.
-    provenance : dict of str
-        Versions and processor it came from.
-    """
-
-    first: int
+    first: int  # number of the first of them
+    # shape (realizations, cells): By the names of `simulation.batch.FLOATS`; NaN where undefined
     measures: dict[str, Array]
+    # shape (realizations, cells): Index into `simulation.measures.STATUSES`
     status: NDArray[np.int8]
-    provenance: dict[str, str]
+    provenance: dict[str, str]  # versions and processor it came from
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Realizations of a design over a map; any block of them is work for anyone.
+    """Realizations of a design over a map; any block of them is work for anyone."""
 
-    Attributes
-    ----------
-    design : Design
-        With what is uncertain, named or by default.
-    axes : tuple of Axis
-        Of the map.
-    source : Source
-        Of the realizations.
-    measures : tuple of str
-        What is kept of a lane, J1 first.
-    censor : float or None
-        Level (s) from which on a lane need not be known; None for all to their end.
-    strings : dict of int to Prepared
-        Strings of the design itself by part of the map, prepared once and shipped.
-    """
-
-    design: Design
-    axes: tuple[Axis, ...]
-    source: Source
-    measures: tuple[str, ...]
+    design: Design  # with what is uncertain, named or by default
+    axes: tuple[Axis, ...]  # of the map
+    source: Source  # of the realizations
+    measures: tuple[str, ...]  # what is kept of a lane, J1 first
+    # level (s) from which on a lane need not be known; None for all to their end
     censor: float | None
+    # strings of the design itself by part of the map, prepared once and shipped
     strings: dict[int, Prepared] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -138,18 +102,7 @@ class Job:
         return int(np.prod(shape_of(self.axes), dtype=int))
 
     def run(self, first: int, count: int) -> Block:
-        """Simulate some realizations at every cell.
-
-        Parameters
-        ----------
-        first, count : int
-            Which of them.
-
-        Returns
-        -------
-        Block
-            The same bits in whatever blocks, by whatever number of threads.
-        """
+        """Simulate some realizations at every cell."""
         values = self._drawn(count, first)
         shape = (count, self.cells)
         measures = {name: np.full(shape, np.nan) for name in self.measures}
@@ -176,14 +129,7 @@ class Job:
         return found
 
     def prepare(self, kept: Callable[[int, Callable[[], Prepared]], Prepared]) -> Job:
-        """The job with the strings of the design itself, and its kernels loaded.
-
-        Parameters
-        ----------
-        kept : callable
-            Takes a number and a function that prepares; gives what was prepared before under
-            that number, if anything was.
-        """
+        """The job with the strings of the design itself, and its kernels loaded."""
         strings = {}
         warm: set[Any] = set()
         for number, part in enumerate(self._parts):

@@ -40,26 +40,12 @@ class Keeping(Protocol):
 
 
 def block_size(cells: int) -> int:
-    """Realizations of a block.
-
-    Parameters
-    ----------
-    cells : int
-        Of the map.
-    """
+    """Realizations of a block."""
     return min(max(1, LANES // cells), MOST)
 
 
 def pieces(done: NDArray[np.bool_], size: int) -> list[tuple[int, int]]:
-    """What is not done, as (first, count), cut at multiples of the size of a block.
-
-    Parameters
-    ----------
-    done : ndarray of bool, shape (realizations,)
-        Which are.
-    size : int
-        Of a block.
-    """
+    """What is not done, as (first, count), cut at multiples of the size of a block."""
     found = []
     for begin in range(0, len(done), size):
         lacking = np.flatnonzero(~done[begin : begin + size])
@@ -69,15 +55,7 @@ def pieces(done: NDArray[np.bool_], size: int) -> list[tuple[int, int]]:
 
 
 class InMemory:
-    """For runs that live in memory only.
-
-    Parameters
-    ----------
-    cells : int
-        Of the map.
-    measures : tuple of str
-        What is kept of a lane.
-    """
+    """For runs that live in memory only."""
 
     def __init__(self, cells: int, measures: tuple[str, ...]) -> None:
         self._cells, self._measures = cells, measures

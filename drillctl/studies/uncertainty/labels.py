@@ -23,13 +23,7 @@ Array = NDArray[np.float64]
 
 
 def dataset(result: Uncertainty) -> xarray.Dataset:
-    """All that a result holds, and the maps that follow from it.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        To be labelled.
-    """
+    """All that a result holds, and the maps that follow from it."""
     import xarray
 
     variables = lanes(result) | maps(result)
@@ -41,13 +35,7 @@ def dataset(result: Uncertainty) -> xarray.Dataset:
 
 
 def lanes(result: Uncertainty) -> dict[str, Any]:
-    """What was simulated, lane by lane, as variables of a dataset.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        To be labelled.
-    """
+    """What was simulated, lane by lane, as variables of a dataset."""
     dimensions = ["realization", *(a.path for a in result.axes)]
     variables: dict[str, Any] = {
         name: (dimensions, values, {"units": UNITS[name]})
@@ -58,13 +46,7 @@ def lanes(result: Uncertainty) -> dict[str, Any]:
 
 
 def maps(result: Uncertainty) -> dict[str, Any]:
-    """Everything else: draws, nominal map, counts with intervals, moments, audit.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        To be labelled.
-    """
+    """Everything else: draws, nominal map, counts with intervals, moments, audit."""
     paths = [a.path for a in result.axes]
     found: dict[str, Any] = {
         one.path: ("realization", result.drawn[one.path], {"units": one.unit})
@@ -89,13 +71,7 @@ def maps(result: Uncertainty) -> dict[str, Any]:
 
 
 def known(result: Uncertainty) -> dict[str, Array]:
-    """Mean, 95 % quantile and tail mean in every cell (s); NaN where stopped lanes enter.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        To be labelled.
-    """
+    """Mean, 95 % quantile and tail mean in every cell (s); NaN where stopped lanes enter."""
     found = {}
     for name in (Mean().name, Quantile().name, TailMean().name):
         one = result.values[name]
@@ -105,13 +81,7 @@ def known(result: Uncertainty) -> dict[str, Array]:
 
 
 def summary(result: Uncertainty) -> dict[str, Any]:
-    """What the command tells; SI units, parameters by path.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        To be told.
-    """
+    """What the command tells; SI units, parameters by path."""
     table = result.design.tables.uncertainty
     told: dict[str, Any] = {
         "realizations": result.realizations,

@@ -24,38 +24,20 @@ INNER, MEDIAN, OUTER = 0.95, 0.5, 0.05
 
 
 def needed(probability: float, total: int) -> int:
-    """Fewest of `total` realizations that are a share of at least `probability`.
-
-    Parameters
-    ----------
-    probability : float
-        Between 0 and 1.
-    total : int
-        Realizations.
-    """
+    """Fewest of `total` realizations that are a share of at least `probability`."""
     return int(np.ceil(probability * total * (1.0 - 1e-12)))
 
 
 @dataclass(frozen=True, eq=False)
 class ProbabilityMap:
-    """How many realizations have J1 at or under a level, in each cell.
+    """How many realizations have J1 at or under a level, in each cell."""
 
-    Attributes
-    ----------
-    level : float
-        Level of J1 (s).
-    counts : ndarray of int, shape of the map
-        Realizations at or under it; one that failed is not.
-    by_replicate : ndarray of int, shape (replicates, ...)
-        The same of every replicate; of Monte Carlo there is one.
-    total : int
-        Realizations.
-    """
-
-    level: float
+    level: float  # level of J1 (s)
+    # shape of the map: Realizations at or under it; one that failed is not
     counts: NDArray[np.int64]
+    # shape (replicates, ...): The same of every replicate; of Monte Carlo there is one
     by_replicate: NDArray[np.int64]
-    total: int
+    total: int  # realizations
 
     @property
     def probability(self) -> Array:
@@ -107,17 +89,7 @@ class ProbabilityMap:
 
 
 def probability_map(j1: Array, level: float, scatter: Scatter) -> ProbabilityMap:
-    """Count realizations at or under a level.
-
-    Parameters
-    ----------
-    j1 : ndarray, shape (realizations, ...)
-        J1 (s); NaN where a lane failed, a lower bound above the level where it was censored.
-    level : float
-        Level (s).
-    scatter : Scatter
-        Which realizations belong together.
-    """
+    """Count realizations at or under a level."""
     hits = j1 <= level
     by_replicate = np.stack([hits[rows].sum(axis=0) for rows in scatter.rows(len(j1))])
     return ProbabilityMap(level, by_replicate.sum(axis=0), by_replicate, len(j1))

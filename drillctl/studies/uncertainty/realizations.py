@@ -35,24 +35,12 @@ TIMED = ("speed_program.begin", "speed_program.end", "weight_program.begin",
 
 
 class Run(NamedTuple):
-    """Lanes that run together.
+    """Lanes that run together."""
 
-    Attributes
-    ----------
-    lanes : Lanes
-        Realization by realization.
-    prepared : Prepared
-        Their string and scheme.
-    rows : ndarray of int, shape (lanes,)
-        Position of the realization of each lane.
-    cells : ndarray of int, shape (lanes,)
-        Cell of each lane, in the flattened map.
-    """
-
-    lanes: Lanes
-    prepared: Prepared
-    rows: NDArray[np.int64]
-    cells: NDArray[np.int64]
+    lanes: Lanes  # realization by realization
+    prepared: Prepared  # their string and scheme
+    rows: NDArray[np.int64]  # shape (lanes,): Position of the realization of each lane
+    cells: NDArray[np.int64]  # shape (lanes,): Cell of each lane, in the flattened map
 
 
 class _Resolved(NamedTuple):
@@ -74,21 +62,11 @@ class _CellByCell(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PartOfMap:
-    """The cells of a map that share a string and the types of their laws.
+    """The cells of a map that share a string and the types of their laws."""
 
-    Attributes
-    ----------
-    part : Part
-        Which cells, and their design.
-    paths : tuple of str
-        What is uncertain.
-    strings : Strings
-        Prepared so far.
-    """
-
-    part: Part
-    paths: tuple[str, ...]
-    strings: Strings
+    part: Part  # which cells, and their design
+    paths: tuple[str, ...]  # what is uncertain
+    strings: Strings  # prepared so far
 
     @cached_property
     def nominal(self) -> dict[str, Array]:
@@ -116,18 +94,7 @@ class PartOfMap:
         return any(path.startswith(SHARED) for path in self.paths)
 
     def runs(self, values: dict[str, Array]) -> Iterator[Run]:
-        """Lanes of realizations.
-
-        Parameters
-        ----------
-        values : dict of ndarray, shape (realizations,)
-            Of what is uncertain (SI), by path.
-
-        Yields
-        ------
-        Run
-            All possible lanes, each in one of them.
-        """
+        """Lanes of realizations."""
         alike: dict[tuple[Any, ...], list[_Resolved]] = {}
         for row in range(len(next(iter(values.values())))):
             drawn = {path: units.SI(column[row]) for path, column in values.items()}
@@ -232,15 +199,7 @@ class PartOfMap:
         return slice(0, 1) if gains else slice(None)
 
     def string_key(self, design: Design, numbers: dict[str, float]) -> Hashable:
-        """What tells the strings of realizations apart, beside the friction.
-
-        Parameters
-        ----------
-        design : Design
-            Of a realization.
-        numbers : dict
-            Of its lane at the first cell, by name.
-        """
+        """What tells the strings of realizations apart, beside the friction."""
         return (kinds(design), tuple(numbers.get(key, 0.0) for key in TIMED))
 
     def _run(self, group: list[_Resolved], lanes: Lanes, ready: Prepared) -> Run:

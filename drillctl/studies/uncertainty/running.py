@@ -36,28 +36,7 @@ def run(
     progress: Progress = SILENT,
     after: Callable[[], None] = lambda: None,
 ) -> float:
-    """Compute what the first `count` realizations still lack.
-
-    Parameters
-    ----------
-    job : Job
-        Prepared.
-    count : int
-        Realizations.
-    kept : Keeping
-        Where finished blocks are, and where they go.
-    workers : Workers
-        Who computes.
-    progress : Progress
-        Told of lanes.
-    after : callable
-        Called after every block that was kept.
-
-    Returns
-    -------
-    float
-        Time spent (s).
-    """
+    """Compute what the first `count` realizations still lack."""
     begin = time.perf_counter()
     pieces = kept.missing(count)
     lacking = sum(size for _, size in pieces)

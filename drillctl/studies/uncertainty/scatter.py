@@ -17,17 +17,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """Which realizations are independent of each other.
+    """Which realizations are independent of each other."""
 
-    Attributes
-    ----------
-    replicates : int
-        Independent sets that take turns; 1 where every realization is independent.
-    numbers : ndarray of int, or None
-        Of the realizations that are looked at, where those are not all from the first on.
-    """
-
-    replicates: int
+    replicates: int  # independent sets that take turns; 1 where every realization is independent
+    # of the realizations that are looked at, where those are not all from the first on
     numbers: NDArray[np.int64] | None = None
 
     @property
@@ -47,13 +40,7 @@ class Scatter:
         return [np.flatnonzero(of == k) for k in range(self.replicates)]
 
     def standard_error(self, influence: Array) -> Array:
-        """Standard error of the mean of an influence function.
-
-        Parameters
-        ----------
-        influence : ndarray, shape (realizations, ...)
-            What each realization adds to an estimate; its mean is the estimate's error.
-        """
+        """Standard error of the mean of an influence function."""
         if self.independent:
             error: Array = influence.std(axis=0, ddof=1) / np.sqrt(len(influence))
             return error

@@ -32,51 +32,28 @@ RESAMPLES = 1000
 
 @dataclass(frozen=True, eq=False)
 class Indices:
-    """Sobol indices of one figure.
+    """Sobol indices of one figure."""
 
-    Attributes
-    ----------
-    of : str
-        What they explain.
-    unit : str
-        Of that figure.
-    first, total : ndarray, shape (parameters,)
-        Indices; NaN where the figure does not vary.
-    first_error, total_error : ndarray, shape (parameters,)
-        Half-widths of 95 % bootstrap intervals; NaN where points are too few to tell.
-    variance : float
-        Of the figure, in its unit squared.
-    """
-
-    of: str
-    unit: str
+    of: str  # what they explain
+    unit: str  # of that figure
+    # shape (parameters,): Indices; NaN where the figure does not vary
     first: Array
     total: Array
+    # shape (parameters,): Half-widths of 95 % bootstrap intervals; NaN where points are too few
+    # to tell
     first_error: Array
     total_error: Array
-    variance: float
+    variance: float  # of the figure, in its unit squared
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """Sobol indices of J1 at chosen cells and of the areas under each level.
+    """Sobol indices of J1 at chosen cells and of the areas under each level."""
 
-    Attributes
-    ----------
-    parameters : tuple of str
-        Paths of what is uncertain.
-    samples : int
-        Points of Saltelli's design.
-    trajectories : int
-        Lanes simulated for it.
-    indices : tuple of Indices
-        One a figure.
-    """
-
-    parameters: tuple[str, ...]
-    samples: int
-    trajectories: int
-    indices: tuple[Indices, ...]
+    parameters: tuple[str, ...]  # paths of what is uncertain
+    samples: int  # points of Saltelli's design
+    trajectories: int  # lanes simulated for it
+    indices: tuple[Indices, ...]  # one a figure
 
     def summary(self) -> dict[str, Any]:
         """Indices by figure and parameter."""
@@ -100,13 +77,7 @@ COLUMNS = ("first", "first_error", "total", "total_error")
 
 
 def read_sensitivity(told: dict[str, Any]) -> Sensitivity:
-    """A `Sensitivity` from its summary.
-
-    Parameters
-    ----------
-    told : dict
-        As `Sensitivity.summary` gives it, perhaps by way of JSON.
-    """
+    """A `Sensitivity` from its summary."""
     found = []
     for of, one in told["indices"].items():
         columns = {key: np.array([np.nan if v is None else v for v in one[key]]) for key in COLUMNS}
@@ -116,13 +87,7 @@ def read_sensitivity(told: dict[str, Any]) -> Sensitivity:
 
 
 def refuse_correlated(design: Design) -> None:
-    """Refuse (`InputError`) correlated parameters, of which Sobol indices say nothing.
-
-    Parameters
-    ----------
-    design : Design
-        With what is uncertain.
-    """
+    """Refuse (`InputError`) correlated parameters, of which Sobol indices say nothing."""
     if design.tables.uncertainty.correlations:
         raise InputError(
             "Sobol indices are of independent parameters: leave correlations or sensitivity out",
@@ -131,27 +96,7 @@ def refuse_correlated(design: Design) -> None:
 
 
 def points(design: Design, samples: int, seed: int) -> dict[str, Array]:
-    """Realizations of Saltelli's design, in the order in which SALib takes their results.
-
-    Parameters
-    ----------
-    design : Design
-        Its parameters must be independent.
-    samples : int
-        A power of two.
-    seed : int
-        Of the scrambling.
-
-    Returns
-    -------
-    dict of ndarray, shape (samples * (parameters + 2),)
-        Values (SI) by path.
-
-    Raises
-    ------
-    InputError
-        Correlated parameters, of which Sobol indices say nothing.
-    """
+    """Realizations of Saltelli's design, in the order in which SALib takes their results."""
     from SALib.sample import sobol
 
     refuse_correlated(design)
@@ -163,19 +108,7 @@ def points(design: Design, samples: int, seed: int) -> dict[str, Array]:
 
 
 def indices(of: str, unit: str, values: Array, parameters: tuple[str, ...], seed: int) -> Indices:
-    """Sobol indices of a figure.
-
-    Parameters
-    ----------
-    of, unit : str
-        What it is.
-    values : ndarray, shape (samples * (parameters + 2),)
-        In the order of `points`; finite.
-    parameters : tuple of str
-        Paths of what is uncertain.
-    seed : int
-        Of the bootstrap.
-    """
+    """Sobol indices of a figure."""
     from SALib.analyze import sobol
 
     nothing = np.full(len(parameters), np.nan)
@@ -207,30 +140,7 @@ def sensitivity(
     levels: tuple[float, ...],
     seed: int,
 ) -> Sensitivity:
-    """Indices of J1 at cells, and of the area under each level.
-
-    Parameters
-    ----------
-    parameters : tuple of str
-        Paths of what is uncertain.
-    samples : int
-        Points of Saltelli's design.
-    j1 : ndarray, shape (samples * (parameters + 2), cells)
-        J1 (s) in the order of `points`.
-    status : ndarray of int8, of the same shape
-        Index into `simulation.measures.STATUSES`.
-    cells : dict of int to str
-        Cells whose J1 is explained, and what they are called.
-    levels : tuple of float
-        Levels of J1 (s).
-    seed : int
-        Of the bootstrap.
-
-    Raises
-    ------
-    InputError
-        A lane at one of the cells was stopped or failed.
-    """
+    """Indices of J1 at cells, and of the area under each level."""
     found = []
     for cell, name in cells.items():
         for reason, problem in (("censored", NEEDS_FULL), ("failed", "lanes failed there")):

@@ -23,24 +23,12 @@ Array = NDArray[np.float64]
 
 
 class Look(NamedTuple):
-    """The area as it was known at a number of realizations.
+    """The area as it was known at a number of realizations."""
 
-    Attributes
-    ----------
-    realizations : int
-        How many had been run.
-    area : float
-        Share of the map.
-    interval : tuple of float
-        Corrected for the number of looks.
-    confidence : float
-        Of this interval by itself.
-    """
-
-    realizations: int
-    area: float
-    interval: Interval
-    confidence: float
+    realizations: int  # how many had been run
+    area: float  # share of the map
+    interval: Interval  # corrected for the number of looks
+    confidence: float  # of this interval by itself
 
     def enough(self, half_width: float) -> bool:
         """Whether the area is known to within a half-width on either side."""
@@ -49,13 +37,7 @@ class Look(NamedTuple):
 
 
 def schedule(first: int, most: int) -> tuple[int, ...]:
-    """Numbers of realizations at which the area is looked at: doubling, up to the most.
-
-    Parameters
-    ----------
-    first, most : int
-        First look, and realizations at most.
-    """
+    """Numbers of realizations at which the area is looked at: doubling, up to the most."""
     looks = []
     while first < most:
         looks.append(first)
@@ -64,20 +46,7 @@ def schedule(first: int, most: int) -> tuple[int, ...]:
 
 
 def level_of(table: UntilTable, levels: tuple[float, ...]) -> float:
-    """The level whose region is to be known: that of the table, or the highest of the map.
-
-    Parameters
-    ----------
-    table : UntilTable
-        The rule.
-    levels : tuple of float
-        Of the map (s).
-
-    Raises
-    ------
-    InputError
-        The table's level is none of the map's.
-    """
+    """The level whose region is to be known: that of the table, or the highest of the map."""
     if table.level is None:
         return levels[-1]
     if table.level not in levels:
@@ -91,23 +60,7 @@ def level_of(table: UntilTable, levels: tuple[float, ...]) -> float:
 def look(
     j1: Array, table: UntilTable, level: float, looks: int, scatter: Scatter, seed: int
 ) -> Look:
-    """The area at one of the looks.
-
-    Parameters
-    ----------
-    j1 : ndarray, shape (realizations, cells)
-        J1 (s).
-    table : UntilTable
-        The rule.
-    level : float
-        Level of J1 (s).
-    looks : int
-        How many there are at most.
-    scatter : Scatter
-        Which realizations are independent.
-    seed : int
-        Of resampling.
-    """
+    """The area at one of the looks."""
     confidence = 1.0 - (1.0 - CONFIDENCE) / looks
     found = probability_map(j1, level, scatter)
     (area,) = region_areas(j1, [(found, table.probability)], scatter, seed, confidence)

@@ -31,32 +31,11 @@ class Strings:
         self._known: dict[Hashable, list[_Known]] = {}
 
     def give(self, key: Hashable, steepest: float, prepared: Prepared) -> None:
-        """Take a string that was prepared elsewhere, lest it be prepared again.
-
-        Parameters
-        ----------
-        key : hashable
-            What tells strings apart, beside the friction.
-        steepest : float
-            Steepest falling slope of the friction that it was prepared for (N m s/rad).
-        prepared : Prepared
-            String and scheme.
-        """
+        """Take a string that was prepared elsewhere, lest it be prepared again."""
         self._known.setdefault(key, []).append(_Known(steepest, steepest, prepared))
 
     def prepared(self, key: Hashable, lanes: Lanes, table: SimulationTable) -> Prepared:
-        """The string of a realization.
-
-        Parameters
-        ----------
-        key : hashable
-            What tells strings apart, beside the friction: realizations with one key share the
-            string, the period of their controllers and the moments of their programs.
-        lanes : Lanes
-            All that matters to the step: lanes of the realization with every friction it meets.
-        table : SimulationTable
-            What was asked for.
-        """
+        """The string of a realization."""
         fall = lanes.steepest_fall
         known = self._known.setdefault(key, [])
         for one in known:

@@ -119,18 +119,7 @@ def uncertainty(
 
 
 def map_axes(design: Design) -> tuple[Axis, ...]:
-    """Axes of the map under uncertainty: those of `[map]`, then those of `[uncertainty]`.
-
-    Parameters
-    ----------
-    design : Design
-        With both tables.
-
-    Raises
-    ------
-    InputError
-        An axis that does not fit the design, or two over one parameter.
-    """
+    """Axes of the map under uncertainty: those of `[map]`, then those of `[uncertainty]`."""
     tables = (*design.tables.map.axes, *design.tables.uncertainty.axes)
     paths = [table.path for table in tables]
     for path in paths:
@@ -294,15 +283,7 @@ def _of(drawn: dict[str, Array], row: int) -> dict[str, units.SI]:
 
 
 def refuse_impossible(design: Design, axes: tuple[Axis, ...]) -> None:
-    """Refuse (`InputError`) what a study under uncertainty cannot be asked for.
-
-    Parameters
-    ----------
-    design : Design
-        With what is uncertain.
-    axes : tuple of Axis
-        Of the map.
-    """
+    """Refuse (`InputError`) what a study under uncertainty cannot be asked for."""
     table = design.tables.uncertainty
     for a in axes:
         if a.path in design.tables.uncertain:

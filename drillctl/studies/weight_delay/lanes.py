@@ -32,18 +32,11 @@ MEASURES = {
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """What was measured.
+    """What was measured."""
 
-    Attributes
-    ----------
-    measures : dict of ndarray
-        By the names of `MEASURES` (SI), all of one shape; NaN where a run failed.
-    status : ndarray of int8, of the same shape
-        Index into `simulation.measures.STATUSES`.
-    """
-
+    # by the names of `MEASURES` (SI), all of one shape; NaN where a run failed
     measures: dict[str, Array]
-    status: NDArray[np.int8]
+    status: NDArray[np.int8]  # index into `simulation.measures.STATUSES`
 
     def at(self, *place: int) -> Runs:
         """Those at a place along the first dimensions."""
@@ -58,19 +51,7 @@ class Runs:
 
 
 def following_design(design: Design) -> Design:
-    """The design with a weight on bit that follows the bit speed, as yet with no gain or delay.
-
-    Parameters
-    ----------
-    design : Design
-        Its `[weight_delay.set]` replaces what its `[weight_on_bit]` says. Without either, the
-        law is that of Navarro-Lopez & Suarez without limits.
-
-    Raises
-    ------
-    InputError
-        Another law, an impossible value, or gain or delay named uncertain.
-    """
+    """The design with a weight on bit that follows the bit speed, as yet with no gain or delay."""
     for path in VARIED:
         if path in design.tables.uncertain:
             where = _where(design, f"uncertain.{path}")
@@ -101,22 +82,13 @@ def _where(design: Design, key: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class DelayedLanes:
-    """Every draw at every delay.
+    """Every draw at every delay."""
 
-    Attributes
-    ----------
-    parts : tuple of DrawnLanes
-        At no delay, where that is asked for, and at all others: without any lag the first is of
-        the law that acts at once, which has a kernel of its own.
-    draws : int
-        How many draws, the impossible ones included.
-    delays : ndarray, shape (delays,)
-        Increasing (s).
-    """
-
+    # at no delay, where that is asked for, and at all others: without any lag the first is of the
+    # law that acts at once, which has a kernel of its own
     parts: tuple[DrawnLanes, ...]
-    draws: int
-    delays: Array
+    draws: int  # how many draws, the impossible ones included
+    delays: Array  # shape (delays,): Increasing (s)
 
     def run(self, gain: float) -> tuple[Runs, set[tuple[float | None, int | None]]]:
         """Simulate all at one gain (N s/rad): runs, shape (delays, draws), and step and modes."""
@@ -136,22 +108,7 @@ class DelayedLanes:
 
 
 def delayed_lanes(following: Design, draws: Draws, delays: Array) -> DelayedLanes:
-    """Lanes of a design at every draw and delay.
-
-    Parameters
-    ----------
-    following : Design
-        From `following_design`.
-    draws : Draws
-        Of its uncertain parameters.
-    delays : ndarray, shape (delays,)
-        Increasing, not negative (s).
-
-    Raises
-    ------
-    InputError
-        Every draw is impossible.
-    """
+    """Lanes of a design at every draw and delay."""
     late = delays[delays > 0.0]
     parts = []
     if late.size < delays.size:

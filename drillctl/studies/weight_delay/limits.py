@@ -23,21 +23,11 @@ ENOUGH = 0.95
 
 @dataclass(frozen=True)
 class EndedShare:
-    """Share of the draws in which stick-slip has ended, at one delay.
+    """Share of the draws in which stick-slip has ended, at one delay."""
 
-    Attributes
-    ----------
-    delay : float
-        Total delay of the path (s).
-    share : float
-        Of all draws, failed ones included.
-    interval_95 : tuple of float
-        Clopper-Pearson interval of the probability that the share estimates.
-    """
-
-    delay: float
-    share: float
-    interval_95: Interval
+    delay: float  # total delay of the path (s)
+    share: float  # of all draws, failed ones included
+    interval_95: Interval  # Clopper-Pearson interval of the probability that the share estimates
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values."""
@@ -46,18 +36,10 @@ class EndedShare:
 
 @dataclass(frozen=True)
 class EndsUpTo:
-    """Longest delay at which stick-slip ends, it and all shorter ones.
+    """Longest delay at which stick-slip ends, it and all shorter ones."""
 
-    Attributes
-    ----------
-    at : EndedShare or None
-        The longest such delay of the grid; None if there is none.
-    next : EndedShare or None
-        The delay of the grid after it; None after the last.
-    """
-
-    at: EndedShare | None
-    next: EndedShare | None
+    at: EndedShare | None  # the longest such delay of the grid; None if there is none
+    next: EndedShare | None  # the delay of the grid after it; None after the last
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values; `delay` is null if there is no such delay."""
@@ -70,17 +52,11 @@ class EndsUpTo:
 
 @dataclass(frozen=True)
 class HarmfulFrom:
-    """Delay from which a case is no longer better than the baseline.
+    """Delay from which a case is no longer better than the baseline."""
 
-    Attributes
-    ----------
-    delay : float or None
-        Where the mean difference first stops being negative (s); None if it never does.
-    interval_95 : tuple of float or None
-        Where the upper and the lower end of the difference's interval do; None where never.
-    """
-
+    # where the mean difference first stops being negative (s); None if it never does
     delay: float | None
+    # where the upper and the lower end of the difference's interval do; None where never
     interval_95: tuple[float | None, float | None]
 
     def summary(self) -> dict[str, Any]:
@@ -89,15 +65,7 @@ class HarmfulFrom:
 
 
 def ends_up_to(shares: Sequence[EndedShare], enough: float = ENOUGH) -> EndsUpTo:
-    """Longest delay at which a share, there and at all shorter delays, is at least `enough`.
-
-    Parameters
-    ----------
-    shares : sequence of EndedShare
-        By increasing delay.
-    enough : float
-        Least share.
-    """
+    """Longest delay at which a share, there and at all shorter delays, is at least `enough`."""
     count = next((k for k, one in enumerate(shares) if one.share < enough), len(shares))
     return EndsUpTo(
         shares[count - 1] if count else None, shares[count] if count < len(shares) else None
@@ -105,21 +73,7 @@ def ends_up_to(shares: Sequence[EndedShare], enough: float = ENOUGH) -> EndsUpTo
 
 
 def harmful_from(delays: Array, difference: Array, low: Array, high: Array) -> HarmfulFrom:
-    """Where a difference, and the ends of its interval, first stop being negative.
-
-    Parameters
-    ----------
-    delays : ndarray, shape (delays,)
-        Increasing (s).
-    difference, low, high : ndarray, shape (delays,)
-        Mean difference from the baseline and the ends of its interval; NaN where unknown.
-
-    Returns
-    -------
-    HarmfulFrom
-        The interval is read point by point: it tells what other draws would change, not what the
-        straight lines between the delays do.
-    """
+    """Where a difference, and the ends of its interval, first stop being negative."""
     return HarmfulFrom(
         first_not_negative(delays, difference),
         (first_not_negative(delays, high), first_not_negative(delays, low)),
@@ -127,18 +81,7 @@ def harmful_from(delays: Array, difference: Array, low: Array, high: Array) -> H
 
 
 def first_not_negative(delays: Array, values: Array) -> float | None:
-    """First delay (s) at which values are not negative, straight lines between the points.
-
-    Parameters
-    ----------
-    delays, values : ndarray, shape (delays,)
-        By increasing delay; points without a value (NaN) are left out.
-
-    Returns
-    -------
-    float or None
-        The first delay itself if its value is not negative; None if all are negative.
-    """
+    """First delay (s) at which values are not negative, straight lines between the points."""
     known = ~np.isnan(values)
     delays, values = delays[known], values[known]
     over = np.flatnonzero(values >= 0.0)

@@ -44,42 +44,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DelayedBenefit:
-    """One gain at one delay, over all draws.
+    """One gain at one delay, over all draws."""
 
-    Attributes
-    ----------
-    j1 : float or None
-        Mean of J1 over the draws that did not fail (s); None if all did.
-    j1_interval : tuple of float, or None
-        Its bootstrap interval; None for fewer than two draws.
-    difference : float or None
-        Mean over the draws of J1 less that of the constant weight at the same draw (s).
-    difference_interval : tuple of float, or None
-        Bootstrap interval of that mean.
-    pairs : int
-        Draws that neither failed in.
-    ended : int
-        Draws in which stick-slip has ended: the bit did not stick in the last 20 s.
-    ended_share : EndedShare
-        The same as a share of all draws, with its interval.
-    peak_bit_speed : float or None
-        Mean of the largest bit speed of a run (rad/s).
-    peak_pipe_torque : float or None
-        Mean of the largest torque in the uppermost element of a run (N m).
-    mean_weight : float or None
-        Mean weight on bit after the start of the run (N).
-    """
-
-    j1: float | None
-    j1_interval: Interval | None
+    j1: float | None  # mean of J1 over the draws that did not fail (s); None if all did
+    j1_interval: Interval | None  # its bootstrap interval; None for fewer than two draws
+    # mean over the draws of J1 less that of the constant weight at the same draw (s)
     difference: float | None
-    difference_interval: Interval | None
-    pairs: int
-    ended: int
-    ended_share: EndedShare
-    peak_bit_speed: float | None
+    difference_interval: Interval | None  # bootstrap interval of that mean
+    pairs: int  # draws that neither failed in
+    ended: int  # draws in which stick-slip has ended: the bit did not stick in the last 20 s
+    ended_share: EndedShare  # the same as a share of all draws, with its interval
+    peak_bit_speed: float | None  # mean of the largest bit speed of a run (rad/s)
+    # mean of the largest torque in the uppermost element of a run (N m)
     peak_pipe_torque: float | None
-    mean_weight: float | None
+    mean_weight: float | None  # mean weight on bit after the start of the run (N)
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values, SI."""
@@ -101,20 +79,12 @@ class DelayedBenefit:
 
 @dataclass(frozen=True)
 class GainLimits:
-    """How much delay one gain bears.
+    """How much delay one gain bears."""
 
-    Attributes
-    ----------
-    gain : float
-        K_w (N s/rad).
-    ends_up_to : EndsUpTo
-        Longest delay at which stick-slip has ended in 95 % of the draws, shorter ones included.
-    harmful_from : HarmfulFrom
-        Delay at which the mean of J1 stops being under that of the constant weight.
-    """
-
-    gain: float
+    gain: float  # K_w (N s/rad)
+    # longest delay at which stick-slip has ended in 95 % of the draws, shorter ones included
     ends_up_to: EndsUpTo
+    # delay at which the mean of J1 stops being under that of the constant weight
     harmful_from: HarmfulFrom
 
 
