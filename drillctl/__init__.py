@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from drillctl.simulation import simulate as simulate
     from drillctl.simulation.limit_cycle import limit_cycle as limit_cycle
     from drillctl.store import open as open
-    from drillctl.studies import adaptive_map as adaptive_map
     from drillctl.studies import compare as compare
     from drillctl.studies import doctor as doctor
     from drillctl.studies import stability_map as stability_map
@@ -59,7 +58,6 @@ _HOME = {
     "limit_cycle": "drillctl.simulation.limit_cycle",
     "sweep": "drillctl.studies",
     "advantage": "drillctl.studies.advantage",
-    "adaptive_map": "drillctl.studies",
     "compare": "drillctl.studies",
     "doctor": "drillctl.studies",
     "stability_map": "drillctl.studies",

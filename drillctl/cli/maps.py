@@ -18,7 +18,6 @@ from drillctl.cli.options import (
 from drillctl.errors import InputError
 
 if TYPE_CHECKING:
-    from drillctl import studies
     from drillctl.design import Design
 
 
@@ -30,27 +29,16 @@ def stability_map(
     audit: Annotated[
         int | None, typer.Option("--audit", help="Cells to audit with the reference solver.")
     ] = None,
-    adaptive: Annotated[
-        bool, typer.Option("--adaptive", help="Simulate the cells near the contours alone.")
-    ] = False,
-    full_audit: Annotated[
-        bool, typer.Option("--full-audit", help="Set an adaptive map beside the full grid.")
-    ] = False,
     measure: Annotated[
         list[str] | None,
-        typer.Option("--measure", metavar="NAME", help="Keep this one and J1 alone; repeatable."),
+        typer.Option(
+            "--measure", metavar="NAME", help="Keep only J1 and this measure; repeatable."
+        ),
     ] = None,
 ) -> None:
     """J1 over one or more parameters, with regions, audit and figures."""
     design = with_values(with_axes(design, axis), {"map.audit_cells": audit})
-    if adaptive and measure:
-        raise InputError("goes with the full grid, not with --adaptive", "--measure")
-    if adaptive:
-        _adaptive_map(design, full_audit, options)
-    elif full_audit:
-        raise InputError("goes with --adaptive: any other map is the full grid", "--full-audit")
-    else:
-        _full_map(design, measure or None, options)
+    _full_map(design, measure or None, options)
 
 
 def _full_map(design: Design, measures: list[str] | None, options: Options) -> None:
@@ -86,38 +74,6 @@ def _full_map(design: Design, measures: list[str] | None, options: Options) -> N
     if result.audit.verdict == "look":
         console.note("audit: look: the engines differ by more than 1 % in J1 in some cell")
     running.conclude(folder, summary, options)
-
-
-def _adaptive_map(design: Design, full_grid: bool, options: Options) -> None:
-    """The regions of a map from the cells near their contours, with checks, figure and tables."""
-    from drillctl import plots, printing, store, studies
-
-    def told(result: studies.AdaptiveMap) -> None:
-        printing.adaptive_map(result, options.units)
-
-    folder = store.claim("adaptive-map", design, options.out, full_grid=full_grid)
-    if running.shown_again(folder, options, lambda: told(store.open(folder.path))):
-        return
-    with running.guarded(folder), console.progress() as bar:
-        blocks = folder.blocks()
-        result = studies.adaptive_map(design, full_grid=full_grid, progress=bar, blocks=blocks)
-    if result.minimum is None:
-        console.note("warning: no cell gives a finite answer; see the statuses")
-    store.write_data(result, folder.path)
-    studies.write_adaptive_tables(result, folder.path)
-    running.draw(plots.adaptive_map(result, system=options.units), folder.path / "map.png")
-    if not options.json:
-        told(result)
-    if result.share == 1.0:
-        console.note("every cell was simulated: cells are left out on axes of 81 points or more")
-    for name, check, reason in (
-        ("self-check", result.self_check, "a cell left out was in another band than said"),
-        ("full audit", result.full_audit, "a region is not that of the full grid to one cell"),
-        ("audit", result.audit, "the engines differ by more than 1 % in J1 in some cell"),
-    ):
-        if check is not None and check.verdict == "look":
-            console.note(f"{name}: look: {reason}")
-    running.conclude(folder, result.summary(), options)
 
 
 @computing

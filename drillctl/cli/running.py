@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from drillctl.store import RunFolder
 
 DPI = 150
-RESUMED = ("map", "adaptive-map", "uncertainty")
+RESUMED = ("map", "uncertainty")
 """Runs that go on from what was finished; the others have no finished parts to go on from."""
 
 

@@ -10,7 +10,6 @@
 - `root_locus.py`: `root_locus`, poles of the loop against a parameter.
 - `friction.py`: `friction_curves`, bit torque against bit speed at each weight on bit.
 - `map.py`: `stability_map` with regions and audit; `sweep_line` for a single parameter.
-- `adaptive_map.py`: `adaptive_map`, regions with the cells simulated to find them.
 - `comparison.py`: `j1_distributions`, `paired_differences`, `j1_against_weight` of cases.
 - `nominal_cases.py`: `compared_regions` and `compared_responses` of cases at their own values.
 - `advantage.py`: `advantage_cases`, `advantage_front`, `advantage_map` and `advantage_delay` of a
@@ -31,7 +30,6 @@ figure and never shows it. Nothing here touches the state of pyplot. Axes are in
 the rig floor: rpm, kN, kN m, m.
 """
 
-from drillctl.plots.adaptive_map import adaptive_map
 from drillctl.plots.advantage import (
     advantage_cases,
     advantage_delay,
@@ -66,7 +64,6 @@ from drillctl.plots.uncertain_regions import probability_map, region_error, unce
 from drillctl.plots.weight_delay import weight_delay
 
 __all__ = [
-    "adaptive_map",
     "advantage_cases",
     "advantage_delay",
     "advantage_front",

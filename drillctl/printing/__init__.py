@@ -4,14 +4,13 @@ from drillctl.printing.advantage import advantage
 from drillctl.printing.comparison import comparison
 from drillctl.printing.doctor import doctor
 from drillctl.printing.linear import loop, modes
-from drillctl.printing.maps import adaptive_map, regions, regularisation, sweep
+from drillctl.printing.maps import regions, regularisation, sweep
 from drillctl.printing.runs import cycle, simulation
 from drillctl.printing.tuning import tune
 from drillctl.printing.uncertainty import uncertainty
 from drillctl.printing.weight_delay import weight_delay
 
 __all__ = [
-    "adaptive_map",
     "advantage",
     "comparison",
     "cycle",

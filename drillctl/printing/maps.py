@@ -9,21 +9,11 @@ from drillctl.console import line, sized, table
 from drillctl.printing.words import place_of, span_of, title_of
 
 if TYPE_CHECKING:
-    from drillctl.studies import AdaptiveMap, Regularisation, Sweep, ThreeRegions
-    from drillctl.studies.adaptive.checks import FullAudit, SelfCheck
+    from drillctl.studies import Regularisation, Sweep, ThreeRegions
 
 
 def sweep(result: Sweep, system: units.System) -> None:
     """Regions, minimum, audit and time of a map."""
-    regions_of_map(result, system)
-    line(
-        f"{result.j1.size} cells: {result.seconds:.3f} s in the lanes, "
-        f"{result.total_seconds:.1f} s in all"
-    )
-
-
-def regions_of_map(result: Sweep | AdaptiveMap, system: units.System) -> None:
-    """Regions, minimum and audit of a map."""
     scales = [units.displayed(1.0, axis.unit, system) for axis in result.axes]
     rows = [
         [
@@ -48,49 +38,10 @@ def regions_of_map(result: Sweep | AdaptiveMap, system: units.System) -> None:
     audit = result.audit
     worst = f", worst relative difference in J1 {sized(audit.worst, 2)}" if len(audit.cells) else ""
     line(f"audit: {audit.verdict}, {len(audit.cells)} cells{worst}")
-
-
-def adaptive_map(result: AdaptiveMap, system: units.System) -> None:
-    """Regions, minimum and audit as of a map; the checks, and how much was simulated."""
-    regions_of_map(result, system)
-    _self_check(result.self_check)
-    if result.full_audit is not None:
-        _full_audit(result.full_audit)
     line(
-        f"{result.trajectories} of {result.bands.size} cells simulated ({result.share:.2%}): "
-        f"{result.seconds:.3f} s in the lanes, {result.total_seconds:.1f} s in all"
+        f"{result.j1.size} cells: {result.seconds:.3f} s in the lanes, "
+        f"{result.total_seconds:.1f} s in all"
     )
-
-
-def _self_check(check: SelfCheck) -> None:
-    if check.interval is None:
-        line("self-check: none")
-        return
-    low, high = check.interval
-    mended = f"; {check.followed} more simulated to mend it" if len(check.mismatches) else ""
-    line(
-        f"self-check: {check.verdict}, {len(check.mismatches)} of {len(check.cells)} cells left "
-        f"out are in another band (95 % interval {low:.1%} to {high:.1%}){mended}"
-    )
-
-
-def _full_audit(audit: FullAudit) -> None:
-    rows = [
-        [
-            f"J1 <= {level:g} s",
-            str(one.cells),
-            f"{one.area_fraction:.2%}",
-            sized(one.farthest, 3),
-            sized(one.hausdorff, 3),
-            "yes" if one.to_one_cell else "no",
-        ]
-        for level, one in audit.mismatches.items()
-    ]
-    heads = [
-        "region", "cells that differ", "area", "farthest from the edge (cells)",
-        "outlines apart (cells)", "same to one cell",
-    ]  # fmt: skip
-    table(f"beside the full grid, {audit.trajectories} more cells: {audit.verdict}", heads, rows)
 
 
 def regions(result: ThreeRegions) -> None:

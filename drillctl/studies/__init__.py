@@ -4,7 +4,6 @@
   numbers, held along the axes they vary over.
 - `sweeps.py`: measures over a grid, the J1 map being one case; `regions.py`: cells and outlines at
   or under a level; `responses.py`, `tables.py`: time responses at cells, maps as CSV.
-- `adaptive/`: the contours of a fine grid from a fraction of its cells.
 - `loop_maps.py`: figures of the linear loop over a grid.
 - `three_regions/`: locally stable, J1 under a level, attracted: three regions of one map.
 - `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
@@ -20,7 +19,6 @@
   `checking.py`: what a design asks of the studies, without running any.
 """
 
-from drillctl.studies.adaptive.study import AdaptiveMap, adaptive_map
 from drillctl.studies.comparison.study import Comparison, compare
 from drillctl.studies.diagnosis.examination import doctor
 from drillctl.studies.diagnosis.result import Doctor
@@ -32,7 +30,6 @@ from drillctl.studies.regularisation import Regularisation, regularisation
 from drillctl.studies.responses import responses
 from drillctl.studies.sweeps import Sweep, stability_map, sweep
 from drillctl.studies.tables import (
-    write_adaptive_tables,
     write_comparison,
     write_loop_table,
     write_tables,
@@ -44,7 +41,6 @@ from drillctl.studies.uncertainty.tables import write_uncertainty_tables
 from drillctl.studies.weight_delay.study import WeightDelay, weight_delay
 
 __all__ = [
-    "AdaptiveMap",
     "Axis",
     "Comparison",
     "Doctor",
@@ -56,7 +52,6 @@ __all__ = [
     "ThreeRegions",
     "Uncertainty",
     "WeightDelay",
-    "adaptive_map",
     "compare",
     "doctor",
     "draw",
@@ -70,7 +65,6 @@ __all__ = [
     "uncertain_parameters",
     "uncertainty",
     "weight_delay",
-    "write_adaptive_tables",
     "write_comparison",
     "write_loop_table",
     "write_tables",

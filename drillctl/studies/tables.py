@@ -6,10 +6,7 @@ import csv
 import itertools
 from pathlib import Path
 
-import numpy as np
-
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.adaptive.study import AdaptiveMap
 from drillctl.studies.comparison.study import MEASURES, QUANTILES, Comparison
 from drillctl.studies.loop_maps import LoopMap
 from drillctl.studies.sweeps import Sweep
@@ -39,7 +36,7 @@ def write_tables(result: Sweep, folder: Path) -> None:
     _write_regions(result, folder)
 
 
-def _write_regions(result: Sweep | AdaptiveMap, folder: Path) -> None:
+def _write_regions(result: Sweep, folder: Path) -> None:
     paths = [axis.path for axis in result.axes]
     with (folder / "regions.csv").open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
@@ -48,38 +45,6 @@ def _write_regions(result: Sweep | AdaptiveMap, folder: Path) -> None:
         for level, region in result.regions.items():
             bounds = [value for path in paths for value in region.bounds.get(path, ("", ""))]
             writer.writerow([level, region.cells, region.area_fraction, *bounds])
-
-
-def write_adaptive_tables(result: AdaptiveMap, folder: Path) -> None:
-    """Write `cells.csv`, a row a simulated cell, `regions.csv`, a row a level, and `outlines.csv`.
-
-    This has a row a vertex: the polygons of each level and their rings, of which number 0 is the
-    outer one and the others are holes. SI units.
-
-    Parameters
-    ----------
-    result : AdaptiveMap
-        What was computed.
-    folder : Path
-        Where to.
-    """
-    paths = [axis.path for axis in result.axes]
-    i, j = np.unravel_index(result.cells, result.bands.shape)
-    columns = [result.axes[0].values[i], result.axes[1].values[j], *result.measures.values()]
-    rows: list[list[object]] = [
-        [*map(float, numbers), STATUSES[status]]
-        for *numbers, status in zip(*columns, result.status, strict=True)
-    ]
-    _write(folder / "cells.csv", [*paths, *result.measures, "status"], rows)
-    _write_regions(result, folder)
-    rows = [
-        [level, number, ring, float(x), float(y)]
-        for level, region in result.regions.items()
-        for number, polygon in enumerate(region.polygons.geoms if region.polygons else ())
-        for ring, line in enumerate((polygon.exterior, *polygon.interiors))
-        for x, y in line.coords
-    ]
-    _write(folder / "outlines.csv", ["level", "polygon", "ring", *paths], rows)
 
 
 def write_loop_table(result: LoopMap, folder: Path) -> None:

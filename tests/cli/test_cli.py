@@ -706,7 +706,6 @@ def test_a_map_of_chosen_measures(call):
     assert "--measure" in err
     assert "did you mean 'sticks'" in err
     assert not Path("none").exists()
-    assert call("map", DESIGN, *SMALL, "--measure", "sticks", "--adaptive")[0] == 2
 
 
 # --- interruption ----------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Maps over a grid: J1, adaptive, smoothed, of the loop, three regions."""
+"""Maps over a grid: J1, smoothed, of the loop, three regions."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ from drillctl.design import Design
 from drillctl.simulation.batch import FLOATS
 from drillctl.store.kind import Kind
 from drillctl.store.names import asked_axes, axis_of
-from drillctl.studies.adaptive.checks import CHECK_CELLS, SelfCheck, full_audit
-from drillctl.studies.adaptive.contour_search import INTERVALS
-from drillctl.studies.adaptive.study import AdaptiveMap, banded
 from drillctl.studies.audit import Audit, choose_cells
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
 from drillctl.studies.regularisation import WIDTHS, Regularisation
@@ -39,41 +36,6 @@ def read_sweep(design: Design, data: xarray.Dataset, summary: dict[str, Any]) ->
         modes=summary["modes"],
         seconds=summary["seconds"],
         total_seconds=summary["total_seconds"],
-        provenance={key: str(value) for key, value in data.attrs.items()},
-    )
-
-
-def read_adaptive_map(design: Design, data: xarray.Dataset, summary: dict[str, Any]) -> AdaptiveMap:
-    """An `AdaptiveMap` as it was saved."""
-    axes = tuple(axis_of(path, data) for path in summary["axes"])
-    cells, j1 = data["cell"].values.astype(np.int64), data["j1"].values
-    audited = data["audited_cell"].values.astype(np.int64)
-    over_grid = np.full(len(axes[0]) * len(axes[1]), np.nan)
-    over_grid[cells] = j1
-    bands, levels = data["band"].values.astype(np.int8), design.tables.map.levels
-    check = SelfCheck(
-        data["checked_cell"].values.astype(np.int64),
-        data["said_band"].values.astype(np.int8),
-        data["found_band"].values.astype(np.int8),
-        summary["self_check"]["followed"],
-    )
-    full = None
-    if summary["full_audit"] is not None:
-        values = banded(bands, levels, cells, j1)
-        count = summary["full_audit"]["trajectories"]
-        full = full_audit(values, data["full_j1"].values, levels, count)
-    return AdaptiveMap(
-        design=design,
-        axes=axes,
-        levels=levels,
-        cells=cells,
-        measures={name: data[name].values for name in FLOATS},
-        status=data["status"].values.astype(np.int8),
-        bands=bands,
-        audit=Audit(audited, over_grid[audited], data["audited_j1"].values),
-        self_check=check,
-        full_audit=full,
-        **{n: summary[n] for n in ("intervals", "step", "modes", "seconds", "total_seconds")},
         provenance={key: str(value) for key, value in data.attrs.items()},
     )
 
@@ -125,22 +87,6 @@ def _asked_of_sweep(result: Sweep) -> tuple[Design, dict[str, Any]]:
     return result.design, settings | asked_measures(tuple(result.measures))
 
 
-def _asked_of_adaptive(result: AdaptiveMap) -> tuple[Design, dict[str, Any]]:
-    settings: dict[str, Any] = {"full_grid": result.full_audit is not None}
-    settings |= asked_axes(result)
-    if result.intervals != INTERVALS:
-        settings["intervals"] = result.intervals
-    check = result.self_check
-    left = result.bands.size - result.trajectories + len(check.cells) + check.followed
-    if len(check.cells) != min(CHECK_CELLS, left):
-        settings["checked"] = len(check.cells)
-    count = result.design.tables.map.audit_cells
-    cells = choose_cells(result.j1.filled(np.nan), result.levels, count)
-    if not np.array_equal(cells, result.audit.cells):
-        settings["audited"] = result.audit.cells.tolist()
-    return result.design, settings
-
-
 def _asked_of_loop_map(result: LoopMap) -> tuple[Design, dict[str, Any]]:
     return result.design, {"quantities": list(result.values)} | asked_axes(result)
 
@@ -157,7 +103,6 @@ def _asked_of_regularisation(result: Regularisation) -> tuple[Design, dict[str, 
 
 KINDS = (
     Kind("map", Sweep, read_sweep, _asked_of_sweep),
-    Kind("adaptive-map", AdaptiveMap, read_adaptive_map, _asked_of_adaptive),
     Kind("loop-map", LoopMap, read_loop_map, _asked_of_loop_map),
     Kind("regions", ThreeRegions, read_three_regions, _asked_of_three_regions),
     Kind("regularisation", Regularisation, read_regularisation, _asked_of_regularisation),
