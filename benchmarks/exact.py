@@ -12,10 +12,10 @@ import json
 import drillctl
 from benchmarks.job import CELLS, DESIGN, EXACT, gains
 from drillctl.design import Design
+from drillctl.ensemble.grid import axes_of, cell_design
 from drillctl.provenance import provenance
 from drillctl.simulation.reference import solve
 from drillctl.simulation.trajectory import deviation
-from drillctl.studies.grid import axes_of, cell_design
 
 TOLERANCE, LOOSER = 1e-10, 1e-9
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import drillctl
 from drillctl.design import Design
-from drillctl.studies.grid import Axis, axes_of, cell_design, shape_of
+from drillctl.ensemble.grid import Axis, axes_of, cell_design, shape_of
 
 Array = NDArray[np.float64]
 

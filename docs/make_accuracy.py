@@ -19,10 +19,10 @@ import numpy as np
 
 import drillctl
 from drillctl import catalog
+from drillctl.ensemble.grid import axes_of, groups
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.simulation.scheme import Scheme
 from drillctl.studies.diagnosis.error_estimate import PROMISES
-from drillctl.studies.grid import axes_of, groups
 
 PAGE = Path(__file__).with_name("accuracy.md")
 SAMPLE = PAGE.parents[1] / "tests" / "data" / "paper_map_sample.json"

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drillctl.bit_rock import (
+from drillctl.linear import tuning
+from drillctl.rig.bit_rock import (
     JansenVanDenSteen,
     NavarroLopezSuarez,
     OverWeight,
@@ -21,9 +22,8 @@ from drillctl.bit_rock import (
     TuckerWang,
     tabulated,
 )
-from drillctl.linear import tuning
-from drillctl.top_drive import PI, ConstantTorque, RealDrive, SampledDrive
-from drillctl.weight_on_bit import (
+from drillctl.rig.top_drive import PI, ConstantTorque, RealDrive, SampledDrive
+from drillctl.rig.weight_on_bit import (
     AlarmWeight,
     ConstantWeight,
     FollowingSpeed,

@@ -17,8 +17,8 @@ from benchmarks.peers import MODULES, all_peers
 from benchmarks.timing import in_turn, interleave, row_of
 from drillctl import machine
 from drillctl.simulation.cost import count
+from drillctl.simulation.lanes import Start
 from drillctl.simulation.propagator import string_step
-from drillctl.simulation.start import Start
 
 HORIZON = "10 s"  # the bit of the well damped cell sticks and slips twice in it
 CLASS = {

@@ -196,9 +196,9 @@ def test_kept_strings_and_blocks_give_the_same_bits(design, result, tmp_path, mo
     folder = claim("map", design, tmp_path / "run")
     same_sweep(sweep(design, blocks=folder.blocks()), result)
     (tmp_path / "run/blocks/000000.npz").unlink()
-    monkeypatch.setattr("drillctl.studies.sweeps.prepare", pytest.fail)  # the string is kept
+    monkeypatch.setattr("drillctl.ensemble.sweeps.prepare", pytest.fail)  # the string is kept
     same_sweep(sweep(design, blocks=folder.blocks()), result)
-    monkeypatch.setattr("drillctl.studies.sweeps.run_batch", pytest.fail)  # and so is the block
+    monkeypatch.setattr("drillctl.ensemble.sweeps.run_batch", pytest.fail)  # and so is the block
     same_sweep(sweep(design, blocks=folder.blocks()), result)
 
 

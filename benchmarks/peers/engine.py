@@ -12,10 +12,10 @@ import numba
 import numpy as np
 
 from benchmarks.job import Array, Job
+from drillctl.ensemble.grid import groups
 from drillctl.simulation.batch import Prepared, prepare, run_batch, warm_up
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.grid import groups
 
 TITLE = "drillctl"
 HEADLINE = "drillctl, standard"

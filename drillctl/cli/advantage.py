@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from drillctl import console
-from drillctl.cli import running
+from drillctl.cli import console, running
 from drillctl.cli.options import Options, computing
 
 if TYPE_CHECKING:

@@ -43,7 +43,7 @@ def run(arguments: list[str]) -> int:
 
 
 def _told(message: str, code: int) -> int:
-    from drillctl import console
+    from drillctl.cli import console
 
     console.note(f"drillctl: {message}")
     return code
@@ -51,7 +51,7 @@ def _told(message: str, code: int) -> int:
 
 def _version(asked: bool) -> None:
     if asked:
-        from drillctl import console
+        from drillctl.cli import console
 
         console.line(f"drillctl {__version__}")
         raise typer.Exit

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drillctl import console
-from drillctl.cli import running
+from drillctl.cli import console, running
 from drillctl.cli.options import (
     Axes,
     Draws,

@@ -10,7 +10,8 @@ from drillctl.cli.options import Debug, DesignName, Json, Sets, loaded
 
 
 def _shelf(shelf: Literal["models", "designs"], as_json: bool) -> None:
-    from drillctl import catalog, console
+    from drillctl import catalog
+    from drillctl.cli import console
 
     found = catalog.entries(shelf)
     if as_json:
@@ -32,9 +33,9 @@ def designs(json: Json = False, debug: Debug = False) -> None:
 
 def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False) -> None:
     """Print a design with its model and all defaults put in."""
-    from drillctl import console
+    from drillctl.cli import console
     from drillctl.design import to_toml
-    from drillctl.design.writing import to_tree
+    from drillctl.design.reading import to_tree
 
     found = loaded(design, sets)
     if json:
@@ -47,7 +48,7 @@ def validate(
     design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False
 ) -> None:
     """Check a design: every key, unit and range, its axes, draws and cases."""
-    from drillctl import console
+    from drillctl.cli import console
     from drillctl.studies.checking import refuse_what_studies_would
 
     found = loaded(design, sets)
@@ -63,7 +64,7 @@ def new(
     debug: Debug = False,
 ) -> None:
     """Write a commented design file to start from."""
-    from drillctl import console
+    from drillctl.cli import console
     from drillctl.design.starter import write_starter
 
     console.line(f"written: {write_starter(name)}")

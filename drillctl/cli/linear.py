@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drillctl import console
-from drillctl.cli import running
+from drillctl.cli import console, running
 from drillctl.cli.options import (
     Axes,
     Options,
@@ -54,7 +53,7 @@ def loop(design: Design, options: Options, axis: Axes = None) -> None:
     """Stability, margins and slope margin of the loop; Bode, Nyquist, impedance, gain maps."""
     from drillctl import linear, plots, printing, store, studies
     from drillctl.linear.export import write_matrices
-    from drillctl.loop_pictures import loop_figures, over_gains
+    from drillctl.plots.loop_pictures import loop_figures, over_gains
 
     design = with_axes(design, axis)
     folder = store.claim("loop", design, options.out)
@@ -88,8 +87,8 @@ def loop(design: Design, options: Options, axis: Axes = None) -> None:
 def _loop_map(design: Design, bar: Progress) -> LoopMap | None:
     """The map over the two axes of a design; None where its axes do not make one."""
     from drillctl import studies
-    from drillctl.loop_pictures import MOST_NODES
-    from drillctl.studies.grid import axes_of
+    from drillctl.ensemble.grid import axes_of
+    from drillctl.plots.loop_pictures import MOST_NODES
 
     try:
         axes = axes_of(design, design.tables.map.axes)

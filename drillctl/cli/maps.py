@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drillctl import console
-from drillctl.cli import running
+from drillctl.cli import console, running
 from drillctl.cli.options import (
     Axes,
     Options,
@@ -44,7 +43,7 @@ def stability_map(
 def _full_map(design: Design, measures: list[str] | None, options: Options) -> None:
     """A sweep with its map, regions, audit and responses."""
     from drillctl import plots, printing, store, studies
-    from drillctl.studies.sweeps import kept_measures
+    from drillctl.ensemble.sweeps import kept_measures
 
     try:
         kept = kept_measures(measures)

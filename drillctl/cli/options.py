@@ -91,7 +91,7 @@ def computing(
 
 def loaded(name: str, sets: list[str] | None) -> Design:
     """The design of a name or path with its changed values; its warnings are told."""
-    from drillctl import console
+    from drillctl.cli import console
     from drillctl.design import load, parse_setting
 
     found = load(name, **dict(parse_setting(text) for text in sets or []))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from typing import TYPE_CHECKING, Any
 
-from drillctl import console
+from drillctl.cli import console
 from drillctl.errors import InputError
 
 if TYPE_CHECKING:

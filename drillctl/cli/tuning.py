@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drillctl import console
-from drillctl.cli import running
+from drillctl.cli import console, running
 from drillctl.cli.options import Options, computing, with_values
 
 if TYPE_CHECKING:

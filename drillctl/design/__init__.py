@@ -14,7 +14,6 @@
 
 from drillctl.design.design import Design
 from drillctl.design.paths import Parameter, parameter, parameters
-from drillctl.design.reading import load, parse_setting
-from drillctl.design.writing import to_toml
+from drillctl.design.reading import load, parse_setting, to_toml
 
 __all__ = ["Design", "Parameter", "load", "parameter", "parameters", "parse_setting", "to_toml"]

@@ -6,10 +6,10 @@ from typing import Any
 
 from pydantic import Field, field_validator, model_validator
 
-from drillctl.design import quantities as q
-from drillctl.design.base import Table
 from drillctl.design.delay_tables import LAW, paths_of_weight
 from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.table import Table
 from drillctl.units import RPM
 
 GAIN = LAW + "gain"

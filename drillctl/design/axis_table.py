@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pydantic import field_validator
 
-from drillctl.design import quantities as q
-from drillctl.design.base import Table, number_or_quantity
 from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.table import Table, number_or_quantity
 
 
 class AxisTable(Table):

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from drillctl.bit_rock.over_weight import KNOTS as KNOTS_OVER_WEIGHT
-from drillctl.bit_rock.tabulated import KNOTS
-from drillctl.design import quantities as q
-from drillctl.design.base import Table
 from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.bit_rock.over_weight import KNOTS as KNOTS_OVER_WEIGHT
+from drillctl.rig.bit_rock.tabulated import KNOTS
+from drillctl.rig.table import Table
 
 
 class FrictionRow(Table):

@@ -6,8 +6,8 @@ from typing import Any
 
 from pydantic import Field, field_validator
 
-from drillctl.design.base import Table
 from drillctl.errors import InputError
+from drillctl.rig.table import Table
 
 
 class CaseTable(Table):

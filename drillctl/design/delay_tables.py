@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import Field, field_validator
 
-from drillctl.design import quantities as q
-from drillctl.design.base import Table
 from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.table import Table
 
 VARIED = ("weight_on_bit.gain", "weight_on_bit.path.delay")
 """What the study runs over."""

@@ -6,17 +6,17 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from drillctl.bit_rock import BitRockLaw
 from drillctl.design import drive, parts, weight
 from drillctl.design.merging import Tree, with_values
 from drillctl.design.tables import DesignTables
 from drillctl.design.validation import validated
 from drillctl.design.weight_tables import SurfaceObserverTable
-from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError
-from drillctl.program import Program
-from drillctl.top_drive import PI, ConstantTorque, TopDriveLaw
-from drillctl.weight_on_bit import ObservedWeight, RealWeight, WeightLaw
+from drillctl.rig.bit_rock import BitRockLaw
+from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.program import Program
+from drillctl.rig.top_drive import PI, ConstantTorque, TopDriveLaw
+from drillctl.rig.weight_on_bit import ObservedWeight, RealWeight, WeightLaw
 
 if TYPE_CHECKING:
     import control

@@ -20,9 +20,9 @@ from drillctl.design.controller_tables import (
     ZTorqueTable,
 )
 from drillctl.design.tables import DesignTables
-from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError
-from drillctl.top_drive import PI, ConstantTorque, RealDrive, SampledDrive, TopDriveLaw
+from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.top_drive import PI, ConstantTorque, RealDrive, SampledDrive, TopDriveLaw
 
 SHORTEST_LAG = 0.01
 """Time constant (s) of a motor whose torque rate is limited, where the design gives a shorter

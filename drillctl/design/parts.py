@@ -5,18 +5,6 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from drillctl.bit_rock import (
-    BitRockLaw,
-    JansenVanDenSteen,
-    NavarroLopezSuarez,
-    PrintedThreeBranch,
-    Stribeck,
-    TuckerWang,
-    WeightTable,
-    changed_rock,
-    over_weight,
-    tabulated,
-)
 from drillctl.design.bit_rock_tables import (
     BitRadiusFrictionTable,
     CoulombTable,
@@ -31,10 +19,22 @@ from drillctl.design.bit_rock_tables import (
 )
 from drillctl.design.tables import DesignTables, SectionTable
 from drillctl.design.weight_tables import ConstantWeightTable
-from drillctl.drillstring import GRADES, PIPES, Drillstring, Section, assemble, polar_moment
-from drillctl.drillstring.section import torsional_yield
 from drillctl.errors import InputError
-from drillctl.program import STILL, Program, Ramp
+from drillctl.rig.bit_rock import (
+    BitRockLaw,
+    JansenVanDenSteen,
+    NavarroLopezSuarez,
+    PrintedThreeBranch,
+    Stribeck,
+    TuckerWang,
+    WeightTable,
+    changed_rock,
+    over_weight,
+    tabulated,
+)
+from drillctl.rig.drillstring import GRADES, PIPES, Drillstring, Section, assemble, polar_moment
+from drillctl.rig.drillstring.section import torsional_yield
+from drillctl.rig.program import STILL, Program, Ramp
 
 STEEL_SHEAR_MODULUS = 79.3e9
 """Shear modulus (Pa) where a design gives none: drill-pipe steel."""

@@ -10,9 +10,9 @@ from pydantic import BeforeValidator
 
 from drillctl import units
 from drillctl.design.design import Design
-from drillctl.design.quantities import number
 from drillctl.design.tables import Table
 from drillctl.errors import InputError, nearest, shown
+from drillctl.rig.table import number
 from drillctl.units import Kind
 
 _HIDDEN = (

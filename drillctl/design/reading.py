@@ -1,4 +1,7 @@
-"""Design files in: TOML text, laid over its model, validated."""
+"""Design files in: TOML text, laid over its model, validated.
+
+Designs out: the resolved design as TOML that reads back to the same object.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from drillctl import catalog
+from drillctl import catalog, units
 from drillctl.design.design import Design
 from drillctl.design.merging import Tree, overlay, with_values
-from drillctl.design.sample_files import with_samples
+from drillctl.design.paths import kind_of
+from drillctl.design.tables import Table
+from drillctl.design.uncertain_tables import with_samples
 from drillctl.design.validation import validated
 from drillctl.errors import InputError, shown
 
@@ -129,3 +134,32 @@ def _number_or_text(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text
+
+
+def to_toml(design: Design) -> str:
+    """The whole design, model and defaults included, as the text of a design file."""
+    import tomli_w
+
+    return tomli_w.dumps(to_tree(design.tables))
+
+
+def to_tree(table: Table) -> Tree:
+    """A table as plain TOML data, quantities as text with units; what is not set is left out."""
+    tree: Tree = {}
+    for key, info in type(table).model_fields.items():
+        value = _plain(getattr(table, key), kind_of(info))
+        if value is not None and value != "" and value != {}:
+            tree[info.alias or key] = value
+    return tree
+
+
+def _plain(value: Any, kind: units.Kind | None) -> Any:
+    if isinstance(value, Table):
+        return to_tree(value)
+    if isinstance(value, tuple):
+        return [_plain(item, kind) for item in value]
+    if isinstance(value, dict):
+        return {key: _plain(item, None) for key, item in value.items()}
+    if kind is not None and isinstance(value, float):
+        return units.write(value, kind)
+    return value

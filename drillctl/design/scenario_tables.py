@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pydantic import model_validator
 
-from drillctl.design import quantities as q
-from drillctl.design.base import Table
 from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.table import Table
 
 
 def _refuse_backwards(begin: float, end: float) -> None:

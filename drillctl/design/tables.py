@@ -11,10 +11,8 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from drillctl import units
-from drillctl.design import quantities as q
 from drillctl.design.advantage_tables import AdvantageTable
 from drillctl.design.axis_table import AxisTable as AxisTable
-from drillctl.design.base import Table as Table
 from drillctl.design.bit_rock_tables import BitRockTable
 from drillctl.design.compare_tables import CompareTable
 from drillctl.design.controller_tables import ControllerTable, PITable
@@ -23,8 +21,10 @@ from drillctl.design.scenario_tables import ScenarioTable
 from drillctl.design.tune_tables import TuneTable
 from drillctl.design.uncertain_tables import DistributionTable, UncertaintyTable, flattened
 from drillctl.design.weight_tables import ConstantWeightTable, WeightOnBitTable
-from drillctl.drillstring import GRADES, PIPES
 from drillctl.errors import InputError, nearest, shown
+from drillctl.rig import table as q
+from drillctl.rig.drillstring import GRADES, PIPES
+from drillctl.rig.table import Table
 
 
 class OperatingPoint(Table):

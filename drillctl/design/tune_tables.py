@@ -6,10 +6,10 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from drillctl.design import quantities as q
-from drillctl.design.base import Table, number_or_quantity
 from drillctl.design.uncertain_tables import flattened
 from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.table import Table, number_or_quantity
 
 FRESH = 1_000_003
 """From the seed of a search to that of its certificate, where none is given."""

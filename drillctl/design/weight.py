@@ -14,7 +14,7 @@ from drillctl.design.weight_tables import (
     SurfaceObserverTable,
 )
 from drillctl.errors import InputError
-from drillctl.weight_on_bit import (
+from drillctl.rig.weight_on_bit import (
     AlarmWeight,
     ConstantWeight,
     FollowingSpeed,

@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from drillctl.design import quantities as q
-from drillctl.design.base import Table
 from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.table import Table
 
 
 class PathTable(Table):

@@ -29,7 +29,6 @@ thirty elements. `control` is imported where a system is made and not before, as
 from drillctl.linear import export, tuning
 from drillctl.linear.boundary import GainBoundary, gain_boundary
 from drillctl.linear.ends import ends_of
-from drillctl.linear.impedance import DriveImpedance, drive_impedance
 from drillctl.linear.loop_analysis import (
     LoopAnalysis,
     critical_speed,
@@ -53,6 +52,7 @@ from drillctl.linear.response import (
 from drillctl.linear.root_loci import RootLocus, root_locus
 from drillctl.linear.slope_margin import slope_margin, slope_margins
 from drillctl.linear.state_space import closed_loop, open_loop, plant
+from drillctl.linear.tuning import DriveImpedance, drive_impedance
 
 __all__ = [
     "DriveImpedance",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.loop_poles import with_slope
+from drillctl.linear.loop_model import with_slope
 from drillctl.linear.operating_point import operating_point
 from drillctl.linear.state_space import (
     INPUTS,
@@ -23,7 +23,7 @@ from drillctl.linear.state_space import (
     plant_matrices,
     state_names,
 )
-from drillctl.weight_on_bit import PATHS
+from drillctl.rig.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     import control

@@ -13,15 +13,12 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.ends import ends_of
-from drillctl.linear.loop_margins import Margins, margins
-from drillctl.linear.loop_model import model_poles
-from drillctl.linear.loop_poles import loop_poles
+from drillctl.linear.ends import BitSide, ends_of, weight_path
+from drillctl.linear.loop_margins import Margins, margins, weight_delay_margin, whole_crossings
+from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
 from drillctl.linear.slope_margin import slope_margin
-from drillctl.linear.weight_path import BitSide, weight_path
-from drillctl.linear.whole_margins import weight_delay_margin, whole_crossings
-from drillctl.weight_on_bit import PATHS
+from drillctl.rig.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from drillctl.drillstring import Drillstring
+from drillctl.rig.drillstring import Drillstring
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating]

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.bit_rock import contact
-from drillctl.bit_rock.contact import by_weight
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.weight_on_bit import PATHS, AlarmWeight
+from drillctl.rig.bit_rock import contact
+from drillctl.rig.bit_rock.contact import by_weight
+from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
 
 Array = NDArray[np.float64]
 

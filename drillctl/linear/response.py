@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError, nearest
-from drillctl.linear.counting import natural_frequencies
-from drillctl.linear.ends import Route, ends_of
+from drillctl.linear.ends import Route, WeightPath, ends_of
+from drillctl.linear.poles import natural_frequencies
 from drillctl.linear.state_space import INPUTS, LOOP_OUTPUTS, OUTPUTS
 from drillctl.linear.transmission import EndMobility
-from drillctl.linear.weight_path import WeightPath
+from drillctl.rig.drillstring import Drillstring
 
 if TYPE_CHECKING:
     import control

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.errors import InputError
-from drillctl.linear.loop_model import model_poles
-from drillctl.linear.loop_poles import loop_poles
+from drillctl.linear.ends import BitSide, weight_path
+from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.operating_point import operating_point
-from drillctl.linear.weight_path import BitSide, weight_path
-from drillctl.weight_on_bit import PATHS
+from drillctl.rig.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     import xarray

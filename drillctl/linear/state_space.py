@@ -13,8 +13,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError
+from drillctl.rig.drillstring import Drillstring
 
 if TYPE_CHECKING:
     import control
@@ -188,8 +188,8 @@ def closed_loop(design: Design) -> control.StateSpace:
 
 def _whole_loop(design: Design) -> control.StateSpace:
     """The loop of a drive with filters and lags; its states beyond the string are numbered."""
+    from drillctl.linear.ends import BitSide
     from drillctl.linear.loop_model import loop_model
-    from drillctl.linear.weight_path import BitSide
 
     matrices = loop_model(design, BitSide(0.0))
     strings = _string_states(design.string.nodes)

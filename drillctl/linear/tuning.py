@@ -1,14 +1,105 @@
-"""Gains of a top drive from the string it turns."""
+"""The top drive as the string feels it: impedance, and what it reflects of a wave.
+
+Gains of a top drive from the string it turns.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
-from drillctl.drillstring import Drillstring
-from drillctl.drillstring.assembly import Parts
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.counting import natural_frequencies
+from drillctl.linear.poles import natural_frequencies
+from drillctl.linear.response import FREQUENCIES, refuse_frequencies
+from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.drillstring.assembly import Parts
+
+if TYPE_CHECKING:
+    import xarray
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class DriveImpedance:
+    """Impedance and reflection of a top drive over frequency.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (frequencies,)
+        Frequencies (Hz).
+    impedance : ndarray of complex, shape (frequencies,)
+        Z = C + i w J_d + damping (N m s/rad): torque against the motion per speed.
+    pipe : float
+        Characteristic impedance zeta of the uppermost pipe (N m s/rad).
+    label : str
+        What to call the drive in a picture.
+    """
+
+    frequency_hz: Array
+    impedance: ComplexArray
+    pipe: float
+    label: str
+
+    @property
+    def reflection(self) -> ComplexArray:
+        """Wave that goes down over the one that came up, r = (zeta - Z) / (zeta + Z).
+
+        Magnitude 0 where the drive takes all of it, 1 for a drive that stands still or hangs
+        free.
+        """
+        return (self.pipe - self.impedance) / (self.pipe + self.impedance)
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """Impedance and reflection over `frequency`, with units."""
+        import xarray
+
+        coords = {"frequency": ("frequency", self.frequency_hz, {"units": "Hz"})}
+        variables = {
+            "impedance": ("frequency", self.impedance, {"units": "N*m*s/rad"}),
+            "reflection": ("frequency", self.reflection, {"units": "1"}),
+        }
+        return xarray.Dataset(variables, coords, {"pipe_impedance": self.pipe})
+
+
+def drive_impedance(
+    design: Design, frequency_hz: ArrayLike = FREQUENCIES, label: str | None = None
+) -> DriveImpedance:
+    """Impedance of a design's top drive, inertia and damping included.
+
+    Parameters
+    ----------
+    design : Design
+        Its drive and its uppermost pipe are looked at.
+    frequency_hz : array_like, shape (frequencies,)
+        Frequencies (Hz), each more than zero.
+    label : str, optional
+        What to call it in a picture; by default the law and its gains.
+
+    Raises
+    ------
+    InputError
+        An impossible frequency, or a string whose uppermost section is a lumped spring.
+    """
+    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
+    refuse_frequencies(frequency)
+    s = 2j * math.pi * frequency
+    parts = design.string.parts
+    impedance = design.top_drive.impedance(s) + s * parts.top_inertia + parts.top_damping
+    if label is None:
+        label = design.tables.controller.law
+        if design.simple_drive:
+            kp, ki = design.top_drive.gains()
+            label += f", Kp {kp:.4g}, Ki {ki:.4g}"
+    return DriveImpedance(frequency, impedance, pipe_impedance(design.string), label)
 
 
 def pipe_impedance(string: Drillstring) -> float:

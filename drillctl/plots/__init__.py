@@ -37,30 +37,25 @@ from drillctl.plots.advantage import (
     advantage_map,
 )
 from drillctl.plots.comparison import j1_against_weight, j1_distributions, paired_differences
-from drillctl.plots.errors import error_estimate
-from drillctl.plots.frequency import bode
 from drillctl.plots.friction import friction_curves
-from drillctl.plots.gain_boundary import gain_boundary
 from drillctl.plots.impedance import drive_impedance
-from drillctl.plots.limit_cycle import limit_cycle
+from drillctl.plots.loop_gains import gain_boundary, root_locus
 from drillctl.plots.loop_map import loop_map
 from drillctl.plots.loop_shape import nichols, nyquist, sensitivity
-from drillctl.plots.map import stability_map, sweep_line
-from drillctl.plots.mobility import mobility
-from drillctl.plots.modes import mode_shapes
+from drillctl.plots.map import error_estimate, regularisation, stability_map, sweep_line
+from drillctl.plots.modes import bode, mobility, mode_shapes
 from drillctl.plots.nominal_cases import compared_regions, compared_responses
-from drillctl.plots.regularisation import regularisation
-from drillctl.plots.root_locus import root_locus
 from drillctl.plots.three_regions import three_regions
-from drillctl.plots.time_response import time_response
-from drillctl.plots.tune_baselines import tune_baselines
-from drillctl.plots.tune_neighbourhood import tune_neighbourhood
-from drillctl.plots.uncertain_curves import (
+from drillctl.plots.time_response import limit_cycle, time_response
+from drillctl.plots.tune import tune_baselines, tune_neighbourhood
+from drillctl.plots.uncertainty import (
     area_convergence,
     cell_distributions,
+    probability_map,
+    region_error,
     sensitivity_bars,
+    uncertain_regions,
 )
-from drillctl.plots.uncertain_regions import probability_map, region_error, uncertain_regions
 from drillctl.plots.weight_delay import weight_delay
 
 __all__ = [

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.plots.plane import origin_of, title_of
 from drillctl.plots.style import (
     BLACK,
     BLUE,
@@ -25,6 +24,8 @@ from drillctl.plots.style import (
     axes_or_new,
     dress,
     grid_or_new,
+    origin_of,
+    title_of,
 )
 
 if TYPE_CHECKING:

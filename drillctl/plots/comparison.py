@@ -10,10 +10,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drillctl import units
+from drillctl.ensemble.intervals import mean_interval
 from drillctl.errors import InputError
-from drillctl.plots.plane import title_of
-from drillctl.plots.style import BLACK, COLOURS, DASHES, LINE, SMALL, TITLE, axes_or_new, dress
-from drillctl.studies.draws.intervals import mean_interval
+from drillctl.plots.style import (
+    BLACK,
+    COLOURS,
+    DASHES,
+    LINE,
+    SMALL,
+    TITLE,
+    axes_or_new,
+    dress,
+    title_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

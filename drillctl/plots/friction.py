@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.bit_rock import BitRockLaw
 from drillctl.design import Design
 from drillctl.plots import style
+from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.units import RPM, SI
 
 BACKWARD = -20.0

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drillctl.errors import InputError
-from drillctl.linear.impedance import DriveImpedance
+from drillctl.linear.tuning import DriveImpedance
 from drillctl.plots import style
-from drillctl.plots.frequency import hertz, listed
+from drillctl.plots.modes import hertz, listed
 
 GREY = "#777777"
 

@@ -17,9 +17,8 @@ from drillctl.design import parameter
 from drillctl.errors import InputError, nearest
 from drillctl.linear.boundary import GainBoundary
 from drillctl.plots import style
-from drillctl.plots.colour_bars import beyond, colours, plain_ticks
-from drillctl.plots.gain_boundary import DIAMOND, GAINS, rings_of, shown_gains
-from drillctl.plots.plane import legend_under, plane
+from drillctl.plots.loop_gains import DIAMOND, GAINS, rings_of, shown_gains
+from drillctl.plots.style import beyond, colours, legend_under, plain_ticks, plane
 
 if TYPE_CHECKING:
     from drillctl.studies.loop_maps import LoopMap

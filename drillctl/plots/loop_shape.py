@@ -30,11 +30,11 @@ from numpy.typing import NDArray
 
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import LoopAnalysis
-from drillctl.linear.loop_poles import loop_poles
+from drillctl.linear.loop_model import loop_poles
 from drillctl.linear.response import FrequencyResponse, frequency_response
 from drillctl.plots import style
-from drillctl.plots.frequency import hertz
 from drillctl.plots.impedance import GREY
+from drillctl.plots.modes import hertz
 
 Array = NDArray[np.floating[Any]]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]

@@ -1,7 +1,13 @@
-"""Maps of J1: values, contours at the levels, the minimum, the audited cells."""
+"""Maps of J1: values, contours at the levels, the minimum, the audited cells.
+
+Estimated errors of the batch engine over a sample of lanes, and what the audit found.
+
+What smoothing the friction does to a map.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +17,27 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.errors import InputError
-from drillctl.plots.plane import axis_label, legend_under, origin_of, plane, title_of
-from drillctl.plots.style import BLACK, LINE, SMALL, VERMILLION, axes_or_new, dress
+from drillctl.plots import style
+from drillctl.plots.style import (
+    BLACK,
+    BLUE,
+    LINE,
+    SMALL,
+    VERMILLION,
+    axes_or_new,
+    axis_label,
+    dress,
+    legend_under,
+    origin_of,
+    plane,
+    title_of,
+)
 from drillctl.simulation.measures import STATUSES
+from drillctl.studies.diagnosis.error_estimate import PROMISES, ROUNDING, SMALLEST
+from drillctl.studies.regularisation import Regularisation
 
 if TYPE_CHECKING:
-    from drillctl.studies import Sweep
+    from drillctl.studies import Doctor, Sweep
 
 MOST_COLOURED = 2000
 """Cells along an axis that are coloured: more than a picture has points along it."""
@@ -142,4 +163,97 @@ def sweep_line(result: Sweep, ax: Axes | None = None, system: units.System = "si
     dress(ax, label, "J1 (s)", title_of(result))
     ax.legend(fontsize=SMALL, frameon=False)
     figure.supxlabel(_caption(result), fontsize=SMALL)
+    return figure
+
+
+def error_estimate(result: Doctor, ax: Axes | None = None) -> Figure:
+    """Estimated error of each lane over its J1, beside what the accuracy promises.
+
+    Parameters
+    ----------
+    result : Doctor
+        Of a design that the batch engine takes.
+    ax : Axes, optional
+        Axes to draw on.
+
+    Returns
+    -------
+    Figure
+        Circles are audited differences, on the lanes that were simulated again.
+
+    Raises
+    ------
+    InputError
+        The engine refused the design: there is nothing to draw.
+    """
+    if not len(result.cells):
+        raise InputError("there is no estimate to draw: the batch engine refused this design")
+    figure, ax = axes_or_new(ax, 7.0, 4.5)
+    j1 = np.maximum(result.estimate.j1[0], SMALLEST)
+    ax.loglog(
+        j1, np.maximum(result.estimate.of_lanes, ROUNDING), ".", color=BLUE,
+        label=f"{len(j1)} lanes, estimated",
+    )  # fmt: skip
+    if len(result.audit.cells):
+        ax.loglog(
+            np.maximum(result.audit.batch, SMALLEST),
+            np.maximum(result.audit.differences, ROUNDING),
+            "o", markerfacecolor="none", markeredgecolor=VERMILLION, markersize=8,
+            label="beside the reference solver",
+        )  # fmt: skip
+    promise = PROMISES[result.accuracy]
+    for value, dash, name in ((promise.median, "--", "median"), (promise.p99, "-", "99 %")):
+        if value is not None:
+            label = f"'{result.accuracy}' over the paper's map: {name}"
+            ax.axhline(value, color=BLACK, linestyle=dash, linewidth=0.6 * LINE, label=label)
+    title = title_of(result)
+    dress(ax, "J1 (s)", "relative error of J1", title)
+    ax.legend(fontsize=SMALL, frameon=False)
+    return figure
+
+
+def regularisation(result: Regularisation, ax: Sequence[Axes] | None = None) -> Figure:
+    """Draw the shift of J1 and the size of the regions against the width of the smoothing.
+
+    Parameters
+    ----------
+    result : Regularisation
+        From `drillctl.studies.regularisation`.
+    ax : sequence of Axes, optional
+        Two panels.
+
+    Returns
+    -------
+    Figure
+        Left: median, 95th percentile and worst relative change of J1 over the cells. Right:
+        cells at or under each level over those of the set-valued map.
+    """
+    figure, (left, right) = style.grid_or_new(ax, 1, 2, 10.5, 4.6)
+    size = np.abs(result.shifts)
+    for number, (share, name) in enumerate(((0.5, "median cell"), (0.95, "95th percentile"),
+                                            (1.0, "worst cell"))):  # fmt: skip
+        change = [100.0 * np.nanquantile(x, share) for x in size]
+        left.loglog(
+            result.widths, change, "o", color=style.COLOURS[number],
+            linestyle=style.DASHES[number], linewidth=style.LINE, markersize=4, label=name,
+        )  # fmt: skip
+    for number, level in enumerate(result.levels):
+        exact, cells = result.cells(level)
+        if exact == 0:
+            continue
+        right.semilogx(
+            result.widths, np.array(cells) / exact, "o", color=style.COLOURS[number],
+            linestyle=style.DASHES[number % 4], linewidth=style.LINE, markersize=4,
+            label=f"J1 at or under {level:g} s ({exact} cells)",
+        )  # fmt: skip
+    right.axhline(1.0, color=style.BLACK, linewidth=0.8)
+    over = "width of the regularisation (rad/s)"
+    style.dress(left, over, "change of J1 (%)", "Friction smoothed by tanh")
+    style.dress(right, over, "cells over those of set-valued friction", "Size of the regions")
+    for panel in (left, right):
+        panel.legend(fontsize=style.SMALL, frameon=False)
+    table = result.design.tables
+    origin = "string reconstructed; " if table.status == "reconstructed" else ""
+    extent = f"{result.j1.size} cells, {table.simulation.duration:g} s"
+    figure.supxlabel(f"{table.title or result.design.name}; {origin}{extent}", fontsize=style.SMALL)
     return figure

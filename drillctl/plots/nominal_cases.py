@@ -19,14 +19,23 @@ from drillctl import units
 from drillctl.design import parameter
 from drillctl.errors import InputError, shown
 from drillctl.plots.comparison import WIDEST, case_colour, legend_below
-from drillctl.plots.plane import axis_label, title_of
-from drillctl.plots.style import BLACK, DASHES, SMALL, TITLE, axes_or_new, dress, grid_or_new
+from drillctl.plots.style import (
+    BLACK,
+    DASHES,
+    SMALL,
+    TITLE,
+    axes_or_new,
+    axis_label,
+    dress,
+    grid_or_new,
+    title_of,
+)
 
 if TYPE_CHECKING:
     import shapely
 
+    from drillctl.ensemble.grid import Axis
     from drillctl.studies.comparison.study import ComparedCase, Comparison
-    from drillctl.studies.grid import Axis
 
 Array = NDArray[np.float64]
 

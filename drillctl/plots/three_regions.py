@@ -11,13 +11,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from drillctl import units
-from drillctl.plots.plane import legend_under, plane
-from drillctl.plots.style import BLACK, BLUE, SMALL, VERMILLION
+from drillctl.plots.style import BLACK, BLUE, SMALL, VERMILLION, legend_under, plane
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
 
-    from drillctl.studies.three_regions.study import ThreeRegions
+    from drillctl.studies.three_regions.compute import ThreeRegions
 
 FILL = "#F7DFA6"
 """Of the cells at or under the level: light enough for hatching and marks, grey in print."""

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.plots.plane import title_of
 from drillctl.plots.style import (
     BLACK,
     COLOURS,
@@ -22,6 +21,7 @@ from drillctl.plots.style import (
     TITLE,
     dress,
     grid_or_new,
+    title_of,
 )
 from drillctl.studies.weight_delay.limits import ENOUGH
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctl import units
-from drillctl.console import line, table
+from drillctl.cli.console import line, table
+from drillctl.ensemble.draws import EQUAL_TO
 from drillctl.printing.words import title_of
-from drillctl.studies.draws.runs import EQUAL_TO
 
 if TYPE_CHECKING:
     from drillctl.studies.advantage import Advantage

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from drillctl.console import line, table
+from drillctl.cli.console import line, table
 from drillctl.printing.words import title_of
-from drillctl.simulation.scheme_reasons import FORMS
+from drillctl.studies.diagnosis.scheme_reasons import FORMS
 
 if TYPE_CHECKING:
     from drillctl.studies import Doctor

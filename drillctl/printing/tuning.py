@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from drillctl import units
-from drillctl.console import line, sized, table
+from drillctl.cli.console import line, sized, table
 from drillctl.printing.words import title_of
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from drillctl import units
-from drillctl.console import line, sized, table
+from drillctl.cli.console import line, sized, table
 from drillctl.errors import InputError
 from drillctl.printing.words import place_of, title_of
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from drillctl.errors import DrillctlError
 from drillctl.json_files import write_json, write_text
-from drillctl.reporting import html, markdown, pdf
+from drillctl.reporting import html, markdown
+from drillctl.reporting import html as pdf
 from drillctl.reporting.blocks import Checks, Document, Table
 from drillctl.reporting.pictures import Album
 

@@ -10,9 +10,9 @@ from matplotlib.patches import Polygon, Rectangle
 
 from drillctl.design import Design
 from drillctl.design.tables import SectionTable
-from drillctl.drillstring import PIPES
 from drillctl.plots import style
 from drillctl.reporting.words import Words, number
+from drillctl.rig.drillstring import PIPES
 
 LUMPED = 0.12
 """Height of a lumped spring, which has no length, as a share of the drawing."""

@@ -80,8 +80,8 @@ def _two_axes(asked: Asked) -> str:
 
 def _fitting_map(asked: Asked) -> str:
     """Why the default map does not fit a design that names no axes of its own."""
+    from drillctl.ensemble.grid import axes_of
     from drillctl.errors import InputError
-    from drillctl.studies.grid import axes_of
 
     try:
         axes_of(asked.design, asked.design.tables.map.axes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from drillctl import units
 from drillctl.design import Design, parameter
-from drillctl.plots.plane import NAMES
+from drillctl.plots.style import NAMES
 
 NOTHING = "–"
 """Where there is no number."""

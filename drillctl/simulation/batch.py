@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.bit_rock import PrintedThreeBranch
 from drillctl.design.tables import SimulationTable
 from drillctl.errors import InputError
+from drillctl.rig.bit_rock import PrintedThreeBranch
+from drillctl.rig.top_drive import SampledDrive
 from drillctl.simulation import measures as m
-from drillctl.simulation.lanes import Lanes
+from drillctl.simulation.lanes import Lanes, start
 from drillctl.simulation.propagator import StringStep, string_step
 from drillctl.simulation.scheme import Scheme, bit_inertia, choose_scheme
-from drillctl.simulation.start import start
 from drillctl.simulation.step_laws import (
     drive_step,
     observer_step,
@@ -31,7 +31,6 @@ from drillctl.simulation.step_laws import (
     remembered,
     weight_step,
 )
-from drillctl.top_drive import SampledDrive
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.drillstring import Drillstring
+from drillctl.rig.drillstring import Drillstring
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.bit_rock import PrintedThreeBranch
 from drillctl.design import Design
 from drillctl.errors import SimulationError
+from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.simulation.phases import stored_energy
 from drillctl.simulation.printed import PrintedSystem
 from drillctl.simulation.system import WORKS, Method, System, integrate

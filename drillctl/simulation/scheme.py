@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design.tables import SimulationTable
-from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError
+from drillctl.rig.drillstring import Drillstring
 
 Array = NDArray[np.float64]
 

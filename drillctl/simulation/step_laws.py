@@ -10,9 +10,9 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from drillctl.linear.observer import Observer
-from drillctl.simulation.start import Start
-from drillctl.top_drive import RealDrive, SampledDrive
-from drillctl.weight_on_bit import PATHS, AlarmWeight
+from drillctl.rig.top_drive import RealDrive, SampledDrive
+from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
+from drillctl.simulation.lanes import Start
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def drive_step(drive: Any, step: float, string: Any) -> Any:
 
 
 def _real_step(drive: RealDrive, step: float, string: Any) -> Any:
-    from drillctl.simulation.kernels.drive_numbers import RealStep
+    from drillctl.simulation.kernels.drive_step import RealStep
 
     keep, ramp = kept(drive.encoder, step), ramp_followed(drive.encoder, step)
     filter_mean, motor_mean = mean_kept(drive.torque_filter, step), mean_kept(drive.lag, step)
@@ -82,7 +82,7 @@ def _real_step(drive: RealDrive, step: float, string: Any) -> Any:
 
 
 def _sampled_step(drive: SampledDrive, step: float) -> Any:
-    from drillctl.simulation.kernels.drive_numbers import SampledStep
+    from drillctl.simulation.kernels.drive_step import SampledStep
 
     motor_mean = mean_kept(drive.lag, step)
     return SampledStep(
@@ -170,7 +170,7 @@ def observer_step(observer: Observer | None, step: float, start: Start) -> Any:
 
 def program_step(program: Any) -> Any:
     """The kernel's form of the programs of all lanes; nothing where none moves."""
-    from drillctl.simulation.kernels.program_numbers import NoProgram, Programs
+    from drillctl.simulation.kernels.program_step import NoProgram, Programs
 
     moves = np.any(program.speed.first != 0.0) or np.any(program.weight.first != 0.0)
     if not moves and not np.any(program.rock_until > 0.0):

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from drillctl.bit_rock import contact
 from drillctl.design import Design
 from drillctl.errors import SimulationError
-from drillctl.simulation.drive_in_time import Top, drive_in_time
+from drillctl.rig.bit_rock import contact
+from drillctl.simulation.lanes import start
+from drillctl.simulation.laws_in_time import Moment, Top, drive_in_time, weight_in_time
 from drillctl.simulation.phases import Phase, damping_power, slip_phase, stick_phase
-from drillctl.simulation.start import start
-from drillctl.simulation.weight_in_time import Moment, weight_in_time
 
 Array = NDArray[np.float64]
 Method = Literal["DOP853", "RK45", "Radau", "BDF"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from drillctl.design import Design
-from drillctl.design.writing import to_tree
+from drillctl.design.reading import to_tree
 from drillctl.errors import InputError, shown
 from drillctl.provenance import provenance
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from drillctl.design import Design
+from drillctl.ensemble.grid import Axis, axes_of
 from drillctl.errors import InputError
-from drillctl.studies.grid import Axis, axes_of
 
 if TYPE_CHECKING:
     import xarray

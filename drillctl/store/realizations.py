@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.ensemble.grid import shape_of
+from drillctl.ensemble.sweeps import UNITS
 from drillctl.errors import StoreError
 from drillctl.simulation.batch import Prepared
 from drillctl.simulation.measures import STATUSES
 from drillctl.store.blocks import FolderBlocks
 from drillctl.store.names import stored_name
-from drillctl.studies.grid import shape_of
-from drillctl.studies.sweeps import UNITS
 from drillctl.studies.uncertainty import Uncertainty
 from drillctl.studies.uncertainty.job import Block, Drawn, Job
 from drillctl.studies.uncertainty.keeping import block_size, pieces

@@ -19,23 +19,23 @@
   `checking.py`: what a design asks of the studies, without running any.
 """
 
+from drillctl.ensemble.grid import Axis
+from drillctl.ensemble.parameters import Draws, draw, uncertain_parameters
+from drillctl.ensemble.regions import Region, region
+from drillctl.ensemble.sweeps import Sweep, stability_map, sweep
 from drillctl.studies.comparison.study import Comparison, compare
 from drillctl.studies.diagnosis.examination import doctor
 from drillctl.studies.diagnosis.result import Doctor
-from drillctl.studies.draws.parameters import Draws, draw, uncertain_parameters
-from drillctl.studies.grid import Axis
 from drillctl.studies.loop_maps import LoopMap, loop_map
-from drillctl.studies.regions import Region, region
 from drillctl.studies.regularisation import Regularisation, regularisation
 from drillctl.studies.responses import responses
-from drillctl.studies.sweeps import Sweep, stability_map, sweep
 from drillctl.studies.tables import (
     write_comparison,
     write_loop_table,
     write_tables,
     write_weight_delay,
 )
-from drillctl.studies.three_regions.study import ThreeRegions, three_regions
+from drillctl.studies.three_regions.compute import ThreeRegions, three_regions
 from drillctl.studies.uncertainty import Uncertainty, uncertainty
 from drillctl.studies.uncertainty.tables import write_uncertainty_tables
 from drillctl.studies.weight_delay.study import WeightDelay, weight_delay

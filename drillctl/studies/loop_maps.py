@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
+from drillctl.ensemble.grid import Axis, Group, axes_of, groups, shape_of
 from drillctl.errors import InputError
-from drillctl.linear.counting import natural_frequencies
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_margins import peak_sensitivities
-from drillctl.linear.loop_poles import many_loop_poles
+from drillctl.linear.loop_model import many_loop_poles
+from drillctl.linear.poles import natural_frequencies
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.grid import Axis, Group, axes_of, groups, shape_of
-from drillctl.studies.three_regions.steady import gains_of, slopes_tolerated, steady_drilling
+from drillctl.studies.three_regions.compute import gains_of, slopes_tolerated, steady_drilling
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.design.parts import weight_moves
+from drillctl.ensemble.grid import Axis, axes_of
+from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.grid import Axis, axes_of
-from drillctl.studies.sweeps import sweep
 
 if TYPE_CHECKING:
     from pathlib import Path

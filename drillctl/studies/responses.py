@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from drillctl.ensemble.grid import cell_design
+from drillctl.ensemble.sweeps import Sweep
 from drillctl.simulation import Simulation, simulate
-from drillctl.studies.grid import cell_design
-from drillctl.studies.sweeps import Sweep
 
 
 def responses(result: Sweep, count: int = 4) -> list[Simulation]:

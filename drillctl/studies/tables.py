@@ -6,10 +6,10 @@ import csv
 import itertools
 from pathlib import Path
 
+from drillctl.ensemble.sweeps import Sweep
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.comparison.study import MEASURES, QUANTILES, Comparison
 from drillctl.studies.loop_maps import LoopMap
-from drillctl.studies.sweeps import Sweep
 from drillctl.studies.weight_delay.study import WeightDelay
 
 

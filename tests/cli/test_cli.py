@@ -715,7 +715,7 @@ class Counted:
     """`run_batch` that counts its calls and is interrupted at one of them."""
 
     def __init__(self, monkeypatch, stop_at=None):
-        from drillctl.studies import sweeps
+        from drillctl.ensemble import sweeps
 
         self.calls, self.stop_at = 0, stop_at
         self.real = sweeps.run_batch

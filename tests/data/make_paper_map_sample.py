@@ -16,9 +16,9 @@ import numpy as np
 
 import drillctl
 from drillctl.design import Design
+from drillctl.ensemble.grid import axes_of, cell_design, shape_of
 from drillctl.simulation.reference import solve
 from drillctl.simulation.trajectory import deviation
-from drillctl.studies.grid import axes_of, cell_design, shape_of
 
 DESIGN, SEED, CELLS = "monteiro-trindade-140kn", 2012, 40
 TOLERANCES = (1e-9, 1e-10)

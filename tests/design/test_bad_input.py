@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 import drillctl
 from drillctl import catalog, units
 from drillctl.design import Design, parameter, parameters, parse_setting, to_toml
-from drillctl.design.reading import parse_axis
-from drillctl.design.writing import to_tree
+from drillctl.design.reading import parse_axis, to_tree
 from drillctl.errors import InputError
 
 HOLDS = (

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 import drillctl
 from drillctl import catalog, units
-from drillctl.bit_rock import NavarroLopezSuarez
 from drillctl.design import parameter, parameters, parse_setting, to_toml
 from drillctl.design.reading import parse_axis
 from drillctl.errors import InputError
-from drillctl.top_drive import PI, ConstantTorque
+from drillctl.rig.bit_rock import NavarroLopezSuarez
+from drillctl.rig.top_drive import PI, ConstantTorque
 
 PAPER = "monteiro-trindade-140kn"
 SHIPPED = [*catalog.names("models"), *catalog.names("designs")]

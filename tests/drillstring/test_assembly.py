@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import drillctl
-from drillctl.drillstring import GRADES, PIPES, Section, assemble, polar_moment
-from drillctl.drillstring.section import torsional_yield
+from drillctl.rig.drillstring import GRADES, PIPES, Section, assemble, polar_moment
+from drillctl.rig.drillstring.section import torsional_yield
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = Section("pipe", elements=2, stiffness=300.0, inertia=12.0, length=200.0)

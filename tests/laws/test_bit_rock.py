@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import drillctl
-from drillctl.bit_rock import NavarroLopezSuarez, WeightTable
+from drillctl.rig.bit_rock import NavarroLopezSuarez, WeightTable
 
 HOLDS = (
     (

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import drillctl
-from drillctl.bit_rock import (
+from drillctl.errors import InputError
+from drillctl.rig.bit_rock import (
     JansenVanDenSteen,
     NavarroLopezSuarez,
     Stribeck,
     TuckerWang,
     tabulated,
 )
-from drillctl.errors import InputError
 
 DESIGN = "monteiro-trindade-140kn"
 POINTS = (0.0, 2.0, 5.0, 12.0, 30.0), (0.085, 0.07, 0.06, 0.044, 0.03)

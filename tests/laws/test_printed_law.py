@@ -9,10 +9,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import drillctl
-from drillctl.bit_rock import NavarroLopezSuarez, PrintedThreeBranch
 from drillctl.cli import run
 from drillctl.errors import InputError
 from drillctl.linear import loop, operating_point
+from drillctl.rig.bit_rock import NavarroLopezSuarez, PrintedThreeBranch
 from drillctl.simulation.printed import BACKWARD_EDGE, CREEPING, FORWARD_EDGE, PUSHED
 from drillctl.simulation.reference import solve
 from drillctl.simulation.trajectory import sample

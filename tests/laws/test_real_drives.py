@@ -10,12 +10,11 @@ import pytest
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import ends_of
+from drillctl.linear.ends import BitSide
 from drillctl.linear.export import nonlinear_system
-from drillctl.linear.loop_model import model_poles, pade
-from drillctl.linear.loop_poles import loop_poles
+from drillctl.linear.loop_model import loop_poles, model_poles, pade
 from drillctl.linear.tuning import active_damping, pipe_impedance, stick_slip_frequency
-from drillctl.linear.weight_path import BitSide
-from drillctl.top_drive import PI, RealDrive, SampledDrive
+from drillctl.rig.top_drive import PI, RealDrive, SampledDrive
 
 HOLDS = (
     (

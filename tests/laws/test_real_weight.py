@@ -8,11 +8,11 @@ import pytest
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import ends_of
+from drillctl.linear.ends import BitSide, weight_path
+from drillctl.linear.loop_margins import weight_delay_margin
 from drillctl.linear.loop_model import model_poles
 from drillctl.linear.observer import observer
-from drillctl.linear.weight_path import BitSide, weight_path
-from drillctl.linear.whole_margins import weight_delay_margin
-from drillctl.weight_on_bit import AlarmWeight, FollowingSpeed, ObservedWeight, RealWeight
+from drillctl.rig.weight_on_bit import AlarmWeight, FollowingSpeed, ObservedWeight, RealWeight
 
 HOLDS = (
     (

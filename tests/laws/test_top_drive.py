@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import drillctl
-from drillctl.top_drive import PI, ConstantTorque
+from drillctl.rig.top_drive import PI, ConstantTorque
 
 angles = st.floats(-50.0, 50.0)
 steps = st.floats(1e-3, 1.0)

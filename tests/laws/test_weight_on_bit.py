@@ -10,11 +10,11 @@ import pytest
 
 import drillctl
 from drillctl import units
-from drillctl.bit_rock import NavarroLopezSuarez, WeightTable, contact, over_weight
-from drillctl.bit_rock.contact import by_weight
 from drillctl.errors import InputError
 from drillctl.linear import cancelling_weight_gain, operating_point
-from drillctl.weight_on_bit import ConstantWeight, FollowingSpeed
+from drillctl.rig.bit_rock import NavarroLopezSuarez, WeightTable, contact, over_weight
+from drillctl.rig.bit_rock.contact import by_weight
+from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed
 
 DESIGN = "monteiro-trindade-140kn"
 ROWS = WeightTable(

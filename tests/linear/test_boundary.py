@@ -9,7 +9,7 @@ import shapely
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import ends_of, gain_boundary, slope_margin, slope_margins
-from drillctl.linear.loop_poles import loop_poles, many_loop_poles
+from drillctl.linear.loop_model import loop_poles, many_loop_poles
 
 HOLDS = (
     (

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import drillctl
-from drillctl.drillstring import Section, assemble
 from drillctl.linear import frequency_response
 from drillctl.linear.ends import ends_of
-from drillctl.linear.expansion import Expansion
+from drillctl.linear.modal import Expansion
 from drillctl.linear.state_space import closed_loop_matrices
 from drillctl.linear.transmission import Lines
+from drillctl.rig.drillstring import Section, assemble
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

@@ -16,7 +16,7 @@ from drillctl.errors import InputError
 from drillctl.linear import critical_speed, critical_weight_on_bit, loop, operating_point
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_margins import disk_gain_and_phase, pole_grid
-from drillctl.linear.loop_poles import loop_poles, many_loop_poles, with_slope
+from drillctl.linear.loop_model import loop_poles, many_loop_poles, with_slope
 from drillctl.linear.slope_margin import slope_margin
 from drillctl.linear.state_space import open_loop_matrices
 from drillctl.studies import Axis, loop_map

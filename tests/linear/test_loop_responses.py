@@ -8,7 +8,7 @@ import pytest
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import closed_loop, frequency_response, open_loop, plant, response_of
-from drillctl.linear.loop_poles import with_slope
+from drillctl.linear.loop_model import with_slope
 from drillctl.linear.state_space import closed_loop_matrices
 
 DESIGN = "monteiro-trindade-140kn"

@@ -10,9 +10,9 @@ import pytest
 from scipy.optimize import brentq
 
 import drillctl
-from drillctl.drillstring import Section, assemble
 from drillctl.errors import InputError
 from drillctl.linear import modes
+from drillctl.rig.drillstring import Section, assemble
 
 HOLDS = (
     (

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import drillctl
-from drillctl.drillstring import Section, assemble
 from drillctl.errors import InputError
 from drillctl.linear import frequency_response
 from drillctl.linear.ends import ends_of
 from drillctl.linear.state_space import closed_loop_matrices, plant_matrices
 from drillctl.linear.transmission import Lines
+from drillctl.rig.drillstring import Section, assemble
 
 HOLDS = (
     (

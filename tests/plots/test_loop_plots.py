@@ -26,8 +26,8 @@ from drillctl.linear import (
     root_locus,
 )
 from drillctl.linear.loop_margins import pole_grid
+from drillctl.plots.loop_gains import mirrored
 from drillctl.plots.loop_shape import turns_about_critical
-from drillctl.plots.root_locus import mirrored
 from drillctl.studies import Axis
 from drillctl.studies.loop_maps import QUANTITIES, loop_map
 

@@ -13,13 +13,13 @@ import pytest
 from matplotlib.figure import Figure
 
 import drillctl
+from drillctl.ensemble.audit import Audit
 from drillctl.errors import InputError
 from drillctl.plots import stability_map, sweep_line, time_response
 from drillctl.plots.map import axis_label
 from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies import Axis, Sweep, responses
-from drillctl.studies.audit import Audit
 
 OK, FAILED = STATUSES.index("ok"), STATUSES.index("failed")
 NOBODY = Audit(np.array([], dtype=int), np.array([]), np.array([]))

@@ -13,7 +13,7 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.plots.three_regions import OUTLINE, three_regions
 from drillctl.studies import Axis
-from drillctl.studies.three_regions.study import FIELDS, MASKS, ThreeRegions
+from drillctl.studies.three_regions.compute import FIELDS, MASKS, ThreeRegions
 
 KP = Axis("controller.kp", "N*m*s/rad", np.linspace(0.0, 400.0, 5))
 WEIGHT = Axis("operating_point.weight_on_bit", "N", np.linspace(100e3, 160e3, 4))

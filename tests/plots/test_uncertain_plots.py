@@ -10,7 +10,7 @@ from matplotlib.text import Text
 import drillctl
 from drillctl import plots
 from drillctl.errors import InputError
-from drillctl.plots.uncertain_regions import border
+from drillctl.plots.uncertainty import border
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.uncertainty import uncertainty
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from drillctl.reporting import Report, pdf
+from drillctl.reporting import Report
+from drillctl.reporting import html as pdf
 
 CHROMIUM = "/usr/bin/chromium"
 

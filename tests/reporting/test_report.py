@@ -14,7 +14,8 @@ import drillctl
 from drillctl import studies
 from drillctl.cli import run
 from drillctl.errors import InputError, SimulationError
-from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, gather, making, pdf
+from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, gather, making
+from drillctl.reporting import html as pdf
 from drillctl.reporting.verdict import verdict
 
 

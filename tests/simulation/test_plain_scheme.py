@@ -6,8 +6,8 @@ from plain_scheme import plain_run
 
 import drillctl
 from drillctl.design.tables import AxisTable
+from drillctl.ensemble.grid import axes_of, groups
 from drillctl.simulation.batch import prepare, run_batch
-from drillctl.studies.grid import axes_of, groups
 
 HOLDS = (
     (

@@ -6,7 +6,8 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drillctl.drillstring import Drillstring, Section, assemble
+from drillctl.rig.drillstring import Drillstring, Section, assemble
+from drillctl.rig.top_drive import PI
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import put
 from drillctl.simulation.kernels.compiling import OPTIONS
@@ -18,9 +19,8 @@ from drillctl.simulation.kernels.string_step import (
     complete_and_propagate,
     look,
 )
+from drillctl.simulation.lanes import Start
 from drillctl.simulation.propagator import string_step
-from drillctl.simulation.start import Start
-from drillctl.top_drive import PI
 
 HOLDS = (
     (
@@ -115,7 +115,7 @@ def test_steps_equal_the_matrix_exponential(name):
 
 
 def test_modes_too_fast_for_the_short_form_take_blocks(monkeypatch):
-    from drillctl.simulation import undamped_step
+    from drillctl.simulation import propagator as undamped_step
 
     string = CASES["undamped"]
     random = np.random.default_rng(7)

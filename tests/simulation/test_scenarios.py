@@ -7,7 +7,7 @@ import pytest
 
 import drillctl
 from drillctl.errors import InputError
-from drillctl.program import NONE, Ramp
+from drillctl.rig.program import NONE, Ramp
 
 HOLDS = (
     (

@@ -9,12 +9,12 @@ import pytest
 
 import drillctl
 from drillctl import catalog
-from drillctl.simulation import scheme_reasons
 from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.cost import count
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.propagator import string_step
-from drillctl.simulation.scheme_reasons import explain
+from drillctl.studies.diagnosis import scheme_reasons
+from drillctl.studies.diagnosis.scheme_reasons import explain
 
 PAPER = "monteiro-trindade-140kn"
 

@@ -12,8 +12,11 @@ import pytest
 import drillctl
 from drillctl import plots, units
 from drillctl.cli import run
+from drillctl.ensemble.draws import drawn_lanes
+from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.progress import SILENT
+from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed, ObservedWeight, RealWeight
 from drillctl.studies import compare
 from drillctl.studies.advantage import advantage, write_advantage
 from drillctl.studies.advantage import delays as delays_module
@@ -33,11 +36,8 @@ from drillctl.studies.advantage.policies import (
     REAL,
     policies,
 )
-from drillctl.studies.draws.lanes import drawn_lanes
-from drillctl.studies.draws.parameters import draw
 from drillctl.studies.robust import search
 from drillctl.studies.robust.objective import Objective
-from drillctl.weight_on_bit import ConstantWeight, FollowingSpeed, ObservedWeight, RealWeight
 
 HOLDS = (
     (

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl.ensemble import audit as auditing
+from drillctl.ensemble.audit import Audit, audit, choose_cells, reference_j1
+from drillctl.ensemble.grid import axes_of
 from drillctl.errors import SimulationError
-from drillctl.studies import audit as auditing
-from drillctl.studies.audit import Audit, audit, choose_cells, reference_j1
-from drillctl.studies.grid import axes_of
 
 LEVELS = (10.0, 20.0, 30.0)
 
@@ -133,7 +133,7 @@ def test_real_audit_of_two_cells(design):
     assert found.audit.verdict == "ok"
     assert 0.0 < found.audit.worst < auditing.WORST_ALLOWED
     alone = [
-        drillctl.simulate(drillctl.studies.grid.cell_design(design, found.axes, int(cell)))
+        drillctl.simulate(drillctl.ensemble.grid.cell_design(design, found.axes, int(cell)))
         for cell in found.audit.cells
     ]
     np.testing.assert_allclose(found.audit.reference, [run.measures.j1 for run in alone], rtol=1e-4)

@@ -10,14 +10,13 @@ import pytest
 from scipy import stats
 
 import drillctl
+from drillctl.ensemble.draws import EQUAL_TO, drawn_lanes, equalising_shift, run_draws, start_up
+from drillctl.ensemble.intervals import mean_interval, share_interval
+from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, trace
 from drillctl.studies.comparison.cases import ALONE, case_designs
 from drillctl.studies.comparison.study import MEASURES, compare
-from drillctl.studies.draws.intervals import mean_interval, share_interval
-from drillctl.studies.draws.lanes import drawn_lanes
-from drillctl.studies.draws.parameters import draw
-from drillctl.studies.draws.runs import EQUAL_TO, equalising_shift, run_draws, start_up
 
 HOLDS = (
     (
@@ -222,7 +221,7 @@ def test_impossible_draws_are_failed_counted_and_under_no_level(half_impossible)
 
 
 def test_a_run_that_breaks_down_is_counted_with_its_reason(short, monkeypatch):
-    from drillctl.studies.draws import runs as drawn_runs
+    from drillctl.ensemble import draws as drawn_runs
 
     def broken(lanes, prepared):
         batch = original(lanes, prepared)

@@ -7,8 +7,8 @@ import pytest
 
 import drillctl
 from drillctl.design.reading import parse_axis
+from drillctl.ensemble import audit
 from drillctl.errors import InputError
-from drillctl.studies import audit
 from drillctl.studies.diagnosis import examination
 from drillctl.studies.diagnosis import result as diagnosis
 from drillctl.studies.diagnosis.error_estimate import PROMISES, ErrorEstimate, Promise, errors_of

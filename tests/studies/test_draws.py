@@ -8,15 +8,10 @@ from scipy import stats
 
 import drillctl
 from drillctl.design import to_toml
+from drillctl.ensemble.draws import drawn_lanes
+from drillctl.ensemble.parameters import DEFAULT_COV, DEFAULT_PATHS, draw, uncertain_parameters
+from drillctl.ensemble.sampling import probabilities
 from drillctl.errors import InputError
-from drillctl.studies.draws.lanes import drawn_lanes
-from drillctl.studies.draws.parameters import (
-    DEFAULT_COV,
-    DEFAULT_PATHS,
-    draw,
-    uncertain_parameters,
-)
-from drillctl.studies.draws.sampling import probabilities
 
 HOLDS = (
     (

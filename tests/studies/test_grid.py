@@ -7,11 +7,11 @@ import pytest
 
 import drillctl
 from drillctl.design.tables import AxisTable
+from drillctl.ensemble.grid import axes_of, axis, cell_design, groups, shape_of
 from drillctl.errors import InputError
 from drillctl.simulation.batch import _turns, prepare
 from drillctl.simulation.lanes import lane_numbers
 from drillctl.studies import sweep
-from drillctl.studies.grid import axes_of, axis, cell_design, groups, shape_of
 from drillctl.units import RPM
 
 PAPER = "monteiro-trindade-140kn"
@@ -126,17 +126,17 @@ def test_axes_that_do_not_fit(paper, asked, words):
 
 
 def test_grids_too_large_are_refused_before_they_are_made(paper, monkeypatch):
-    monkeypatch.setattr("drillctl.studies.memory._free_memory", lambda: 1e6)
+    monkeypatch.setattr("drillctl.ensemble.grid._free_memory", lambda: 1e6)
     assert shape_of(grid(paper, ("controller.kp", 0, 1, 1000))) == (1000,)
     with pytest.raises(InputError, match=r"10,000 cells need about 0\.0 GiB"):
         grid(paper, ("controller.kp", 0, 1, 100), ("controller.ki", 0, 1, 100))
-    monkeypatch.setattr("drillctl.studies.memory._free_memory", lambda: float("inf"))
+    monkeypatch.setattr("drillctl.ensemble.grid._free_memory", lambda: float("inf"))
     assert shape_of(grid(paper, ("controller.kp", 0, 1, 100), ("controller.ki", 0, 1, 100)))
 
 
 def test_axes_given_by_hand_are_refused_too(paper, monkeypatch):
     axes = grid(paper, ("controller.kp", 0, 1, 100))
-    monkeypatch.setattr("drillctl.studies.memory._free_memory", lambda: 1e4)
+    monkeypatch.setattr("drillctl.ensemble.grid._free_memory", lambda: 1e4)
     with pytest.raises(InputError, match="fewer points"):
         sweep(paper, axes)
 
@@ -319,7 +319,7 @@ RAMPED = {"scenario.speed.start": "0 rpm", "scenario.weight_on_bit.start": "0 kN
 
 @pytest.mark.parametrize("case", SCHEMED)
 def test_a_few_lanes_ask_for_the_scheme_of_all(paper, case, monkeypatch):
-    monkeypatch.setattr("drillctl.studies.grid.SEARCHED", 2)
+    monkeypatch.setattr("drillctl.ensemble.grid.SEARCHED", 2)
     design = paper.replace(RAMPED) if case == "programs" else paper
     for group in groups(design, grid(design, *SCHEMED[case])):
         table = group.design.tables.simulation
@@ -341,7 +341,7 @@ def test_a_grid_of_ten_million_cells_is_two_columns(paper):
 
 
 def test_a_sweep_makes_the_lanes_of_one_block_at_a_time(paper, monkeypatch):
-    from drillctl.studies import sweeps
+    from drillctl.ensemble import sweeps
 
     axes = grid(paper, ("controller.kp", 0, 1000, 6), ("controller.ki", 0, 500, 5))
     whole = sweep(paper, axes, audit_cells=0)
@@ -370,7 +370,7 @@ def test_measures_that_are_kept(paper, tmp_path):
 
 
 def test_fewer_measures_are_less_memory(paper, monkeypatch):
-    monkeypatch.setattr("drillctl.studies.memory._free_memory", lambda: 2.5e4)
+    monkeypatch.setattr("drillctl.ensemble.grid._free_memory", lambda: 2.5e4)
     axes = grid(paper, ("controller.kp", 0, 1000, 2))
     large = (axes[0], type(axes[0])("controller.ki", "N*m/rad", np.linspace(0, 1, 50)))
     assert sweep(paper, large, audit_cells=0, measures=["j1"]).j1.shape == (2, 50)

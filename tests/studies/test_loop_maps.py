@@ -7,9 +7,9 @@ import pytest
 
 import drillctl
 from drillctl import units
+from drillctl.ensemble.grid import cell_design
 from drillctl.errors import InputError
 from drillctl.studies import Axis, loop_map
-from drillctl.studies.grid import cell_design
 
 DESIGN = "monteiro-trindade-140kn"
 

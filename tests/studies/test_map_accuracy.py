@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl.ensemble.grid import axes_of, groups
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.studies.diagnosis.error_estimate import PROMISES
-from drillctl.studies.grid import axes_of, groups
 
 HOLDS = (
     (

@@ -8,10 +8,10 @@ from scipy import stats
 
 import drillctl
 from drillctl.design import to_toml
+from drillctl.ensemble.parameters import draw, uncertain_parameters
+from drillctl.ensemble.sampling import Sampling, correlation_root
 from drillctl.errors import InputError
 from drillctl.studies import compare, weight_delay
-from drillctl.studies.draws.parameters import draw, uncertain_parameters
-from drillctl.studies.draws.sampling import Sampling, correlation_root
 
 HOLDS = (
     (

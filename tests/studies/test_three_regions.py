@@ -10,6 +10,7 @@ import pytest
 
 import drillctl
 from drillctl.design.tables import AxisTable
+from drillctl.ensemble.grid import axes_of
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
 from drillctl.linear.operating_point import operating_point
@@ -18,9 +19,8 @@ from drillctl.linear.state_space import closed_loop_matrices
 from drillctl.simulation.measures import STATUSES
 from drillctl.store import claim
 from drillctl.studies import sweep
-from drillctl.studies.grid import axes_of
-from drillctl.studies.three_regions import attraction
-from drillctl.studies.three_regions.study import FIELDS, MASKS, three_regions
+from drillctl.studies.three_regions import compute as attraction
+from drillctl.studies.three_regions.compute import FIELDS, MASKS, three_regions
 
 HOLDS = (
     (

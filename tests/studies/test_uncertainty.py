@@ -8,13 +8,13 @@ import pytest
 
 import drillctl
 from drillctl import units
+from drillctl.ensemble import grid as grid_module
+from drillctl.ensemble import sweeps as sweeps_module
+from drillctl.ensemble.grid import axes_of, cell_design
 from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies import grid as grid_module
-from drillctl.studies import sweeps as sweeps_module
-from drillctl.studies.grid import axes_of, cell_design
 from drillctl.studies.uncertainty import job as job_module
 from drillctl.studies.uncertainty import keeping as keeping_module
 from drillctl.studies.uncertainty import realizations as realizations_module
@@ -350,7 +350,7 @@ def test_slices_of_a_third_axis():
 
 
 def test_contours_of_each_realization(whole):
-    from drillctl.studies.regions import region
+    from drillctl.ensemble.regions import region
 
     expected = region(whole.j1[2], whole.axes, 15.0).polygons
     assert whole.contours(15.0, 2).equals(expected)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import pytest
 
 import drillctl
+from drillctl.ensemble.grid import axes_of
 from drillctl.errors import InputError, SimulationError
-from drillctl.studies.grid import axes_of
 from drillctl.studies.uncertainty import cluster as cluster_module
 from drillctl.studies.uncertainty import keeping as keeping_module
 from drillctl.studies.uncertainty import uncertainty

@@ -10,10 +10,11 @@ import pytest
 
 import drillctl
 from drillctl import units
+from drillctl.ensemble.intervals import share_interval
 from drillctl.errors import InputError
+from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies import compare, weight_delay
-from drillctl.studies.draws.intervals import share_interval
 from drillctl.studies.weight_delay.lanes import Runs, following_design
 from drillctl.studies.weight_delay.limits import (
     EndedShare,
@@ -21,7 +22,6 @@ from drillctl.studies.weight_delay.limits import (
     first_not_negative,
     harmful_from,
 )
-from drillctl.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 
 HOLDS = (
     (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drillctl import plots
-from drillctl.loop_pictures import loop_drawings
+from drillctl.plots.loop_pictures import loop_drawings
 from drillctl.reporting.blocks import Block, Figure, Table, Text
 from drillctl.reporting.gather import Gathered
 from drillctl.reporting.words import NOTHING, number, percent

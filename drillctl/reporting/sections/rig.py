@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from drillctl.design.tables import SectionTable
-from drillctl.drillstring import PIPES
 from drillctl.reporting.blocks import Block, Figure, Table, Text
 from drillctl.reporting.gather import Gathered
 from drillctl.reporting.rig_drawing import rig_drawing
 from drillctl.reporting.words import NOTHING, Words, number
+from drillctl.rig.drillstring import PIPES
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:

@@ -27,6 +27,7 @@ from drillctl.simulation.kernels.drive_step import (
     top_torque_now,
 )
 from drillctl.simulation.kernels.held_rock import hold_rock
+from drillctl.simulation.kernels.lane_step import move_top
 from drillctl.simulation.kernels.laws import contact, law_at, load_block, weight_at
 from drillctl.simulation.kernels.measure_step import (
     Before,
@@ -41,7 +42,6 @@ from drillctl.simulation.kernels.program_step import advance_program, begin_prog
 from drillctl.simulation.kernels.rock_step import meet_rock
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.kernels.string_step import complete_and_propagate, look
-from drillctl.simulation.kernels.top_motion import move_top
 from drillctl.simulation.kernels.weight_step import (
     Memory,
     acting,
@@ -266,7 +266,7 @@ def _compile(on_disk: bool) -> Any:
 def sources() -> list[Path]:
     """Every source that is compiled into the kernels."""
     package = Path(__file__).resolve().parents[2]
-    folders = ("simulation/kernels", "bit_rock", "top_drive", "weight_on_bit")
+    folders = ("simulation/kernels", "rig/bit_rock", "rig/top_drive", "rig/weight_on_bit")
     return [path for folder in folders for path in sorted((package / folder).glob("*.py"))]
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from drillctl.bit_rock import OverWeight
-from drillctl.bit_rock.protocol import Exp
+from drillctl.rig.bit_rock import OverWeight
+from drillctl.rig.bit_rock.protocol import Exp
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import at, put
 from drillctl.simulation.kernels.compiling import by_type, inlined

@@ -13,6 +13,8 @@ is free - gain T_bit, and what is left is one scalar inclusion:
 Every lane takes its own decisions, and its Newton iteration freezes when that lane has converged:
 no lane's bits depend on its neighbours. What takes divisions and happens rarely is done when some
 lane needs it; it leaves the other lanes as they are.
+
+Top speed at the ends of steps, for the drives and observers that ask for it.
 """
 
 from __future__ import annotations
@@ -29,9 +31,11 @@ from drillctl.simulation.kernels.arithmetic import (
     pick,
     put,
 )
-from drillctl.simulation.kernels.compiling import inlined
+from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.drive_step import RealStep, SampledStep
 from drillctl.simulation.kernels.held_rock import rock
 from drillctl.simulation.kernels.laws import contact, kinetic_torque_at_rest, static_torque
+from drillctl.simulation.kernels.observer_step import ObserverStep
 from drillctl.simulation.kernels.weight_step import acting
 
 NEWTON_STEP = 1e-3
@@ -151,3 +155,29 @@ def one_over_one_plus(d: Any) -> Any:
     product = 1.0 - d
     product = product + product * square
     return product + product * (square * square)
+
+
+def asks_for_top(drive: Any, observer: Any) -> bool:
+    """Whether drive or observer, as numba knows them, need the top speed."""
+    return (
+        drive.instance_class in (RealStep, SampledStep) or observer.instance_class is ObserverStep
+    )
+
+
+def move_top(drive: Any, observer: Any, string: Any, swing: Any, work: Any) -> None:
+    """Top speed at the end of the step, where something asks for it."""
+    raise NotImplementedError("compiled only")
+
+
+@by_type(move_top)
+def _move_top(drive, observer, string, swing, work):
+    if not asks_for_top(drive, observer):
+        return lambda drive, observer, string, swing, work: None
+    return lambda drive, observer, string, swing, work: _move(string, swing, work)
+
+
+@inlined
+def _move(string: Any, swing: Any, work: Any) -> None:
+    top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
+    speed = swing.top_speed + string.top_speed_by_top * top - string.top_speed_by_bit * bit
+    put(work, r.TOP_SPEED, speed)

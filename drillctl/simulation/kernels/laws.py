@@ -11,9 +11,8 @@ from typing import Any
 
 from numba import types
 
-from drillctl.simulation.kernels.arithmetic import at, pick, put
+from drillctl.simulation.kernels.arithmetic import at, exp, pick, put
 from drillctl.simulation.kernels.compiling import by_type, inlined
-from drillctl.simulation.kernels.exponential import exp
 from drillctl.simulation.kernels.rows import MOST_FIELDS, WIDTH
 
 

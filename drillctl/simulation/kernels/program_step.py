@@ -1,15 +1,38 @@
-"""What changes by the clock: set speed, nominal weight, rock."""
+"""Numbers of programs as the kernels take them; made in `simulation.step_laws`.
+
+What changes by the clock: set speed, nominal weight, rock.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import any_of, at, least, pick, put
 from drillctl.simulation.kernels.compiling import by_type, compiled, inlined
 from drillctl.simulation.kernels.laws import contact, law_at, load_block, load_where, weight_at
-from drillctl.simulation.kernels.program_numbers import NoProgram
 from drillctl.simulation.kernels.weight_step import acting
+
+
+class NoProgram(NamedTuple):
+    """Nothing changes by the clock."""
+
+    unused: Any  # numba wants a number
+
+
+class Programs(NamedTuple):
+    """`drillctl.rig.program.Program` of every lane."""
+
+    # set speed less the final one (rad/s) up to a time, zero from a time on (s)
+    speed_first: Any
+    speed_begin: Any
+    speed_end: Any
+    # nominal weight over the final one less one, likewise
+    weight_first: Any
+    weight_begin: Any
+    weight_end: Any
+    rock_until: Any  # time until which the rock is another one (s)
+
 
 ROUNDING = 1e-6
 """Share of a step by which a moment that falls on its end may miss it."""

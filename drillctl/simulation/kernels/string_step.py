@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import at, each, fma, put
 from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.lane_step import asks_for_top
 from drillctl.simulation.kernels.rows import WIDTH
-from drillctl.simulation.kernels.top_motion import asks_for_top
 
 
 class UndampedString(NamedTuple):

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from drillctl.rig.weight_on_bit import AlarmWeight, ConstantWeight, RealWeight
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import (
     any_of,
     at,
+    exp,
     gather,
     lane_number,
     least,
@@ -23,11 +25,9 @@ from drillctl.simulation.kernels.arithmetic import (
     rounded_down,
 )
 from drillctl.simulation.kernels.compiling import by_type, inlined
-from drillctl.simulation.kernels.exponential import exp
 from drillctl.simulation.kernels.laws import law_at, moves, weight_at
 from drillctl.simulation.kernels.observer_step import move_observer, read_observer, start_observer
 from drillctl.simulation.kernels.rows import WIDTH
-from drillctl.weight_on_bit import AlarmWeight, ConstantWeight, RealWeight
 
 # The laws' own equations; they read numbers that the laws' steps have too.
 _asked = inlined(RealWeight.command)

@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.bit_rock import PrintedThreeBranch
 from drillctl.design import Design
 from drillctl.errors import InputError
+from drillctl.rig.bit_rock import PrintedThreeBranch
+from drillctl.rig.top_drive import RealDrive, SampledDrive
+from drillctl.rig.weight_on_bit import PATHS
+from drillctl.simulation.lanes import Kind
 from drillctl.simulation.limit_cycle.describing import (
     MODES,
     HarmonicCycle,
@@ -19,9 +22,6 @@ from drillctl.simulation.limit_cycle.describing import (
 )
 from drillctl.simulation.limit_cycle.returns import Returns, judge, long_run
 from drillctl.simulation.limit_cycle.shooting import Orbit
-from drillctl.simulation.start import Kind
-from drillctl.top_drive import RealDrive, SampledDrive
-from drillctl.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     from pathlib import Path

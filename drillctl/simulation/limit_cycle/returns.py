@@ -19,10 +19,10 @@ from scipy.optimize import brentq
 
 from drillctl.design import Design
 from drillctl.errors import SimulationError
+from drillctl.simulation.lanes import Kind
 from drillctl.simulation.limit_cycle.flow import Flow
 from drillctl.simulation.limit_cycle.shooting import Orbit, find_orbit
 from drillctl.simulation.reference import Motion, Piece, solve
-from drillctl.simulation.start import Kind
 
 Array = NDArray[np.float64]
 

@@ -10,18 +10,18 @@ import numpy as np
 
 from drillctl.design import Design, to_toml
 from drillctl.design.validation import validated
+from drillctl.ensemble.audit import Audit
+from drillctl.ensemble.draws import Failures
+from drillctl.ensemble.sweeps import Sweep
 from drillctl.errors import InputError
 from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.measures import Measures
 from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.store.kind import Kind
 from drillctl.store.names import axis_of, stored_name
-from drillctl.studies.audit import Audit
 from drillctl.studies.comparison.cases import case_designs
 from drillctl.studies.comparison.nominal import Nominal, map_dimension, nominal_design
 from drillctl.studies.comparison.study import MEASURES, ComparedCase, Comparison
-from drillctl.studies.draws.lanes import Failures
-from drillctl.studies.sweeps import Sweep
 from drillctl.studies.weight_delay.lanes import MEASURES as DELAY_MEASURES
 from drillctl.studies.weight_delay.lanes import Runs
 from drillctl.studies.weight_delay.study import WeightDelay

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl.design import Design
+from drillctl.ensemble.audit import Audit
+from drillctl.ensemble.grid import Axis
 from drillctl.store.kind import Kind
 from drillctl.store.names import stored_name
-from drillctl.studies.audit import Audit
 from drillctl.studies.diagnosis.error_estimate import ErrorEstimate
 from drillctl.studies.diagnosis.result import Doctor
-from drillctl.studies.grid import Axis
 
 if TYPE_CHECKING:
     import xarray

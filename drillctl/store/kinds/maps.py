@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl.design import Design
+from drillctl.ensemble.audit import Audit, choose_cells
+from drillctl.ensemble.sweeps import Sweep
 from drillctl.simulation.batch import FLOATS
 from drillctl.store.kind import Kind
 from drillctl.store.names import asked_axes, axis_of
-from drillctl.studies.audit import Audit, choose_cells
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
 from drillctl.studies.regularisation import WIDTHS, Regularisation
-from drillctl.studies.sweeps import Sweep
-from drillctl.studies.three_regions.study import FIELDS, MASKS, PAPER_LEVEL, ThreeRegions
+from drillctl.studies.three_regions.compute import FIELDS, MASKS, PAPER_LEVEL, ThreeRegions
 
 if TYPE_CHECKING:
     import xarray

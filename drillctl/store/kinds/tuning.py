@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl.design import Design
+from drillctl.ensemble.audit import Audit
+from drillctl.ensemble.draws import Failures
 from drillctl.store.kind import Kind
 from drillctl.store.names import axis_of, stored_name
-from drillctl.studies.audit import Audit
-from drillctl.studies.draws.lanes import Failures
 from drillctl.studies.robust.baselines import Baseline
 from drillctl.studies.robust.certificate import Certificate
 from drillctl.studies.robust.fresh import FreshRuns

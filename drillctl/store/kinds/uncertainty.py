@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl.design import Design
+from drillctl.ensemble.audit import Audit
+from drillctl.ensemble.draws import Failures
 from drillctl.store.differences import growing_realizations
 from drillctl.store.kind import Kind
 from drillctl.store.names import asked_axes, axis_of, stored_name
 from drillctl.store.realizations import write_uncertainty
-from drillctl.studies.audit import Audit
-from drillctl.studies.draws.lanes import Failures
 from drillctl.studies.uncertainty import Uncertainty
 from drillctl.studies.uncertainty.sensitivity import read_sensitivity
 from drillctl.studies.uncertainty.stopping import Look

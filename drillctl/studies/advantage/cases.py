@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.ensemble.intervals import Interval, mean_interval, share_interval
 from drillctl.progress import Progress
 from drillctl.studies.advantage.equalities import (
     ALL_TERMS,
@@ -20,7 +21,6 @@ from drillctl.studies.advantage.equalities import (
 from drillctl.studies.advantage.measured import Estimate, Fresh, Measured, estimate, less
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import CONSTANT, GAIN, KI, KP, Policies, Policy
-from drillctl.studies.draws.intervals import Interval, mean_interval, share_interval
 
 Array = NDArray[np.float64]
 

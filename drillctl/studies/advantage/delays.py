@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.ensemble.intervals import CONFIDENCE
 from drillctl.progress import Progress
 from drillctl.studies.advantage.cases import Optima, optimum_beside
 from drillctl.studies.advantage.measured import Fresh, estimate, less
 from drillctl.studies.advantage.optimum import Optimum
 from drillctl.studies.advantage.policies import DELAY, Policies, Policy
-from drillctl.studies.draws.intervals import CONFIDENCE
 from drillctl.studies.weight_delay.limits import first_not_negative
 
 Array = NDArray[np.float64]

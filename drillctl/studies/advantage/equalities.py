@@ -15,12 +15,11 @@ import numpy as np
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.ensemble.draws import DrawnLanes, drawn_lanes, matching_shift, run_draws
+from drillctl.ensemble.parameters import draw
 from drillctl.studies.advantage.measured import Measured
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import WEIGHT, Policy
-from drillctl.studies.draws.lanes import DrawnLanes, drawn_lanes
-from drillctl.studies.draws.parameters import draw
-from drillctl.studies.draws.runs import matching_shift, run_draws
 
 ROUNDS = 4
 """Most turns of gains and shift."""

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.studies.draws.intervals import CONFIDENCE, Interval
-from drillctl.studies.draws.lanes import DrawnLanes, Failures, drawn_lanes
-from drillctl.studies.draws.parameters import draw
-from drillctl.studies.draws.runs import DrawnRuns, run_draws
+from drillctl.ensemble.draws import DrawnLanes, DrawnRuns, Failures, drawn_lanes, run_draws
+from drillctl.ensemble.intervals import CONFIDENCE, Interval
+from drillctl.ensemble.parameters import draw
 from drillctl.studies.robust.objective import Objective, objective_of
 
 Array = NDArray[np.float64]

@@ -17,8 +17,8 @@ from drillctl.design import Design, parameter
 from drillctl.design.advantage_tables import GAIN, REAL_PATH
 from drillctl.design.delay_tables import LAW
 from drillctl.design.validation import validated
+from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.errors import InputError
-from drillctl.studies.draws.parameters import refuse_dependent, uncertain_parameters
 from drillctl.studies.robust.tuned import Tuned, put, tuned_parameters
 from drillctl.studies.weight_delay.lanes import LAWS
 

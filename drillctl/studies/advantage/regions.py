@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.ensemble.grid import Axis
+from drillctl.ensemble.sweeps import sweep
 from drillctl.progress import Progress
 from drillctl.studies.advantage.cases import Optima
 from drillctl.studies.advantage.optimum import Optimum
 from drillctl.studies.advantage.policies import GAIN, Policies, Policy
-from drillctl.studies.grid import Axis
 from drillctl.studies.robust.evaluation import Evaluation
-from drillctl.studies.sweeps import sweep
 from drillctl.studies.uncertainty.areas import Area, region_areas
 from drillctl.studies.uncertainty.probability import INNER, OUTER, probability_map
 from drillctl.studies.uncertainty.scatter import Scatter

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from drillctl.design import Design
+from drillctl.ensemble.grid import refuse_too_large
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.studies.advantage.cases import cases, own_optima
@@ -15,7 +16,6 @@ from drillctl.studies.advantage.measured import Fresh
 from drillctl.studies.advantage.policies import SPEED, WEIGHT, Policies, policies
 from drillctl.studies.advantage.regions import regions
 from drillctl.studies.advantage.result import Advantage
-from drillctl.studies.memory import refuse_too_large
 
 
 def advantage(design: Design, progress: Progress = SILENT) -> Advantage:

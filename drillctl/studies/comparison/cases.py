@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from drillctl.design import Design, parameter
+from drillctl.ensemble.parameters import Uncertain, uncertain_parameters
 from drillctl.errors import InputError
-from drillctl.studies.draws.parameters import Uncertain, uncertain_parameters
 
 ALONE = "as designed"
 """Name of the only case of a design without cases."""

@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.ensemble.grid import Axis, axes_of, refuse_too_large, shape_of
+from drillctl.ensemble.sweeps import UNITS, Sweep, sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress, Within
 from drillctl.simulation import Simulation, simulate
 from drillctl.simulation.measures import STATUSES
 from drillctl.simulation.trajectory import SIGNALS
 from drillctl.studies.comparison.cases import in_case
-from drillctl.studies.grid import Axis, axes_of, shape_of
-from drillctl.studies.memory import refuse_too_large
-from drillctl.studies.sweeps import UNITS, Sweep, sweep
 
 if TYPE_CHECKING:
     from drillctl.design.tables import AxisTable

@@ -17,19 +17,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design, to_toml
+from drillctl.ensemble.draws import (
+    DrawnRuns,
+    Failures,
+    drawn_lanes,
+    equalising_shift,
+    run_draws,
+    start_up,
+)
+from drillctl.ensemble.grid import refuse_too_large
+from drillctl.ensemble.intervals import Interval, mean_interval, share_interval
+from drillctl.ensemble.parameters import draw, refuse_dependent, uncertain_parameters
+from drillctl.ensemble.regions import Region, region
+from drillctl.ensemble.sweeps import UNITS
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.comparison.cases import case_designs, in_case, refuse_unequal
 from drillctl.studies.comparison.nominal import Nominal, labelled, nominal_design, nominal_runs
-from drillctl.studies.draws.intervals import Interval, mean_interval, share_interval
-from drillctl.studies.draws.lanes import Failures, drawn_lanes
-from drillctl.studies.draws.parameters import draw, refuse_dependent, uncertain_parameters
-from drillctl.studies.draws.runs import DrawnRuns, equalising_shift, run_draws, start_up
-from drillctl.studies.memory import refuse_too_large
-from drillctl.studies.regions import Region, region
-from drillctl.studies.sweeps import UNITS
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -10,14 +10,13 @@ from typing import Any
 import numba
 import numpy as np
 
-from drillctl.drillstring import Drillstring
 from drillctl.machine import multiply_adds
+from drillctl.rig.drillstring import Drillstring
 from drillctl.simulation.batch import Prepared, run_batch, warm_up
 from drillctl.simulation.cost import count
 from drillctl.simulation.kernels.string_step import DenseString
 from drillctl.simulation.lanes import Lanes
-from drillctl.simulation.propagator import string_step
-from drillctl.simulation.undamped_step import LARGEST_TURN
+from drillctl.simulation.propagator import LARGEST_TURN, string_step
 
 SECONDS = 0.3
 """Least length of a timed run (s)."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design.tables import SimulationTable
-from drillctl.drillstring import Drillstring
+from drillctl.rig.drillstring import Drillstring
 from drillctl.simulation.batch import Prepared
 from drillctl.simulation.propagator import string_step
 from drillctl.simulation.scheme import ACCURACIES, Scheme

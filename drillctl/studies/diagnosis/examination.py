@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.bit_rock import PrintedThreeBranch
 from drillctl.design import Design
+from drillctl.ensemble import audit as auditing
+from drillctl.ensemble.grid import Axis, Group, axes_of, cell_design, groups, shape_of
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
+from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.simulation.batch import Prepared, prepare, run_batch, warm_up
-from drillctl.simulation.scheme_reasons import SchemeReasons, explain
-from drillctl.studies import audit as auditing
 from drillctl.studies.diagnosis.engine_speed import Speed, engine_speed
 from drillctl.studies.diagnosis.error_estimate import (
     PROMISES,
@@ -29,7 +29,7 @@ from drillctl.studies.diagnosis.error_estimate import (
     refined,
 )
 from drillctl.studies.diagnosis.result import Doctor
-from drillctl.studies.grid import Axis, Group, axes_of, cell_design, groups, shape_of
+from drillctl.studies.diagnosis.scheme_reasons import SchemeReasons, explain
 
 Array = NDArray[np.float64]
 

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
+from drillctl.ensemble import audit as auditing
+from drillctl.ensemble.grid import Axis, shape_of
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies import audit as auditing
 from drillctl.studies.diagnosis.error_estimate import (
     PROMISES,
     REFINEMENTS,
     ErrorEstimate,
 )
-from drillctl.studies.grid import Axis, shape_of
 
 if TYPE_CHECKING:
     from pathlib import Path

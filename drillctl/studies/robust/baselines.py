@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design, parameter
+from drillctl.ensemble.grid import Axis
+from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.grid import Axis
 from drillctl.studies.robust.crossings import by_path
 from drillctl.studies.robust.fresh import Fresh, FreshRuns
 from drillctl.studies.robust.judge import Judge
 from drillctl.studies.robust.linear_design import linear_design
 from drillctl.studies.robust.objective import PRICE
 from drillctl.studies.robust.tuned import Tuned
-from drillctl.studies.sweeps import sweep
 
 Array = NDArray[np.float64]
 

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.ensemble.audit import Audit, choose_cells, references
+from drillctl.ensemble.draws import Failures, beyond_the_table
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.audit import Audit, choose_cells, references
-from drillctl.studies.draws.lanes import Failures, beyond_the_table
 from drillctl.studies.robust.fresh import Fresh, FreshRuns
 from drillctl.studies.robust.tolerance import Neighbourhood, Tolerance, neighbourhood, tolerances
 

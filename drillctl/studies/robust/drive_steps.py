@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from drillctl.rig.top_drive import RealDrive
 from drillctl.simulation.kernels.drive_step import SLOWEST
-from drillctl.top_drive import RealDrive
 
 
 class Line(NamedTuple):

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
+from drillctl.ensemble.draws import DrawnGroup, Failures, drawn_lanes
+from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.simulation.batch import Prepared, prepare, run_batch, trace
 from drillctl.simulation.lanes import Lanes
-from drillctl.studies.draws.lanes import DrawnGroup, Failures, drawn_lanes
-from drillctl.studies.draws.parameters import draw
 from drillctl.studies.robust.tuned import (
     LAW_KEYS,
     StringNumbers,

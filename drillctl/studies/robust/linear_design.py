@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.design.tune_tables import TuneConstraintsTable
+from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import tolerated_slope
-from drillctl.studies.draws.parameters import draw
 from drillctl.studies.robust.crossings import by_path, least_seen
 from drillctl.studies.robust.linear_nlp import PRICE, LinearProgram
 from drillctl.studies.robust.loops import Loop, loops_of, refuse_not_linear

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.ends import Ends, ends_of
+from drillctl.linear.ends import Ends, WeightPath, ends_of, weight_path
+from drillctl.linear.loop_margins import TURNS
 from drillctl.linear.operating_point import at_speed
-from drillctl.linear.weight_path import WeightPath, weight_path
-from drillctl.linear.whole_margins import TURNS
+from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 from drillctl.studies.robust.line_data import Grid, grid_of
 from drillctl.studies.robust.tuned import (
     LAW_KEYS,
@@ -31,7 +31,6 @@ from drillctl.studies.robust.tuned import (
     middle,
     string_numbers,
 )
-from drillctl.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 
 Array = NDArray[np.float64]
 

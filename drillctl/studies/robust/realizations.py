@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.ensemble.parameters import Draws
 from drillctl.errors import InputError
-from drillctl.studies.draws.parameters import Draws
 
 
 def designs_at(design: Design, draws: Draws) -> Iterator[Design]:

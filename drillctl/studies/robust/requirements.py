@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design.tune_tables import TuneConstraintsTable
-from drillctl.linear.counting import natural_frequencies
+from drillctl.linear.ends import BitSide
 from drillctl.linear.loop_analysis import ROUNDING
 from drillctl.linear.loop_margins import pole_grid
-from drillctl.linear.loop_model import model_poles
-from drillctl.linear.loop_poles import loop_poles
-from drillctl.linear.weight_path import BitSide
+from drillctl.linear.loop_model import loop_poles, model_poles
+from drillctl.linear.poles import natural_frequencies
 from drillctl.studies.robust.crossings import Crossing, by_path, crossings_of, slope_margin_of
 from drillctl.studies.robust.line_data import chain
 from drillctl.studies.robust.loops import Loop
@@ -114,7 +113,7 @@ class Loops:
         return bool(poles.real.max() < ROUNDING * np.abs(poles).max())
 
     def _path(self, loop: Loop, values: Array) -> Any:
-        from drillctl.linear.weight_path import weight_path
+        from drillctl.linear.ends import weight_path
 
         variant = put(loop.design, self.tuned, values)
         return weight_path(variant, variant.speed)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.ensemble.grid import Axis
 from drillctl.progress import Progress
-from drillctl.studies.grid import Axis
 from drillctl.studies.robust.fresh import Fresh
 from drillctl.studies.robust.tuned import Tuned
 

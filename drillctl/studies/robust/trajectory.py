@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.bit_rock.contact import contact
 from drillctl.design import Design
 from drillctl.errors import InputError
+from drillctl.rig.bit_rock.contact import contact
+from drillctl.rig.top_drive import PI, ConstantTorque, RealDrive
+from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed
 from drillctl.simulation.batch import Prepared
-from drillctl.simulation.lanes import Lanes
-from drillctl.simulation.start import start
+from drillctl.simulation.lanes import Lanes, start
 from drillctl.studies.robust.bit_step import Bit, meet_rock
 from drillctl.studies.robust.drive_steps import Ideal, Real, Top
 from drillctl.studies.robust.string_matrices import StringMatrices, string_matrices
@@ -31,8 +32,6 @@ from drillctl.studies.robust.tuned import (
     drive_numbers,
     string_numbers,
 )
-from drillctl.top_drive import PI, ConstantTorque, RealDrive
-from drillctl.weight_on_bit import ConstantWeight, FollowingSpeed
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drillctl.studies.draws.parameters import uncertain_parameters
+from drillctl.ensemble.parameters import uncertain_parameters
 
 if TYPE_CHECKING:
     import xarray

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.design.tune_tables import RangeTable
-from drillctl.drillstring import Drillstring
 from drillctl.errors import InputError, nearest
 from drillctl.linear.tuning import active_damping, pipe_impedance, stick_slip_frequency
+from drillctl.rig.drillstring import Drillstring
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.ensemble.intervals import CONFIDENCE, mean_interval, share_interval
 from drillctl.errors import InputError
-from drillctl.studies.draws.intervals import CONFIDENCE, mean_interval, share_interval
 from drillctl.studies.uncertainty.objectives import (
     Exceedance,
     Mean,

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.design.validation import validated
+from drillctl.ensemble.draws import beyond_the_table
+from drillctl.ensemble.grid import Axis, parts, shape_of
+from drillctl.ensemble.parameters import drawing
 from drillctl.provenance import provenance
 from drillctl.simulation.batch import Prepared, prepare, warm_up
 from drillctl.simulation.lanes import lane_numbers, lanes_of
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.draws.lanes import beyond_the_table
-from drillctl.studies.draws.parameters import drawing
-from drillctl.studies.grid import Axis, parts, shape_of
 from drillctl.studies.uncertainty.engine import simulate
 from drillctl.studies.uncertainty.realizations import PartOfMap
 from drillctl.studies.uncertainty.strings import Strings

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.ensemble.parameters import uncertain_parameters
+from drillctl.ensemble.sweeps import UNITS
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.draws.parameters import uncertain_parameters
-from drillctl.studies.sweeps import UNITS
 from drillctl.studies.uncertainty.objectives import Mean, Quantile, TailMean
 from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER
 

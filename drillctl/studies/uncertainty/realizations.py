@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.design.tables import SimulationTable
+from drillctl.ensemble.grid import SHARED, Axis, Part, cell_numbers, replaced
 from drillctl.errors import InputError
 from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
-from drillctl.studies.grid import SHARED, Axis, Part, cell_numbers, replaced
 from drillctl.studies.uncertainty.strings import Strings
 
 Array = NDArray[np.float64]

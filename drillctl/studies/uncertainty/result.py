@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.ensemble.audit import Audit
+from drillctl.ensemble.draws import Failures
+from drillctl.ensemble.grid import Axis
+from drillctl.ensemble.regions import Region, region
+from drillctl.ensemble.sampling import sampling_of
 from drillctl.errors import InputError
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.audit import Audit
-from drillctl.studies.draws.lanes import Failures
-from drillctl.studies.draws.sampling import sampling_of
-from drillctl.studies.grid import Axis
-from drillctl.studies.regions import Region, region
 from drillctl.studies.uncertainty.areas import Area, region_areas
 from drillctl.studies.uncertainty.best import (
     NEEDS_FULL,
@@ -261,7 +261,7 @@ class Uncertainty:
             Lanes were stopped, so that the outline between cells is not known; or the map does
             not run over two parameters.
         """
-        from drillctl.studies.regions import outline
+        from drillctl.ensemble.regions import outline
 
         if self.censored[realization].any():
             raise InputError(f"outlines between cells: {NEEDS_FULL}", "contours")

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
+from drillctl.ensemble.intervals import CONFIDENCE
+from drillctl.ensemble.parameters import uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.draws.intervals import CONFIDENCE
-from drillctl.studies.draws.parameters import uncertain_parameters
 from drillctl.studies.uncertainty.best import NEEDS_FULL
 
 Array = NDArray[np.float64]

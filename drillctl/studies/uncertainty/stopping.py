@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design.uncertain_tables import UntilTable
+from drillctl.ensemble.intervals import CONFIDENCE, Interval
 from drillctl.errors import InputError
-from drillctl.studies.draws.intervals import CONFIDENCE, Interval
 from drillctl.studies.uncertainty.areas import region_areas
 from drillctl.studies.uncertainty.probability import probability_map
 from drillctl.studies.uncertainty.scatter import Scatter

@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.design.uncertain_tables import SensitivityTable
+from drillctl.ensemble import audit as auditing
+from drillctl.ensemble.draws import Failures, beyond_the_table, told
+from drillctl.ensemble.grid import Axis, axes_of, cell_design, refuse_more_bytes, shape_of
+from drillctl.ensemble.parameters import drawing
+from drillctl.ensemble.sampling import sampling_of
+from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.batch import FLOATS
-from drillctl.studies import audit as auditing
-from drillctl.studies.draws.lanes import Failures, beyond_the_table, told
-from drillctl.studies.draws.parameters import drawing
-from drillctl.studies.draws.sampling import sampling_of
-from drillctl.studies.grid import Axis, axes_of, cell_design, shape_of
-from drillctl.studies.memory import refuse_more_bytes
-from drillctl.studies.sweeps import sweep
 from drillctl.studies.uncertainty import sensitivity as indices
 from drillctl.studies.uncertainty.job import Drawn, Job, Listed, Source
 from drillctl.studies.uncertainty.keeping import InMemory, Keeping

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.design.delay_tables import VARIED
+from drillctl.ensemble.draws import DrawnGroup, DrawnLanes, drawn_lanes, run_draws
+from drillctl.ensemble.parameters import Draws, uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.draws.lanes import DrawnGroup, DrawnLanes, drawn_lanes
-from drillctl.studies.draws.parameters import Draws, uncertain_parameters
-from drillctl.studies.draws.runs import run_draws
 
 Array = NDArray[np.float64]
 

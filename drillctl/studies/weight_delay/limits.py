@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.studies.draws.intervals import Interval
+from drillctl.ensemble.intervals import Interval
 
 Array = NDArray[np.float64]
 

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.ensemble.draws import Failures
+from drillctl.ensemble.grid import refuse_too_large
+from drillctl.ensemble.intervals import Interval, mean_interval, share_interval
+from drillctl.ensemble.parameters import draw, refuse_dependent, uncertain_parameters
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.draws.intervals import Interval, mean_interval, share_interval
-from drillctl.studies.draws.lanes import Failures
-from drillctl.studies.draws.parameters import draw, refuse_dependent, uncertain_parameters
-from drillctl.studies.memory import refuse_too_large
 from drillctl.studies.weight_delay.lanes import MEASURES, Runs, delayed_lanes, following_design
 from drillctl.studies.weight_delay.limits import (
     EndedShare,
@@ -303,7 +303,7 @@ def weight_delay(
     Notes
     -----
     The law is that of Navarro-Lopez & Suarez, Proc. IEEE CCA (2004) 1454-1460, behind the way of
-    `drillctl.weight_on_bit.RealWeight`.
+    `drillctl.rig.weight_on_bit.RealWeight`.
     """
     begin = time.perf_counter()
     design = _asked(design, gains, delays, realizations)

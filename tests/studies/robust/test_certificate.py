@@ -8,13 +8,12 @@ import pytest
 
 import drillctl
 from drillctl.design import to_toml
+from drillctl.ensemble.audit import reference_j1
+from drillctl.ensemble.draws import drawn_lanes, run_draws
+from drillctl.ensemble.intervals import share_interval
+from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.json_files import strict
-from drillctl.studies.audit import reference_j1
-from drillctl.studies.draws.intervals import share_interval
-from drillctl.studies.draws.lanes import drawn_lanes
-from drillctl.studies.draws.parameters import draw
-from drillctl.studies.draws.runs import run_draws
 from drillctl.studies.robust import search, tune
 from drillctl.studies.robust.certificate import certified
 from drillctl.studies.robust.fresh import Fresh, FreshRuns

@@ -102,7 +102,7 @@ def test_gains_hold_for_a_set_of_strings():
     assert many.excess < alone.excess
     # At the gains of the design alone some string of the set is worse off.
     tuned = tuned_parameters(design)
-    from drillctl.studies.draws.parameters import draw
+    from drillctl.ensemble.parameters import draw
     from drillctl.studies.robust.realizations import designs_at
 
     loops = loops_of([design, *designs_at(design, draw(design, 8, 5))], tuned)

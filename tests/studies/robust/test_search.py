@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl.ensemble.draws import drawn_lanes, run_draws
+from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
-from drillctl.studies.draws.lanes import drawn_lanes
-from drillctl.studies.draws.parameters import draw
-from drillctl.studies.draws.runs import run_draws
 from drillctl.studies.robust.evaluation import Evaluation
 from drillctl.studies.robust.judge import Judge
 from drillctl.studies.robust.search import search

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl.ensemble.draws import drawn_lanes
+from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, run_batch, trace
-from drillctl.studies.draws.lanes import drawn_lanes
-from drillctl.studies.draws.parameters import draw
 from drillctl.studies.robust.trajectory import MEASURED, Trajectories
 from drillctl.studies.robust.tuned import put, tuned_parameters
 

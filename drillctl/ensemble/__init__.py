@@ -1,0 +1,1 @@
+"""Grids and draws run as lanes of the batch engine."""

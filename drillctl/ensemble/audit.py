@@ -1,0 +1,135 @@
+"""Self-audit of a map: some of its cells, simulated again by the reference solver."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.ensemble.grid import Axis, cell_design, shape_of
+from drillctl.errors import SimulationError
+from drillctl.progress import SILENT, Progress
+
+Array = NDArray[np.float64]
+
+SEED = 20121
+"""Seed of the choice of cells: the same map is audited at the same cells."""
+WORST_ALLOWED = 1e-2
+"""Relative difference in J1 above which a map says `audit: look`."""
+TOLERANCE = 1e-7
+"""Tolerance of the reference solver in an audit: J1 to some 1e-7."""
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """Batch engine against reference solver at some cells."""
+
+    cells: NDArray[np.int64]  # shape (audited,): Index in the flattened map
+    # shape (audited,): J1 by either (s); NaN where the reference solver failed
+    batch: Array
+    reference: Array
+
+    @property
+    def differences(self) -> Array:
+        """Relative differences, shape (audited,); NaN where the reference solver failed."""
+        # A rig that never leaves its set speed has J1 = 0, known to the tolerance alone.
+        return np.abs(self.batch - self.reference) / np.maximum(np.abs(self.reference), TOLERANCE)
+
+    @property
+    def worst(self) -> float | None:
+        """Largest relative difference; None if no cell was audited or none could be."""
+        found = self.differences[np.isfinite(self.differences)]
+        return float(found.max()) if found.size else None
+
+    @property
+    def verdict(self) -> str:
+        """`ok`, `look` when a cell differs too much or failed, `none` without audited cells."""
+        if not len(self.cells):
+            return "none"
+        fine = np.isfinite(self.reference).all() and (self.worst or 0.0) <= WORST_ALLOWED
+        return "ok" if fine else "look"
+
+    def summary(self) -> dict[str, Any]:
+        """Number of cells, worst difference, verdict."""
+        return {
+            "cells": len(self.cells),
+            "worst_relative_difference": self.worst,
+            "verdict": self.verdict,
+        }
+
+
+def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> NDArray[np.int64]:
+    """Cells to audit: a seeded random sample, spread over the levels."""
+    flat = np.nan_to_num(values.ravel(), nan=np.inf)
+    random = np.random.default_rng(SEED)
+    edges = [-np.inf, *levels, 2.0 * levels[-1]]
+    bands = [
+        random.permutation(np.flatnonzero((flat > low) & (flat <= high)))
+        for low, high in pairwise(edges)
+    ]
+    # A band gives its last cells first; of a large map they stay in arrays.
+    turns = sorted(
+        (turn, band) for band, cells in enumerate(bands) for turn in range(min(len(cells), count))
+    )
+    chosen = [int(bands[band][-1 - turn]) for turn, band in turns[:count]]
+    return np.array(sorted(chosen), dtype=np.int64)
+
+
+def audit(
+    design: Design,
+    axes: tuple[Axis, ...],
+    values: Array,
+    levels: tuple[float, ...],
+    count: int,
+    progress: Progress = SILENT,
+) -> Audit:
+    """Simulate some cells of a map again with the reference solver, on all cores."""
+    cells = choose_cells(values.reshape(shape_of(axes)), levels, count)
+    designs = [cell_design(design, axes, int(cell)) for cell in cells]
+    reference = references(designs, progress)
+    return Audit(cells, values.ravel()[cells], reference)
+
+
+def references(
+    designs: list[Design], progress: Progress = SILENT, seconds: float = math.inf
+) -> Array:
+    """J1 of designs by the reference solver (s), on all cores; NaN for those that fail."""
+    import joblib
+    import numba
+
+    if not designs:
+        return np.empty(0)
+    progress.begin("auditing cells", len(designs))
+    begin, found = time.perf_counter(), list[float]()
+    # As many as the lanes may use, which is what `--threads` sets.
+    workers = min(len(designs), numba.get_num_threads())
+    at_a_time = len(designs) if math.isinf(seconds) else workers
+    with joblib.Parallel(n_jobs=workers, return_as="generator") as parallel:
+        for first in range(0, len(designs), at_a_time):
+            if time.perf_counter() - begin > seconds:
+                break
+            part = designs[first : first + at_a_time]
+            for value in parallel(joblib.delayed(reference_j1)(d) for d in part):
+                found.append(value)
+                progress.advance(1)
+    return np.array(found)
+
+
+def reference_j1(design: Design) -> float:
+    """J1 of a design by the reference solver (s); NaN if that fails, be it by overflow."""
+    from drillctl.simulation.reference import solve
+    from drillctl.simulation.trajectory import deviation
+
+    table = design.tables.simulation
+    try:
+        with np.errstate(all="ignore"):  # a run that grows without bound is told as failed
+            motion = solve(design, tolerance=TOLERANCE)
+    except (SimulationError, ArithmeticError, np.linalg.LinAlgError):
+        return float("nan")
+    return deviation(motion, table.j1_from, table.duration) / design.speed

@@ -1,0 +1,258 @@
+"""Draws of uncertain parameters as lanes of the batch engine; impossible ones told apart.
+
+Runs of a design at every draw, and the weight on bit that it had on the mean.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.ensemble.grid import SHARED
+from drillctl.ensemble.parameters import Draws
+from drillctl.errors import InputError
+from drillctl.rig.weight_on_bit import AlarmWeight, ConstantWeight
+from drillctl.simulation.batch import FLOATS, Prepared, prepare, run_batch
+from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
+from drillctl.simulation.measures import STATUSES
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnGroup:
+    """Draws that share a string."""
+
+    design: Design  # of the first of them
+    lanes: Lanes  # one a draw
+    numbers: NDArray[np.int64]  # shape (lanes,): Position of each among all draws
+
+
+@dataclass(frozen=True)
+class Failures:
+    """Draws that came to nothing, for one reason."""
+
+    reason: str  # key or cause
+    count: int  # how many draws
+    example: str  # what was said of the first of them
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnLanes:
+    """All draws of a design."""
+
+    # the possible ones; a single group unless a draw changes the string or a law's type
+    groups: tuple[DrawnGroup, ...]
+    failures: tuple[Failures, ...]  # the impossible ones
+
+
+def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
+    """Lanes of a design at every draw."""
+    design = beyond_the_table(design, tuple(draws.values))
+    apart = any(path.startswith(SHARED) for path in draws.values)
+    possible: list[_Drawn] = []
+    errors: list[InputError] = []
+    like: dict[tuple[Any, ...], Design] = {}
+    for number in range(len(draws)):
+        values = {path: units.SI(column[number]) for path, column in draws.values.items()}
+        try:
+            variant = design.replace(values)
+            lane = lane_numbers(variant)
+        except InputError as error:
+            errors.append(error)
+        else:
+            # Thousands of designs would fill the memory; lanes that run together need but one.
+            kind = kinds(variant)
+            kept = variant if apart else like.setdefault(kind, variant)
+            possible.append(_Drawn(number, kept, lane))
+    if not possible:
+        raise InputError(f"every draw is impossible; the first: {errors[0]}", "uncertain")
+    parts = [[one] for one in possible]
+    if not apart:
+        parts = [[one for one in possible if one.design is kept] for kept in like.values()]
+    return DrawnLanes(tuple(_group(part) for part in parts), told(errors))
+
+
+class _Drawn(NamedTuple):
+    """A possible draw: its position, the design of its string, the numbers of its lane."""
+
+    number: int
+    design: Design
+    lane: dict[str, float]
+
+
+def beyond_the_table(design: Design, drawn: tuple[str, ...]) -> Design:
+    """The design with its friction table extrapolated, if the weight on bit is drawn."""
+    table = getattr(design.tables.bit_rock, "table", None)
+    if table is None or "operating_point.weight_on_bit" not in drawn:
+        return design
+    return design.replace({"bit_rock.outside_table": "extrapolate"})
+
+
+def _group(part: list[_Drawn]) -> DrawnGroup:
+    columns = {key: np.array([one.lane[key] for one in part]) for key in part[0].lane}
+    design = part[0].design
+    return DrawnGroup(design, lanes_of(design, columns), np.array([one.number for one in part]))
+
+
+def told(errors: list[InputError]) -> tuple[Failures, ...]:
+    """Errors counted by the key that they name: their numbers differ from draw to draw."""
+    by_key: dict[str, list[InputError]] = {}
+    for error in errors:
+        by_key.setdefault(error.where, []).append(error)
+    return tuple(Failures(key, len(some), some[0].problem) for key, some in by_key.items())
+
+
+Array = NDArray[np.float64]
+
+START_UP = 20.0
+"""Time (s) that `mean_weight_after_start` leaves out, of runs of 100 s and more."""
+START_UP_SHARE = 0.2
+"""And its largest share of shorter runs."""
+EQUAL_TO = 2e-3
+"""Largest relative difference of mean weights that are called equal."""
+SOUGHT_TO = 5e-4
+"""Relative difference that the search for equal weights stops at."""
+MOST_SHIFTS = 40
+"""Shifts of the nominal weight that are tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnRuns:
+    """What was measured at every draw."""
+
+    # shape (draws,): By the names of `simulation.batch.FLOATS`, and `mean_weight_after_start`
+    # (N); NaN where undefined
+    measures: dict[str, Array]
+    status: NDArray[np.int8]  # shape (draws,): Index into `simulation.measures.STATUSES`
+    # scheme; None where it differs from draw to draw
+    step: float | None
+    modes: int | None
+
+
+def start_up(duration: float) -> float:
+    """Time (s) at the beginning of a run that `mean_weight_after_start` leaves out."""
+    return min(START_UP, START_UP_SHARE * duration)
+
+
+def run_draws(drawn: DrawnLanes, count: int, shift: float = 0.0) -> DrawnRuns:
+    """Simulate a design at every draw with the batch engine."""
+    measures = {name: np.full(count, np.nan) for name in (*FLOATS, "mean_weight_after_start")}
+    status = np.full(count, STATUSES.index("failed"), dtype=np.int8)
+    schemes = set()
+    for group in drawn.groups:
+        lanes = shifted(group.lanes, shift)
+        prepared = prepare(lanes, group.design.tables.simulation)
+        batch = run_batch(lanes, prepared)
+        schemes.add((prepared.scheme.step, prepared.scheme.modes))
+        for name in FLOATS:
+            measures[name][group.numbers] = batch.measures[name]
+        whole = batch.measures["mean_weight_on_bit"]
+        measures["mean_weight_after_start"][group.numbers] = _after_start(lanes, prepared, whole)
+        status[group.numbers] = batch.status
+    step, modes = next(iter(schemes)) if len(schemes) == 1 else (None, None)
+    return DrawnRuns(measures, status, step, modes)
+
+
+def _after_start(lanes: Lanes, prepared: Prepared, whole: Array) -> Array:
+    """Mean weight (N) after the start: the mean of the whole run less that of its beginning.
+
+    The beginning is run again by itself. That is the same trajectory, step for step, and the
+    kernel needs no second window that every other study would pay for.
+    """
+    scheme = prepared.scheme
+    steps = round(start_up(prepared.duration) / scheme.step)
+    if isinstance(lanes.weight, ConstantWeight) or not 0 < steps < scheme.steps:
+        return whole
+    time = steps * scheme.step
+    beginning = Prepared(prepared.stepper, replace(scheme, steps=steps), time, 0.0)
+    before = run_batch(lanes, beginning).measures["mean_weight_on_bit"]
+    late: Array = (whole * prepared.duration - before * time) / (prepared.duration - time)
+    return late
+
+
+def shifted(lanes: Lanes, shift: float) -> Lanes:
+    """Lanes whose law of the weight on bit has its nominal weight shifted (N)."""
+    if shift == 0.0:
+        return lanes
+    return replace(lanes, weight=lanes.weight._replace(nominal=lanes.weight.nominal + shift))
+
+
+def equalising_shift(drawn: DrawnLanes, count: int) -> float:
+    """Shift of the nominal weight (N) at which the mean weight on bit is the nominal one.
+
+    Means over the draws; that of the weight over each run after its start.
+    """
+    if isinstance(drawn.groups[0].lanes.weight, ConstantWeight):
+        return 0.0
+    target = _nominal(drawn)
+    shift, error = matching_shift(drawn, count, "mean_weight_after_start", target)
+    if abs(error) > EQUAL_TO:
+        raise InputError(
+            f"within its limits the law cannot have a mean weight of {target / 1e3:g} kN: at the "
+            f"nominal weight shifted by {shift / 1e3:g} kN it has {(1 + error) * target / 1e3:g}",
+            "weight_on_bit",
+        )
+    return shift
+
+
+def matching_shift(
+    drawn: DrawnLanes, count: int, measure: str, target: float
+) -> tuple[float, float]:
+    """Shift of the nominal weight at which the mean of a measure over the draws is a given one."""
+    low, high = _allowed(drawn)
+
+    def excess(shift: float) -> float:
+        found = run_draws(drawn, count, shift).measures[measure]
+        if np.isnan(found).all():
+            raise InputError("no draw gives a finite answer", "weight_on_bit")
+        return float(np.nanmean(found)) / target - 1.0
+
+    return _zero(excess, low, high, _nominal(drawn))
+
+
+def _nominal(drawn: DrawnLanes) -> float:
+    """Mean over the draws of the nominal weight (N)."""
+    return float(np.mean(np.concatenate([g.lanes.nominal_weight for g in drawn.groups])))
+
+
+def _allowed(drawn: DrawnLanes) -> tuple[float, float]:
+    """Shifts (N) that keep the nominal weight of every draw within the limits of its law."""
+    laws = [group.lanes.weight for group in drawn.groups]
+    if isinstance(laws[0], AlarmWeight):  # its least weight is a share of the nominal one
+        return max(float(np.max(-law.nominal)) for law in laws), math.inf
+    low = max(float(np.max(law.least - law.nominal)) for law in laws)
+    high = min(float(np.min(law.most - law.nominal)) for law in laws)
+    return low, high
+
+
+def _zero(
+    excess: Callable[[float], float], low: float, high: float, scale: float
+) -> tuple[float, float]:
+    """Where the excess vanishes, and what is left of it; the nearest found if it does not."""
+    known = {0.0: excess(0.0)}
+    stride = 1.0
+    while len(known) < MOST_SHIFTS:
+        best = min(known, key=lambda shift: abs(known[shift]))
+        if abs(known[best]) <= SOUGHT_TO:
+            break
+        under = max((s for s, e in known.items() if e < 0.0), default=None)
+        over = min((s for s, e in known.items() if e > 0.0), default=None)
+        if under is not None and over is not None:
+            share = known[under] / (known[under] - known[over])
+            # Not too near an end: the mean jumps where a draw begins to stick.
+            trial = under + (over - under) * min(max(share, 0.1), 0.9)
+        else:
+            # More weight, more mean weight, at about the same rate.
+            trial = min(max(best - stride * known[best] * scale, low), high)
+            stride *= 1.5
+        if trial in known:
+            break
+        known[trial] = excess(trial)
+    best = min(known, key=lambda shift: abs(known[shift]))
+    return best, known[best]

@@ -1,0 +1,340 @@
+"""Uncertain parameters of a design, and draws from them that anyone can make again.
+
+The numbers behind a draw are a function of seed and number of the draw alone (`sampling.py`):
+draw 17 is the same whether 20 or 20,000 are asked for, in one go or in blocks. Two designs drawn
+with one seed are thus under the same conditions (common random numbers), and their difference is
+known far better than either of them.
+
+A draw that no rig has, such as a static friction below the sliding one, is neither clipped nor
+drawn again: that would change the distribution that was asked for. It is a failed run with a
+reason, counted; see `lanes.py`. Only a normal distribution, which has no ends of its own,
+is truncated at what its key allows; one with ends beyond that is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design, Parameter, parameter
+from drillctl.design.tables import DistributionTable
+from drillctl.ensemble.sampling import correlated, correlation_root, sampling_of
+from drillctl.errors import InputError
+
+Array = NDArray[np.float64]
+
+DEFAULT_COV = 0.05
+"""Coefficient of variation of the rock where a design names nothing uncertain."""
+DEFAULT_PATHS = {
+    "navarro-lopez-suarez": ("bit_rock.a1_factor", "bit_rock.a2_factor"),
+    "printed-three-branch": ("bit_rock.a1_factor", "bit_rock.a2_factor"),
+    "bit-radius-friction": ("bit_rock.sliding_coefficient", "bit_rock.static_coefficient"),
+    "stribeck": ("bit_rock.sliding_coefficient", "bit_rock.static_coefficient"),
+    "jansen-van-den-steen": ("bit_rock.a1", "bit_rock.a2"),
+    "coulomb": ("bit_rock.a",),
+    "tucker-wang": ("bit_rock.a",),
+}
+"""What is uncertain where a design names nothing: sliding and static torque of the rock,
+lognormal about the design's own values."""
+
+FAR = 8.0
+"""Standard deviations beyond which a limit cuts nothing off a normal distribution."""
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """An uncertain parameter, its numbers read and checked."""
+
+    path: str  # dotted path of the parameter
+    unit: str  # unit of its values, empty for factors
+    distribution: str  # {'lognormal', 'normal', 'uniform', 'beta', 'triangular', 'samples'}: Family
+    # mean (SI) and coefficient of variation; None for a distribution between limits
+    mean: float | None
+    cov: float | None
+    # limits and mode (SI); None for a distribution without limits, or without mode
+    low: float | None
+    high: float | None
+    mode: float | None
+    own_mean: bool  # whether the mean is the design's own value, not one that was written
+    samples: tuple[float, ...] = ()  # increasing (SI), of a distribution that is these
+
+    def law(self) -> Any:
+        """The distribution as SciPy has it, frozen; samples have none."""
+        from scipy import stats  # half a second that a map need not wait for
+
+        return getattr(self, f"_{self.distribution}")(stats)
+
+    def values(self, probabilities: Array) -> Array:
+        """Values (SI) at probabilities within (0, 1), of the same shape."""
+        if self.samples:
+            number = np.ceil(probabilities * len(self.samples)).astype(int) - 1
+            return np.asarray(self.samples)[np.maximum(number, 0)]
+        found: Array = np.asarray(self.law().ppf(probabilities), dtype=float)
+        return found
+
+    def _normal(self, stats: Any) -> Any:
+        deviation = self.cov * abs(self.mean)  # type: ignore[operator, arg-type]
+        ends = [
+            sign * np.inf if end is None else (end - self.mean) / deviation  # type: ignore[operator]
+            for end, sign in ((self.low, -1.0), (self.high, 1.0))
+        ]
+        if ends[0] < -FAR and ends[1] > FAR:
+            return stats.norm(self.mean, deviation)
+        return stats.truncnorm(*ends, self.mean, deviation)
+
+    def _lognormal(self, stats: Any) -> Any:
+        variance = np.log1p(self.cov**2)  # type: ignore[operator]
+        return stats.lognorm(np.sqrt(variance), scale=self.mean * np.exp(-0.5 * variance))
+
+    def _uniform(self, stats: Any) -> Any:
+        return stats.uniform(self.low, self.high - self.low)  # type: ignore[operator]
+
+    def _triangular(self, stats: Any) -> Any:
+        width = self.high - self.low  # type: ignore[operator]
+        place = (self.mode - self.low) / width  # type: ignore[operator]
+        return stats.triang(place, self.low, width)
+
+    def _beta(self, stats: Any) -> Any:
+        width = self.high - self.low  # type: ignore[operator]
+        place = (self.mean - self.low) / width  # type: ignore[operator]
+        total = place * (1.0 - place) / (self.cov * self.mean / width) ** 2 - 1.0  # type: ignore[operator]
+        return stats.beta(place * total, (1.0 - place) * total, self.low, width)
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Draws of the uncertain parameters of a design.
+
+    Attributes
+    ----------
+    seed : int
+        What they follow from.
+    first : int
+        Number of the first of them.
+    parameters : tuple of Uncertain
+        What was drawn.
+    values : dict of ndarray, shape (draws,)
+        By dotted path, SI.
+    """
+
+    seed: int
+    first: int
+    parameters: tuple[Uncertain, ...]
+    values: dict[str, Array]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.values.values())))
+
+
+def draw(design: Design, count: int, seed: int, first: int = 0) -> Draws:
+    """Draw the uncertain parameters of a design.
+
+    Parameters
+    ----------
+    design : Design
+        Its `[uncertain]` tables, or the defaults of `DEFAULT_PATHS`.
+    count : int
+        How many draws.
+    seed : int
+        What they follow from.
+    first : int
+        Number of the first: blocks of draws are pieces of one sequence.
+
+    Raises
+    ------
+    InputError
+        As for `uncertain_parameters` and `sampling.correlation_root`.
+    """
+    return drawing(design, seed)(count, first)
+
+
+def refuse_dependent(design: Design) -> None:
+    """Refuse (`InputError`) a sampling whose draws are not independent of each other."""
+    kind = design.tables.uncertainty.sampling
+    if kind != "monte-carlo":
+        raise InputError(
+            f"{kind!r} is for `drillctl uncertainty`; intervals here are of independent draws: "
+            "monte-carlo",
+            "uncertainty.sampling",
+        )
+
+
+def drawing(design: Design, seed: int) -> Callable[[int, int], Draws]:
+    """A function of count and first that draws; what it draws from is read once."""
+    found = uncertain_parameters(design)
+    table = design.tables.uncertainty
+    paths = tuple(p.path for p in found)
+    root = correlation_root(table, paths)
+    sampling = sampling_of(table, seed)
+
+    def drawn(count: int, first: int) -> Draws:
+        points = sampling.points(paths, count, first)
+        if root is not None:
+            points = correlated(points, root)
+        return Draws(seed, first, found, {p.path: p.values(points[p.path]) for p in found})
+
+    return drawn
+
+
+def uncertain_parameters(design: Design) -> tuple[Uncertain, ...]:
+    """What is uncertain in a design.
+
+    Parameters
+    ----------
+    design : Design
+        Its `[uncertain]` tables, or the defaults of `DEFAULT_PATHS`.
+
+    Raises
+    ------
+    InputError
+        An unknown path, one that is not a number of the rig, a wrong unit, or a distribution
+        that does not exist; or nothing named and no default for the law of the rock.
+    """
+    tables = design.tables.uncertain or _defaults(design)
+    found = []
+    for path, table in tables.items():
+        where = f"{design.origin}: uncertain.{path}" if design.origin else f"uncertain.{path}"
+        try:
+            found.append(_read(design, path, table))
+        except InputError as error:
+            key = error.where if error.where != path else ""
+            raise InputError(error.problem, f"{where}.{key}" if key else where) from None
+    return tuple(found)
+
+
+def _defaults(design: Design) -> dict[str, DistributionTable]:
+    law = design.tables.bit_rock.law
+    if law not in DEFAULT_PATHS:
+        raise InputError(
+            f"nothing is named uncertain, and there is no default for the friction law {law!r}; "
+            'give a table such as [uncertain."operating_point.weight_on_bit"]',
+            "uncertain",
+        )
+    table = DistributionTable(distribution="lognormal", cov=DEFAULT_COV)
+    return dict.fromkeys(DEFAULT_PATHS[law], table)
+
+
+def _read(design: Design, path: str, table: DistributionTable) -> Uncertain:
+    target = parameter(design, path)
+    if path.startswith("simulation."):
+        raise InputError("is how a run is computed, not a parameter of the rig")
+    if target.whole:
+        raise InputError("takes whole numbers only and cannot be drawn")
+    numbers = {key: _number(target, key, getattr(table, key)) for key in _NUMBERS}
+    mean, low, high, mode = numbers.values()
+    samples = tuple(sorted(_sample(target, value) for value in table.samples or ()))
+    own = table.cov is not None and mean is None
+    if own:
+        if target.value is None:
+            raise InputError("the design gives it no value of its own: give a mean", "mean")
+        mean = target.value
+    _refuse_impossible(table, mean, low, high, mode)
+    if table.distribution in _SYMMETRIC and table.cov is not None:
+        half = _SYMMETRIC[table.distribution] * table.cov * abs(mean or 0.0)
+        low, high = (mean or 0.0) - half, (mean or 0.0) + half
+    if table.distribution == "triangular" and mode is None:
+        mode = 0.5 * (low + high)  # type: ignore[operator]
+    if table.distribution == "normal":
+        low, high = _limits(target, mean or 0.0, low, high)
+    _refuse_ends(target, table, low, high, mean, samples)
+    return Uncertain(
+        path, target.si_unit, table.distribution, mean, table.cov, low, high, mode, own, samples
+    )
+
+
+_NUMBERS = ("mean", "min", "max", "mode")
+_SYMMETRIC = {"uniform": 3.0**0.5, "triangular": 6.0**0.5}
+"""Half the width of a distribution over its standard deviation."""
+
+
+def _number(target: Parameter, key: str, written: object) -> float | None:
+    try:
+        return None if written is None else target.parse(written)
+    except InputError as error:
+        raise InputError(error.problem, key) from None
+
+
+def _sample(target: Parameter, written: object) -> float:
+    found = _number(target, "samples", written)
+    problem = target.refusal(found or 0.0)
+    if problem:
+        raise InputError(f"{written}: {problem}", "samples")
+    return found or 0.0
+
+
+def _limits(
+    target: Parameter, mean: float, low: float | None, high: float | None
+) -> tuple[float | None, float | None]:
+    """Limits of a normal distribution: those given, else those of what its key allows."""
+    just = 1e-6 * abs(mean)
+    if low is None and target.refusal(-just):
+        low = 0.0
+    if high is None and not target.refusal(1.0) and target.refusal(1.0 + 1e-6):
+        high = 1.0
+    return low, high
+
+
+def _refuse_impossible(
+    table: DistributionTable,
+    mean: float | None,
+    low: float | None,
+    high: float | None,
+    mode: float | None,
+) -> None:
+    """Refuse numbers (SI) that no distribution has."""
+    if mean is not None and table.distribution == "lognormal" and not mean > 0.0:
+        raise InputError(f"{mean:g} is impossible: a lognormal mean is greater than 0", "mean")
+    if mean is not None and mean == 0.0:
+        raise InputError("0 with a coefficient of variation does not vary; give uniform", "mean")
+    if low is not None and high is not None and not low < high:
+        raise InputError(f"{table.min} must be less than max {table.max}", "min")
+    if mode is not None and not (low or 0.0) <= mode <= (high or 0.0):
+        raise InputError(f"{table.mode} must lie between min and max", "mode")
+    if table.distribution == "beta":
+        _refuse_impossible_beta(mean or 0.0, table.cov or 0.0, low or 0.0, high or 0.0)
+
+
+def _refuse_impossible_beta(mean: float, cov: float, low: float, high: float) -> None:
+    if not low < mean < high:
+        raise InputError(f"{mean:g} must lie between min and max", "mean")
+    widest = ((mean - low) * (high - mean)) ** 0.5 / abs(mean)
+    if not cov < widest:
+        raise InputError(
+            f"{cov:g} is impossible: between these limits, about this mean, it is less than "
+            f"{widest:.3g}",
+            "cov",
+        )
+
+
+def _refuse_ends(
+    target: Parameter,
+    table: DistributionTable,
+    low: float | None,
+    high: float | None,
+    mean: float | None,
+    samples: tuple[float, ...],
+) -> None:
+    """Refuse a distribution that reaches values which its key does not allow."""
+    if table.distribution == "samples" and not samples:
+        raise InputError("holds nothing to draw from", "samples")
+    if table.distribution == "normal":
+        assert mean is not None
+        inside = (low is None or low <= mean) and (high is None or mean <= high)
+        if not inside or target.refusal(mean):
+            problem = target.refusal(mean) or "it must lie between min and max"
+            raise InputError(f"{mean:g} {target.si_unit}".strip() + f": {problem}", "mean")
+    open_end = table.distribution in ("normal", "beta", "uniform", "triangular")
+    for key, end, inward in (("min", low, 1.0), ("max", high, -1.0)):
+        # An end itself is drawn with probability zero: just inside is what counts.
+        span = abs(mean or 1.0) if low is None or high is None else high - low
+        if end is None or not open_end:
+            continue
+        impossible = target.refusal(end + inward * 1e-9 * span)
+        if impossible:
+            told = getattr(table, key) or f"a spread down to {end:g}"
+            reason = impossible.partition(": ")[2] or problem
+            raise InputError(f"{told} reaches impossible values: {reason}", key)

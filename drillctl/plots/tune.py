@@ -1,0 +1,186 @@
+"""Tuned gains beside other gains and laws at the same fresh realizations.
+
+How far tuned gains may drift: probability about the optimum, with the tolerance of each.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from drillctl import units
+from drillctl.plots.style import (
+    BLACK,
+    BLUE,
+    LINE,
+    SMALL,
+    VERMILLION,
+    axes_or_new,
+    axis_label,
+    dress,
+    grid_or_new,
+    legend_under,
+    origin_of,
+    title_of,
+)
+
+if TYPE_CHECKING:
+    from drillctl.studies.robust import Tune
+    from drillctl.studies.robust.fresh import FreshRuns
+
+ROW = 0.42
+"""Height of a row (inches)."""
+WIDEST = 120
+"""Longest line of a caption (characters)."""
+
+
+def tune_baselines(result: Tune, ax: Sequence[Axes] | None = None) -> Figure:
+    """Quantiles of J1 and the probability of the level, a row the tuned gains and each baseline.
+
+    Parameters
+    ----------
+    result : Tune
+        Any.
+    ax : sequence of Axes, optional
+        Two panels to draw on.
+
+    Returns
+    -------
+    Figure
+        Baselines that do not apply are left out.
+    """
+    rows: dict[str, FreshRuns] = {"tuned": result.certificate.runs}
+    rows |= {one.name: one.runs for one in result.baselines if one.runs is not None}
+    figure, (left, right) = grid_or_new(ax, 1, 2, 9.5, 2.0 + ROW * len(rows), share_y=True)
+    for place, (name, runs) in enumerate(rows.items()):
+        colour = VERMILLION if name == "tuned" else BLUE
+        _spread(left, place, runs, colour)
+        low, high = runs.interval
+        right.plot([low, high], [place, place], "-", color=colour, linewidth=2.2)
+        right.plot(runs.probability, place, "o", color=colour, markersize=5.5)
+    level, required = result.certificate.runs.level, result.certificate.required
+    left.axvline(level, color=BLACK, linewidth=1.0, linestyle="--")
+    right.axvline(required, color=BLACK, linewidth=1.0, linestyle="--")
+    left.set_yticks(range(len(rows)), list(rows))
+    left.set_ylim(len(rows) - 0.5, -0.5)
+    left.set_xlim(left=0.0)
+    right.set_xlim(-0.03, 1.03)
+    dress(left, "J1 (s)", "", title_of(result))
+    dress(right, f"probability that J1 is at or under {level:g} s", "")
+    right.tick_params(labelleft=False)
+    text = (
+        f"{origin_of(result)}{len(result.certificate.runs.j1)} fresh realizations (seed "
+        f"{result.certificate.seed}). Left: 5 to 95 % (line), 25 to 75 % (bar), median (dot); "
+        "right: 95 % intervals. Dashed: level and required probability."
+    )
+    figure.supxlabel("\n".join(textwrap.wrap(text, WIDEST)), fontsize=SMALL)
+    return figure
+
+
+def _spread(ax: Axes, place: int, runs: FreshRuns, colour: str) -> None:
+    """Quantiles of J1 on a row, those that are finite."""
+    found = {name: value for name, value in runs.quantiles.items() if np.isfinite(value)}
+    for low, high, width in (("q05", "q95", 1.6), ("q25", "q75", 7.0)):
+        if low in found and high in found:
+            ax.plot(
+                [found[low], found[high]], [place, place], "-", color=colour, linewidth=width,
+                solid_capstyle="butt", alpha=0.55 if width > 2.0 else 1.0,
+            )  # fmt: skip
+    if "q50" in found:
+        ax.plot(found["q50"], place, "o", color=colour, markeredgecolor="white", markersize=6.5)
+
+
+WIDEST_NEIGHBOURHOOD = 105
+"""Longest line of a caption (characters)."""
+
+
+def tune_neighbourhood(result: Tune, ax: Axes | None = None, system: units.System = "si") -> Figure:
+    """Probability of the level over the first two tuned parameters, or the only one.
+
+    Parameters
+    ----------
+    result : Tune
+        Over any number of parameters; the others stay at the optimum.
+    ax : Axes, optional
+        Axes to draw on.
+    system : {'si', 'field'}
+        Units of the axes.
+
+    Returns
+    -------
+    Figure
+        The contour is that of the required probability; bars are how far each parameter may
+        drift alone, an arrow where the bound of the search ends it.
+    """
+    figure, ax = axes_or_new(ax, 8.0, 6.0)
+    about = result.certificate.neighbourhood
+    lines = [axis_label(axis, system) for axis in about.axes]
+    name = f"probability that J1 is at or under {result.certificate.runs.level:g} s"
+    if len(lines) == 1:
+        (x, label), shares = lines[0], about.probability
+        ax.plot(x, shares, "-", color=BLACK, linewidth=LINE)
+        ax.axhline(result.certificate.required, color=BLACK, linewidth=0.9, linestyle="--")
+        ax.set_ylim(-0.02, 1.02)
+        dress(ax, label, name, title_of(result))
+        _bars(result, ax, system, [result.certificate.runs.probability])
+    else:
+        (x, x_label), (y, y_label) = lines
+        _map(result, figure, ax, x, y, name)
+        dress(ax, x_label, y_label, title_of(result))
+        ax.grid(visible=False)
+        _bars(result, ax, system, [])
+    legend_under(ax, 3)
+    text = (
+        f"{origin_of(result)}{about.realizations} of {len(result.certificate.runs.j1)} fresh "
+        f"realizations (seed {result.certificate.seed}) in the background, all of them for the "
+        f"bars. Dashed: probability {result.certificate.required:g}."
+    )
+    figure.supxlabel("\n".join(textwrap.wrap(text, WIDEST_NEIGHBOURHOOD)), fontsize=SMALL)
+    return figure
+
+
+def _map(
+    result: Tune, figure: Figure, ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64],
+    name: str,
+) -> None:  # fmt: skip
+    shares = result.certificate.neighbourhood.probability
+    mesh = ax.pcolormesh(
+        x, y, shares.T, cmap="cividis", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True
+    )
+    bar = figure.colorbar(mesh, ax=ax, pad=0.02)
+    bar.set_label(name)
+    bar.ax.tick_params(labelsize=SMALL)
+    required = result.certificate.required
+    if shares.min() < required <= shares.max():
+        ax.contour(
+            x, y, shares.T, levels=[required], colors=BLACK, linewidths=LINE, linestyles="--"
+        )
+
+
+def _bars(result: Tune, ax: Axes, system: units.System, height: list[float]) -> None:
+    """The optimum, and how far each shown parameter may drift alone."""
+    tolerances = result.certificate.tolerances[: len(result.certificate.neighbourhood.axes)]
+    centre = [float(units.displayed(one.value, one.unit, system)[0]) for one in tolerances]
+    place = [*centre, *height]
+    for k, one in enumerate(tolerances):
+        ends = [float(units.displayed(end, one.unit, system)[0]) for end in (one.low, one.high)]
+        line = [list(place), list(place)]
+        line[0][k], line[1][k] = ends
+        (x0, y0), (x1, y1) = line
+        label = "each may drift alone" if k == 0 else None
+        ax.plot([x0, x1], [y0, y1], "-", color=VERMILLION, linewidth=2.0, label=label)
+        for (x, y), bound, arrow in zip(
+            line, (one.low_at_bound, one.high_at_bound), ("<v"[k], ">^"[k]), strict=True
+        ):
+            marker = arrow if bound else "|_"[k]
+            ax.plot(x, y, marker, color=VERMILLION, markersize=9.0, markeredgewidth=2.0)
+    ax.plot(
+        *place, "*", color=VERMILLION, markeredgecolor="white", markersize=15.0,
+        label=f"tuned, {result.certificate.runs.probability:.3f}",
+    )  # fmt: skip

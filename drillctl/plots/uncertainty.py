@@ -1,0 +1,427 @@
+"""Under uncertainty: areas against the number of draws, J1 at chosen cells, Sobol indices.
+
+Regions of a map under uncertainty: bands of probability, and what is not known of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from drillctl import units
+from drillctl.errors import InputError
+from drillctl.plots.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    DASHES,
+    LINE,
+    NAMES,
+    SMALL,
+    VERMILLION,
+    axes_or_new,
+    axis_label,
+    dress,
+    grid_or_new,
+    title_of,
+)
+from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER, needed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from drillctl.studies import Uncertainty
+
+
+BEST = ("mean", "q95")
+"""Objectives whose best cells are shown unless others are chosen."""
+
+
+def area_convergence(result: Uncertainty, ax: Axes | None = None) -> Figure:
+    """Area of the 95 % regions against the number of draws, with its sampling error.
+
+    Parameters
+    ----------
+    result : Uncertainty
+        Any map.
+    ax : Axes, optional
+        Axes to draw on.
+    """
+    figure, ax = axes_or_new(ax)
+    curves = result.convergence
+    for k, (level, areas) in enumerate(curves.areas.items()):
+        colour = COLOURS[k % len(COLOURS)]
+        value = 100.0 * np.array([one.value for one in areas])
+        low, high = (100.0 * np.array([one.interval[end] for one in areas]) for end in (0, 1))
+        # Side by side: intervals of several levels overlap.
+        at = np.array(curves.counts) * 2.0 ** (0.08 * (k - 0.5 * (len(curves.areas) - 1)))
+        ax.errorbar(
+            at, value, yerr=np.maximum([value - low, high - value], 0.0), marker="o",
+            markersize=4, capsize=3, elinewidth=1.0, color=colour, linewidth=LINE,
+            linestyle=DASHES[k % len(DASHES)], label=f"J1 <= {level:g} s",
+        )  # fmt: skip
+    if len(curves.counts) > 1:
+        ax.set_xscale("log", base=2)
+        ax.set_xticks(curves.counts, [f"{count:,}" for count in curves.counts])
+        ax.minorticks_off()
+    title = title_of(result)
+    dress(ax, "draws", "area of the 95 % region (% of the map)", title)
+    ax.legend(fontsize=SMALL, frameon=False)
+    figure.supxlabel(
+        "bars: 95 % interval of the sampling error, at each number of draws by itself",
+        fontsize=SMALL,
+    )
+    return figure
+
+
+def cell_distributions(
+    result: Uncertainty,
+    cells: Sequence[int] | None = None,
+    ax: Axes | None = None,
+    system: units.System = "si",
+) -> Figure:
+    """Distribution of J1 over the draws at some cells of the map.
+
+    Parameters
+    ----------
+    result : Uncertainty
+        Any map.
+    cells : sequence of int, optional
+        Of the flattened map; by default the best of the design itself, and those of `BEST`.
+    ax : Axes, optional
+        Axes to draw on.
+    system : {'si', 'field'}
+        Units of the parameters.
+    """
+    figure, ax = axes_or_new(ax)
+    named = _named(result) if cells is None else dict.fromkeys(cells, "")
+    j1 = result.j1.reshape(result.realizations, -1)
+    top = 2.0 * result.levels[-1] if not result.censored.any() else result.levels[-1]
+    for k, (cell, name) in enumerate(named.items()):
+        column = np.sort(np.nan_to_num(j1[:, cell], nan=np.inf))
+        share = np.arange(1, len(column) + 1) / len(column)
+        place = ", ".join(
+            f"{NAMES.get(a.path, a.path)} {_shown(result, cell, a.path, system)}"
+            for a in result.axes
+        )
+        ax.step(
+            [0.0, *column, top], [0.0, *share, share[-1]], where="post", linewidth=LINE,
+            color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)],
+            label=f"{place}{f' ({name})' if name else ''}",
+        )  # fmt: skip
+    for level in result.levels:
+        ax.axvline(level, color="#888888", linewidth=0.8, linestyle="--")
+    ax.axhline(0.95, color="#BBBBBB", linewidth=0.8)
+    ax.set_xlim(0.0, top)
+    ax.set_ylim(0.0, 1.02)
+    dress(ax, "J1 (s)", "share of the draws at or under it",
+          title_of(result))  # fmt: skip
+    ax.legend(fontsize=SMALL, frameon=False, loc="lower right")
+    figure.supxlabel(f"{result.realizations} draws; levels dashed", fontsize=SMALL)
+    return figure
+
+
+def _named(result: Uncertainty) -> dict[int, str]:
+    """Cells worth a look, with what they are best by."""
+    found: dict[int, list[str]] = {}
+    if not np.isnan(result.nominal).all():
+        found.setdefault(int(np.nanargmin(result.nominal)), []).append("J1 without draws")
+    for name in BEST:
+        try:
+            found.setdefault(result.best(name).cell, []).append(name)
+        except InputError:  # not known without --full
+            continue
+    return {cell: f"best by {', '.join(names)}" for cell, names in found.items()}
+
+
+def _shown(result: Uncertainty, cell: int, path: str, system: units.System) -> str:
+    unit = next(a.unit for a in result.axes if a.path == path)
+    value, label = units.displayed(result.at(cell)[path], unit, system)
+    return f"{value:g} {label}".rstrip()
+
+
+def sensitivity_bars(result: Uncertainty, ax: Sequence[Axes] | None = None) -> Figure:
+    """First and total Sobol indices with their intervals, a panel a figure that they explain.
+
+    Parameters
+    ----------
+    result : Uncertainty
+        With indices.
+    ax : sequence of Axes, optional
+        Panels to draw on.
+
+    Raises
+    ------
+    InputError
+        The result has no indices.
+    """
+    found = result.sensitivity
+    if found is None:
+        raise InputError("the result has no Sobol indices: ask for uncertainty.sensitivity")
+    shown = [one for one in found.indices if one.variance > 0.0]
+    if not shown:
+        raise InputError("nothing varies, so there are no Sobol indices")
+    columns = min(len(shown), 2)
+    rows = -(-len(shown) // columns)
+    if ax is None:
+        height = (0.24 * len(found.parameters) + 1.0) * rows + 0.8
+        figure, panels = grid_or_new(None, rows, columns, 4.6 * columns + 1.6, height)
+    else:
+        figure, panels = grid_or_new(ax, 1, len(shown), 0.0, 0.0)
+    for spare in panels[len(shown) :]:
+        spare.remove()
+    places = np.arange(len(found.parameters))
+    for number, (panel, one) in enumerate(zip(panels, shown, strict=False)):
+        for shift, key, colour in ((-0.19, "first", COLOURS[0]), (0.19, "total", COLOURS[1])):
+            panel.barh(
+                places + shift, getattr(one, key), 0.36, xerr=getattr(one, f"{key}_error"),
+                color=colour, label=f"{key} index", error_kw={"linewidth": 1.0, "capsize": 2},
+            )  # fmt: skip
+        left = ax is not None or number % columns == 0
+        names = [path.removeprefix("drillstring.sections.") for path in found.parameters]
+        panel.set_yticks(places, names if left else [""] * len(places))
+        panel.invert_yaxis()
+        panel.set_xlim(-0.25, 1.1)  # what reaches further is error
+        dress(panel, "Sobol index", "", _short(one.of))
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False,
+        title=f"{found.samples} points of Saltelli's design; bars: 95 % interval of the error",
+        title_fontsize=SMALL,
+    )  # fmt: skip
+    return figure
+
+
+def _short(of: str) -> str:
+    """What is explained, by the usual names and without the units of gains."""
+    for path, name in NAMES.items():
+        of = of.replace(path, name)
+    return of.replace(" N*m*s/rad", "").replace(" N*m/rad", "")
+
+
+SHADES = {OUTER: "#D6E6F2", MEDIAN: "#8FBFE0", INNER: BLUE}
+"""Colour of the region of each probability."""
+FEW = 20
+"""Realizations up to which the outline of every one is drawn."""
+
+
+def uncertain_regions(
+    result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
+    """Nominal contours with inner, median and outer regions: variability alone.
+
+    The picture of Monteiro & Trindade (2012), Fig. 6, a panel a level. Up to `FEW` realizations
+    are drawn one by one beside the bands.
+
+    Parameters
+    ----------
+    result : Uncertainty
+        Over two parameters.
+    ax : sequence of Axes, optional
+        Panels to draw on, one a level.
+    system : {'si', 'field'}
+        Units of the axes.
+
+    Raises
+    ------
+    InputError
+        The result has another number of parameters than two.
+    """
+    figure, panels, x, y = _panels(result, ax, system)
+    # Between a cell that is known and one that was stopped an outline is not.
+    few = result.realizations <= FEW and not result.censored.any()
+    for panel, level in zip(panels, result.levels, strict=True):
+        probability = result.maps[level].probability
+        _bands(panel, x, y, probability, result.realizations)
+        if few:
+            for number in np.flatnonzero(result.possible):
+                _outline(
+                    panel, x, y, _shown_regions(result.j1[number], level), level, "#555555", 0.6
+                )
+        _outline(panel, x, y, result.nominal, level, BLACK, LINE)
+    handles: list[Patch | Line2D] = [
+        Line2D([], [], color=BLACK, linewidth=LINE, label="design itself"),
+        Patch(color=SHADES[INNER], label="in at least 95 % of the draws"),
+        Patch(color=SHADES[MEDIAN], label="in at least half"),
+        Patch(color=SHADES[OUTER], label="in at least 5 %"),
+    ]
+    if few:
+        handles.insert(1, Line2D([], [], color="#555555", linewidth=0.6, label="each draw"))
+    _finish(figure, result, handles, "variability, not error")
+    return figure
+
+
+def probability_map(
+    result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
+    """Probability that J1 keeps to each level, over two parameters.
+
+    Parameters
+    ----------
+    result : Uncertainty
+        Over two parameters.
+    ax : sequence of Axes, optional
+        Panels to draw on, one a level.
+    system : {'si', 'field'}
+        Units of the axes.
+
+    Raises
+    ------
+    InputError
+        The result has another number of parameters than two.
+    """
+    figure, panels, x, y = _panels(result, ax, system)
+    share = Normalize(0.0, 1.0)
+    scale = ScalarMappable(share, "cividis")
+    for panel, level in zip(panels, result.levels, strict=True):
+        probability = result.maps[level].probability
+        panel.pcolormesh(
+            x, y, probability.T, cmap=scale.cmap, norm=share, shading="nearest",
+            rasterized=True,
+        )  # fmt: skip
+        shown = [v for v in (OUTER, MEDIAN, INNER) if probability.min() < v < probability.max()]
+        if shown:
+            at = [border(v, result.realizations) for v in shown]
+            lines = panel.contour(x, y, probability.T, levels=at, colors="white", linewidths=1.0)
+            names = dict(zip(at, shown, strict=True))
+            panel.clabel(lines, fmt=lambda v, names=names: f"{names[v]:.0%}", fontsize=SMALL)
+    bar = figure.colorbar(scale, ax=panels, pad=0.02)
+    bar.set_label("probability that J1 is at or under the level")
+    bar.ax.tick_params(labelsize=SMALL)
+    _finish(figure, result, [], "variability, not error")
+    return figure
+
+
+def region_error(
+    result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
+    """What is not known of the inner regions because draws are finite in number.
+
+    Cells whose probability is at least 95 %, or is not, by intervals that hold in all cells at
+    once with 95 %; and those of which neither can be said.
+
+    Parameters
+    ----------
+    result : Uncertainty
+        Over two parameters.
+    ax : sequence of Axes, optional
+        Panels to draw on, one a level.
+    system : {'si', 'field'}
+        Units of the axes.
+
+    Raises
+    ------
+    InputError
+        The result has another number of parameters than two.
+    """
+    from matplotlib.colors import ListedColormap
+
+    figure, panels, x, y = _panels(result, ax, system)
+    colours = ("#FFFFFF", "#F2C59F", VERMILLION)
+    for panel, level in zip(panels, result.levels, strict=True):
+        low, high = result.maps[level].simultaneous
+        kind = np.where(low >= INNER, 2, np.where(high >= INNER, 1, 0))
+        panel.pcolormesh(
+            x, y, kind.T, cmap=ListedColormap(colours), vmin=-0.5, vmax=2.5, shading="nearest",
+            rasterized=True,
+        )  # fmt: skip
+        value, (least, most) = result.areas[level][INNER]
+        panel.annotate(
+            f"area {value:.1%} ({100 * least:.1f} to {100 * most:.1f})", (0.98, 0.96),
+            xycoords="axes fraction", ha="right", va="top", fontsize=SMALL,
+        )  # fmt: skip
+    names = ("not in the 95 % region", "not known", "in the 95 % region")
+    handles = [
+        Patch(facecolor=colour, edgecolor="#888888", label=name)
+        for colour, name in zip(colours, names, strict=True)
+    ]
+    _finish(figure, result, handles, "sampling error: all cells at once, with 95 %")
+    return figure
+
+
+def _panels(
+    result: Uncertainty, ax: Sequence[Axes] | None, system: units.System
+) -> tuple[Figure, list[Axes], NDArray[np.float64], NDArray[np.float64]]:
+    if len(result.axes) != 2:
+        raise InputError(f"a map shows 2 parameters, the result has {len(result.axes)}")
+    count = len(result.levels)
+    columns = min(count, 2)
+    rows = -(-count // columns)
+    if ax is None:
+        figure, panels = grid_or_new(None, rows, columns, 4.2 * columns + 1.0, 3.6 * rows + 0.8)
+    else:
+        figure, panels = grid_or_new(ax, 1, count, 0.0, 0.0)
+    for spare in panels[count:]:
+        spare.remove()
+    x, x_label = axis_label(result.axes[0], system)
+    y, y_label = axis_label(result.axes[1], system)
+    for panel, level in zip(panels, result.levels, strict=False):
+        dress(panel, x_label, y_label, f"J1 <= {level:g} s")
+        panel.grid(visible=False)
+        panel.set_xlim(x[0], x[-1])
+        panel.set_ylim(y[0], y[-1])
+    return figure, panels[:count], x, y
+
+
+def border(probability: float, total: int) -> float:
+    """Share of the draws between the largest out of a region and the smallest in it.
+
+    A contour through a share that draws can have would be a matter of rounding.
+    """
+    return (needed(probability, total) - 0.5) / total
+
+
+def _bands(
+    panel: Axes,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    probability: NDArray[np.float64],
+    total: int,
+) -> None:
+    for bound, colour in SHADES.items():
+        at = border(bound, total)
+        if probability.max() > at:
+            panel.contourf(x, y, probability.T, levels=[at, 2.0], colors=[colour])
+
+
+def _outline(
+    panel: Axes,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    j1: NDArray[np.float64],
+    level: float,
+    colour: str,
+    width: float,
+) -> None:
+    if np.nanmin(j1) < level < np.nanmax(j1):
+        panel.contour(x, y, j1.T, levels=[level], colors=[colour], linewidths=width)
+
+
+def _shown_regions(j1: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+    """J1 of a draw for its outline; a cell that failed is far above any level."""
+    return np.nan_to_num(j1, nan=10.0 * level)
+
+
+def _finish(
+    figure: Figure, result: Uncertainty, handles: Sequence[Patch | Line2D], what: str
+) -> None:
+    figure.suptitle(title_of(result), fontsize=11.0, x=0.01, ha="left")
+    status = result.design.tables.status
+    origin = f"string {status}; " if status == "reconstructed" else ""
+    method = result.design.tables.uncertainty.sampling
+    text = f"{origin}{result.realizations} draws ({method}, seed {result.seed}); {what}"
+    if not handles:
+        figure.supxlabel(text, fontsize=SMALL)
+        return
+    figure.legend(
+        handles=list(handles), loc="outside lower center", ncols=len(handles), fontsize=SMALL,
+        frameon=False, title=text, title_fontsize=SMALL,
+    )  # fmt: skip

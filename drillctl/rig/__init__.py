@@ -1,0 +1,1 @@
+"""The parts of a rig: plain physics, numbers only."""

@@ -1,0 +1,58 @@
+"""Stribeck friction regularised by tanh: the literature's smooth law, for comparison."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from drillctl.rig.bit_rock.protocol import Exp
+
+
+class Stribeck(NamedTuple):
+    r"""Smooth friction that falls exponentially and changes sign over a small speed.
+
+    .. math:: T(\omega) = W R [\mu_k + (\mu_s - \mu_k) e^{-|\omega| / v_s}]
+              \tanh(\omega / \varepsilon)
+
+    As in public simulators of drilling. A bit never stands still under it: it creeps.
+
+    Attributes
+    ----------
+    static, sliding : float
+        mu_s R and mu_k R, torque over weight on bit (m); static not less than sliding.
+    decay : float
+        1 / v_s (s/rad).
+    sharpness : float
+        1 / epsilon (s/rad): the sign changes over the speed epsilon.
+    """
+
+    static: Any
+    sliding: Any
+    decay: Any
+    sharpness: Any
+
+    @property
+    def set_valued(self) -> bool:
+        """A bit creeps under this law where it should stand still."""
+        return False
+
+    def static_torque(self, weight: Any) -> Any:
+        """Torque that a bit at rest can bear (N m): none, it creeps."""
+        return 0.0 * weight
+
+    def kinetic_torque_at_rest(self, weight: Any) -> Any:
+        """Torque in the limit of zero speed (N m): none."""
+        return 0.0 * weight
+
+    def steepest_fall(self, weight: Any) -> Any:
+        """A bound of the falling slope (N m s/rad): that of the exponential at rest."""
+        return self.decay * (self.static - self.sliding) * weight
+
+    def torque_and_slope(self, weight: Any, speed: Any, exp: Exp) -> tuple[Any, Any]:
+        """Torque (N m) and slope (N m s/rad) at `speed` >= 0 (rad/s) under `weight` (N)."""
+        # Of an argument that is not negative exp(-2 x) never overflows.
+        fade = exp(-2.0 * self.sharpness * speed)
+        tanh = (1.0 - fade) / (1.0 + fade)
+        falling = (self.static - self.sliding) * weight * exp(-self.decay * speed)
+        level = self.sliding * weight + falling
+        rise = self.sharpness * (1.0 - tanh * tanh)
+        return level * tanh, level * rise - self.decay * falling * tanh

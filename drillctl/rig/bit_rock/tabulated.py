@@ -1,0 +1,126 @@
+"""Friction given as points of torque over speed."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from drillctl.rig.bit_rock.protocol import Exp
+
+KNOTS = 12
+"""Most points after the first."""
+
+
+class Tabulated(NamedTuple):
+    r"""Set-valued friction through measured points, straight between them, level after the last.
+
+    .. math:: T(\omega) = W \Big[ t_0 + s_0 |\omega|
+              + \sum_i c_i \max(0, |\omega| - \omega_i) \Big] \mathrm{sign}\,\omega,
+              \qquad T(0) \in [-t_s W, t_s W]
+
+    Made by `tabulated`; the coefficients follow from the points.
+
+    Attributes
+    ----------
+    static : float
+        Static torque over weight on bit t_s (m).
+    start : float
+        Torque over weight t_0 of a bit that just turns (m).
+    rise : float
+        Slope of the first piece over weight (m s/rad).
+    fall : float
+        Steepest falling slope over weight (m s/rad), not negative.
+    w1, ..., w12 : float
+        Speeds at which the slope changes (rad/s).
+    c1, ..., c12 : float
+        Changes of slope over weight there (m s/rad); zero where there are fewer points.
+    """
+
+    static: Any
+    start: Any
+    rise: Any
+    fall: Any
+    w1: Any
+    w2: Any
+    w3: Any
+    w4: Any
+    w5: Any
+    w6: Any
+    w7: Any
+    w8: Any
+    w9: Any
+    w10: Any
+    w11: Any
+    w12: Any
+    c1: Any
+    c2: Any
+    c3: Any
+    c4: Any
+    c5: Any
+    c6: Any
+    c7: Any
+    c8: Any
+    c9: Any
+    c10: Any
+    c11: Any
+    c12: Any
+
+    @property
+    def set_valued(self) -> bool:
+        """A bit can stand still under this law."""
+        return True
+
+    def static_torque(self, weight: Any) -> Any:
+        """Largest torque of a bit at rest (N m)."""
+        return self.static * weight
+
+    def kinetic_torque_at_rest(self, weight: Any) -> Any:
+        """Torque of a bit that just turns (N m)."""
+        return self.start * weight
+
+    def steepest_fall(self, weight: Any) -> Any:
+        """Largest falling slope (N m s/rad)."""
+        return self.fall * weight
+
+    def torque_and_slope(self, weight: Any, speed: Any, exp: Exp) -> tuple[Any, Any]:
+        """Torque (N m) and slope (N m s/rad) at `speed` >= 0 (rad/s) under `weight` (N)."""
+        torque, slope = self.start + self.rise * speed, self.rise + 0.0 * speed
+        for knot in range(12):  # KNOTS, as a number that every compiler of laws can see
+            above = speed > self[4 + knot]
+            torque = torque + above * self[16 + knot] * (speed - self[4 + knot])
+            slope = slope + above * self[16 + knot]
+        return torque * weight, slope * weight
+
+
+def tabulated(static: float, speeds: tuple[float, ...], torques: tuple[float, ...]) -> Tabulated:
+    """The law through given points.
+
+    Parameters
+    ----------
+    static : float
+        Static torque over weight on bit (m), not less than the first torque.
+    speeds : tuple of float
+        Speeds (rad/s), increasing from zero; at most `KNOTS` + 1.
+    torques : tuple of float
+        Torque over weight at these speeds (m).
+
+    Returns
+    -------
+    Tabulated
+        Beyond the last point its torque holds.
+    """
+    slopes = [
+        (t1 - t0) / (w1 - w0)
+        for w0, w1, t0, t1 in zip(speeds, speeds[1:], torques, torques[1:], strict=False)
+    ]
+    changes = [b - a for a, b in zip(slopes, [*slopes[1:], 0.0], strict=True)]
+    unused = KNOTS - len(changes)
+    return Tabulated(
+        static,
+        torques[0],
+        slopes[0],
+        max(0.0, *(-slope for slope in slopes)),
+        *speeds[1:],
+        *([0.0] * unused),
+        *changes,
+        *([0.0] * unused),
+    )

@@ -1,0 +1,228 @@
+"""Mass, damping and stiffness of a whole string, from its sections and its two ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+from numpy.typing import NDArray
+
+from drillctl.rig.drillstring.section import Section
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Sections and ends of a string, before they become matrices.
+
+    Attributes
+    ----------
+    sections : tuple of Section
+        From top to bottom.
+    top_inertia, bit_inertia : float
+        Of the top drive and of the BHA with the bit (kg m2).
+    top_damping, bit_damping : float
+        Viscous dampers to ground at the two ends (N m s/rad).
+    modal_damping : float
+        Damping ratio added to every elastic free-free mode.
+    mass : {'consistent', 'lumped'}
+        Mass of an element, m/6 [[2, 1], [1, 2]] or m/2 at each end.
+    """
+
+    sections: tuple[Section, ...]
+    top_inertia: float
+    bit_inertia: float
+    top_damping: float
+    bit_damping: float
+    modal_damping: float
+    mass: Literal["consistent", "lumped"]
+
+
+@dataclass(frozen=True, eq=False)
+class Drillstring:
+    """M u'' + C u' + K u = F of the string, its top drive and its BHA.
+
+    Attributes
+    ----------
+    depth : ndarray, shape (nodes,)
+        Measured depth of each node (m).
+    node_section : tuple of str, shape (nodes,)
+        Name of the section above each node; the top drive for node 0.
+    mass, damping, stiffness : sparse array, shape (nodes, nodes)
+        M (kg m2), C (N m s/rad) and K (N m/rad).
+    ground_damping : ndarray, shape (nodes,)
+        C times a rigid rotation at 1 rad/s: torque (N m s/rad) that damping to ground takes
+        at each node. Zero where all damping is internal.
+    element_stiffness, element_damping : ndarray, shape (elements,)
+        Of each two-node element (N m/rad, N m s/rad), top to bottom.
+    classical : bool
+        True where the undamped modes diagonalise C.
+    yield_torque : float
+        Torsional yield of the uppermost pipe (N m); infinite when unknown.
+    parts : Parts
+        What the matrices were assembled from.
+    """
+
+    depth: Array
+    node_section: tuple[str, ...]
+    mass: scipy.sparse.csr_array
+    damping: scipy.sparse.csr_array
+    stiffness: scipy.sparse.csr_array
+    ground_damping: Array
+    element_stiffness: Array
+    element_damping: Array
+    classical: bool
+    yield_torque: float
+    parts: Parts
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.depth)
+
+    @property
+    def undamped(self) -> bool:
+        """Whether C is zero."""
+        return self.damping.count_nonzero() == 0
+
+    @property
+    def static_stiffness(self) -> float:
+        """Stiffness of the string between its ends (N m/rad)."""
+        return float(1.0 / np.sum(1.0 / self.element_stiffness))
+
+    @cached_property
+    def undamped_modes(self) -> tuple[Array, Array]:
+        """Angular frequencies (rad/s), shape (nodes,), and mass-normalised shapes by column.
+
+        The free-free string: the first frequency is exactly zero, its shape the rigid body, and
+        no other shape has a part of it, so that a string that turns as a whole stays untwisted.
+        One BLAS thread, since another count gives other bits.
+        """
+        from threadpoolctl import threadpool_limits
+
+        with threadpool_limits(limits=1, user_api="blas"):
+            mass = self.mass.toarray()
+            squares, shapes = scipy.linalg.eigh(self.stiffness.toarray(), mass)
+            rigid = np.full(self.nodes, 1.0 / np.sqrt(mass.sum()))
+            # What the eigensolver leaves is its rounding over the gap to the next mode: on a
+            # short stiff string 1e-11, which its stiffness makes a torque of.
+            shapes[:, 1:] -= np.outer(rigid, (rigid @ mass) @ shapes[:, 1:])
+        squares[0] = 0.0
+        shapes[:, 0] = rigid
+        return np.sqrt(np.maximum(squares, 0.0)), shapes
+
+
+def assemble(
+    sections: tuple[Section, ...],
+    top_inertia: float,
+    bit_inertia: float,
+    top_damping: float = 0.0,
+    bit_damping: float = 0.0,
+    modal_damping: float = 0.0,
+    mass: Literal["consistent", "lumped"] = "consistent",
+) -> Drillstring:
+    """Put a string together from linear (two-node) torsional elements.
+
+    Parameters
+    ----------
+    sections : tuple of Section
+        From top to bottom.
+    top_inertia, bit_inertia : float
+        Of the top drive and of the BHA with the bit (kg m2).
+    top_damping, bit_damping : float
+        Viscous dampers to ground at the two ends (N m s/rad).
+    modal_damping : float
+        Damping ratio added to every elastic free-free mode.
+    mass : {'consistent', 'lumped'}
+        Mass of an element, m/6 [[2, 1], [1, 2]] or m/2 at each end.
+
+    Returns
+    -------
+    Drillstring
+        Frozen.
+    """
+    stiffness = _per_element(sections, lambda s: s.stiffness * s.elements)
+    inertia = _per_element(sections, lambda s: s.inertia / s.elements)
+    damping = _per_element(
+        sections,
+        lambda s: s.coupling_damping * s.elements + s.stiffness_damping * s.stiffness * s.elements,
+    )
+    drag = _per_element(sections, lambda s: (s.mass_damping * s.inertia + s.drag) / s.elements)
+
+    end_inertia = np.zeros(len(stiffness) + 1)
+    end_drag = np.zeros_like(end_inertia)
+    for section, last in zip(sections, np.cumsum([s.elements for s in sections]), strict=True):
+        end_inertia[last] += section.end_inertia
+        end_drag[last] += section.mass_damping * section.end_inertia
+    end_inertia[0] += top_inertia
+    end_inertia[-1] += bit_inertia
+    end_drag[0] += top_damping
+    end_drag[-1] += bit_damping
+
+    share = (1 / 3, 1 / 6) if mass == "consistent" else (1 / 2, 0.0)
+    m = _spread(inertia, share) + scipy.sparse.diags_array(end_inertia)
+    k = _spread(stiffness, (1.0, -1.0))
+    ground = _spread(drag, share) + scipy.sparse.diags_array(end_drag)
+    c = _spread(damping, (1.0, -1.0)) + ground
+    string = Drillstring(
+        depth=_depths(sections),
+        node_section=_names(sections),
+        mass=m.tocsr(),
+        damping=c.tocsr(),
+        stiffness=k.tocsr(),
+        ground_damping=np.asarray(ground.sum(axis=1)).ravel(),
+        element_stiffness=stiffness,
+        element_damping=damping,
+        classical=_classical(c.tocsr(), m.tocsr(), k.tocsr()),
+        yield_torque=sections[0].yield_torque,
+        parts=Parts(
+            sections, top_inertia, bit_inertia, top_damping, bit_damping, modal_damping, mass
+        ),
+    )
+    return string if modal_damping == 0.0 else _with_modal_damping(string, modal_damping)
+
+
+def _per_element(sections: tuple[Section, ...], value: Callable[[Section], float]) -> Array:
+    return np.concatenate([np.full(s.elements, value(s), dtype=float) for s in sections])
+
+
+def _spread(values: Array, share: tuple[float, float]) -> scipy.sparse.sparray:
+    """Tridiagonal sum of the element matrices `values` x [[a, b], [b, a]]."""
+    own, other = share
+    diagonal = np.zeros(len(values) + 1)
+    diagonal[:-1] += own * values
+    diagonal[1:] += own * values
+    return scipy.sparse.diags_array([other * values, diagonal, other * values], offsets=[-1, 0, 1])
+
+
+def _depths(sections: tuple[Section, ...]) -> Array:
+    steps = _per_element(sections, lambda s: s.length / s.elements)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _names(sections: tuple[Section, ...]) -> tuple[str, ...]:
+    return ("top drive", *(s.name for s in sections for _ in range(s.elements)))
+
+
+def _classical(
+    c: scipy.sparse.csr_array, m: scipy.sparse.csr_array, k: scipy.sparse.csr_array
+) -> bool:
+    """Caughey's condition: C M^-1 K symmetric, to rounding."""
+    if c.count_nonzero() == 0:
+        return True
+    product = c.toarray() @ np.linalg.solve(m.toarray(), k.toarray())
+    return bool(np.abs(product - product.T).max() <= 1e-10 * np.abs(product).max())
+
+
+def _with_modal_damping(string: Drillstring, ratio: float) -> Drillstring:
+    """Add C = M Phi diag(2 ratio omega) Phi^T M; the rigid body stays free."""
+    frequency, shapes = string.undamped_modes
+    weighted = string.mass @ shapes
+    extra = (weighted * (2.0 * ratio * frequency)) @ weighted.T
+    return replace(string, damping=scipy.sparse.csr_array(string.damping.toarray() + extra))

@@ -1,0 +1,131 @@
+"""One section of a drillstring: a run of equal torsional elements.
+
+API drill pipes by the name drillers use, and the yield strength of their grades.
+
+Outside and inside diameters are those of API RP 7G for new pipe bodies.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+def polar_moment(outer_diameter: float, inner_diameter: float) -> float:
+    """Polar moment of area of a pipe (m^4), pi/32 (OD^4 - ID^4), diameters in m."""
+    return math.pi / 32.0 * (outer_diameter**4 - inner_diameter**4)
+
+
+def torsional_yield(outer_diameter: float, inner_diameter: float, yield_strength: float) -> float:
+    """Torque at which a pipe body begins to yield (N m), after API RP 7G.
+
+    The shear yield strength is `yield_strength` / sqrt(3) (Pa, von Mises); diameters in m.
+    """
+    moment = polar_moment(outer_diameter, inner_diameter)
+    return yield_strength / math.sqrt(3.0) * moment / (outer_diameter / 2.0)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A uniform run of the string, split into equal elements. Totals, not per element.
+
+    Attributes
+    ----------
+    name : str
+        As in the design.
+    elements : int
+        Number of elements.
+    stiffness : float
+        Torsional stiffness end to end (N m/rad).
+    inertia : float
+        Inertia spread evenly over the length (kg m2).
+    end_inertia : float
+        Inertia lumped at the lower end (kg m2).
+    length : float
+        Length (m); 0 for a lumped spring.
+    coupling_damping : float
+        Damper between the two ends of the section (N m s/rad).
+    stiffness_damping : float
+        Damping of an element over its stiffness (s).
+    mass_damping : float
+        Damping to ground over inertia (1/s).
+    drag : float
+        Damping to ground, spread evenly over the length (N m s/rad).
+    yield_torque : float
+        Torque at which the pipe body begins to yield (N m); infinite when unknown.
+    """
+
+    name: str
+    elements: int
+    stiffness: float
+    inertia: float = 0.0
+    end_inertia: float = 0.0
+    length: float = 0.0
+    coupling_damping: float = 0.0
+    stiffness_damping: float = 0.0
+    mass_damping: float = 0.0
+    drag: float = 0.0
+    yield_torque: float = math.inf
+
+    @property
+    def impedance(self) -> float:
+        """Characteristic impedance, sqrt(stiffness x inertia) (N m s/rad): J sqrt(G rho)."""
+        return math.sqrt(self.stiffness * self.inertia)
+
+    @property
+    def travel_time(self) -> float:
+        """Time a torsional wave takes from end to end (s)."""
+        return math.sqrt(self.inertia / self.stiffness)
+
+
+INCH = 0.0254
+PSI = 6894.757293168361
+
+
+@dataclass(frozen=True)
+class Pipe:
+    """Body of a drill pipe.
+
+    Attributes
+    ----------
+    outer_diameter, inner_diameter : float
+        Of the body (m).
+    """
+
+    outer_diameter: float
+    inner_diameter: float
+
+
+def _pipe(outer: float, inner: float) -> Pipe:
+    return Pipe(outer * INCH, inner * INCH)
+
+
+PIPES: dict[str, Pipe] = {
+    "2 7/8 in 10.4 lb/ft": _pipe(2.875, 2.151),
+    "3 1/2 in 9.5 lb/ft": _pipe(3.5, 2.992),
+    "3 1/2 in 13.3 lb/ft": _pipe(3.5, 2.764),
+    "3 1/2 in 15.5 lb/ft": _pipe(3.5, 2.602),
+    "4 in 11.85 lb/ft": _pipe(4.0, 3.476),
+    "4 in 14.0 lb/ft": _pipe(4.0, 3.340),
+    "4 in 15.7 lb/ft": _pipe(4.0, 3.240),
+    "4 1/2 in 13.75 lb/ft": _pipe(4.5, 3.958),
+    "4 1/2 in 16.6 lb/ft": _pipe(4.5, 3.826),
+    "4 1/2 in 20.0 lb/ft": _pipe(4.5, 3.640),
+    "5 in 16.25 lb/ft": _pipe(5.0, 4.408),
+    "5 in 19.5 lb/ft": _pipe(5.0, 4.276),
+    "5 in 25.6 lb/ft": _pipe(5.0, 4.000),
+    "5 1/2 in 19.2 lb/ft": _pipe(5.5, 4.892),
+    "5 1/2 in 21.9 lb/ft": _pipe(5.5, 4.778),
+    "5 1/2 in 24.7 lb/ft": _pipe(5.5, 4.670),
+    "5 7/8 in 23.4 lb/ft": _pipe(5.875, 5.153),
+    "6 5/8 in 25.2 lb/ft": _pipe(6.625, 5.965),
+    "6 5/8 in 27.7 lb/ft": _pipe(6.625, 5.901),
+}
+
+GRADES: dict[str, float] = {
+    "E-75": 75e3 * PSI,
+    "X-95": 95e3 * PSI,
+    "G-105": 105e3 * PSI,
+    "S-135": 135e3 * PSI,
+}
+"""Minimum yield strength (Pa)."""

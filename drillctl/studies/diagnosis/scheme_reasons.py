@@ -1,0 +1,154 @@
+"""Why the batch engine takes the step and the modes that it takes.
+
+`choose_scheme` is what chooses. Here each of its bounds is worked out once more and named, from the
+same constants and helpers, and what they give is held to what was chosen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from drillctl.design.tables import SimulationTable
+from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.top_drive import SampledDrive
+from drillctl.simulation.batch import Prepared, _shared, _turns
+from drillctl.simulation.kernels.string_step import BlockString, UndampedString
+from drillctl.simulation.lanes import Lanes
+from drillctl.simulation.scheme import (
+    ACCURACIES,
+    STEEPEST,
+    Scheme,
+    _whole_steps,
+    bit_inertia,
+)
+
+SHORTENED = 1e-3
+"""Share by which a step must be shorter than its bound for whole steps to be the reason."""
+FORMS = {"undamped": "undamped modes", "blocks": "2 x 2 blocks", "dense": "a dense matrix"}
+"""Forms of the string, in words."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A bound on the step."""
+
+    name: str  # {'accuracy', 'elastic_mode', 'friction', 'given'}: What bounds it
+    step: float  # longest step that it allows (s)
+    reason: str  # in words
+
+
+@dataclass(frozen=True)
+class SchemeReasons:
+    """A scheme, and why it is this one."""
+
+    scheme: Scheme  # step, steps and modes
+    accuracy: str  # {'fast', 'standard', 'fine'}: Asked for
+    bounds: tuple[Bound, ...]  # on the step; a given step stands alone
+    # name of the bound that decides, or 'sampling' or 'program' where the step is shorter for
+    # whole steps to a period of the controller, or to what changes by the clock
+    decided_by: str
+    # {'turn', 'all', 'fewest', 'given'}: Modes that turn little enough in a step, all of the
+    # string, two, or as given
+    modes_by: str
+    highest_frequency: float  # of the modes kept (Hz)
+    turn: float  # of that mode in a step (rad)
+    # modes of the string that are not carried; their static share of the pipe torque is
+    left_out: int
+    form: str  # {'undamped', 'blocks', 'dense'}: What the string's step is made of
+
+    @property
+    def decisive(self) -> Bound:
+        """The bound that is the lowest."""
+        return min(self.bounds, key=lambda bound: bound.step)
+
+    def summary(self) -> dict[str, Any]:
+        """Scheme, bounds and reasons; SI units."""
+        return {
+            "accuracy": self.accuracy,
+            "step": self.scheme.step,
+            "steps": self.scheme.steps,
+            "modes": self.scheme.modes,
+            "sampling": self.scheme.sampling,
+            "decided_by": self.decided_by,
+            "bounds": {bound.name: bound.step for bound in self.bounds},
+            "reasons": {bound.name: bound.reason for bound in self.bounds},
+            "modes_by": self.modes_by,
+            "highest_frequency_hz": self.highest_frequency,
+            "turn": self.turn,
+            "modes_left_out": self.left_out,
+            "string": self.form,
+        }
+
+
+def explain(lanes: Lanes, table: SimulationTable, prepared: Prepared) -> SchemeReasons:
+    """Why a scheme was chosen."""
+    scheme, string = prepared.scheme, lanes.string
+    bounds = _bounds(string, table, lanes.steepest_fall)
+    asked = min(bound.step for bound in bounds)
+    period = _shared(lanes.drive.period) if isinstance(lanes.drive, SampledDrive) else None
+    steps, sampling = _whole_steps(table.duration, asked, period, _turns(lanes))
+    modes, modes_by = _modes(string, table, scheme.step)
+    if (steps, sampling, modes) != (scheme.steps, scheme.sampling, scheme.modes):
+        raise RuntimeError(
+            f"reasons for {steps} steps, {sampling} to a sample, {modes} modes; chosen was {scheme}"
+        )
+    highest = float(string.undamped_modes[0][modes - 1])
+    return SchemeReasons(
+        scheme=scheme,
+        accuracy=table.accuracy,
+        bounds=bounds,
+        decided_by=_decided(bounds, asked, table.duration, scheme),
+        modes_by=modes_by,
+        highest_frequency=highest / (2.0 * math.pi),
+        turn=highest * scheme.step,
+        left_out=string.nodes - modes,
+        form=form_of(prepared.stepper.string),
+    )
+
+
+def form_of(string: Any) -> str:
+    """Name of the form of a string made ready: a key of `FORMS`."""
+    if isinstance(string, UndampedString):
+        return "undamped"
+    return "blocks" if isinstance(string, BlockString) else "dense"
+
+
+def _bounds(string: Drillstring, table: SimulationTable, fall: float) -> tuple[Bound, ...]:
+    if table.step is not None:
+        return (Bound("given", table.step, "simulation.step"),)
+    accuracy = ACCURACIES[table.accuracy]
+    elastic = float(2.0 * math.pi / string.undamped_modes[0][1])
+    bounds = [
+        Bound("accuracy", accuracy.step, f"the longest step of '{table.accuracy}'"),
+        Bound(
+            "elastic_mode",
+            elastic / accuracy.steps_per_period,
+            f"{accuracy.steps_per_period:g} steps in a period of the first elastic mode, "
+            f"{elastic:.3g} s",
+        ),
+    ]
+    if fall > 0.0:
+        reason = f"the friction falls by up to {fall:.4g} N m s/rad: one root at the bit"
+        bounds.append(Bound("friction", STEEPEST * bit_inertia(string) / fall, reason))
+    return tuple(bounds)
+
+
+def _decided(bounds: tuple[Bound, ...], asked: float, duration: float, scheme: Scheme) -> str:
+    plain = max(1, math.ceil(duration / asked * (1.0 - 1e-12)))
+    if scheme.sampling and scheme.step < asked * (1.0 - SHORTENED):
+        return "sampling"
+    if not scheme.sampling and scheme.steps > plain:
+        return "program"
+    return min(bounds, key=lambda bound: bound.step).name
+
+
+def _modes(string: Drillstring, table: SimulationTable, step: float) -> tuple[int, str]:
+    if table.modes is not None:
+        return min(max(table.modes, 2), string.nodes), "given"
+    frequency, _ = string.undamped_modes
+    turning = int((frequency * step <= ACCURACIES[table.accuracy].phase).sum())
+    if turning < 2:
+        return min(2, string.nodes), "fewest"
+    return turning, "all" if turning == string.nodes else "turn"

@@ -1,0 +1,405 @@
+"""Which lanes end in steady drilling: long runs from a bit at rest and from a wound-up string.
+
+Steady drilling of the cells of a grid: operating speed, slope of the rock, gains.
+
+Three regions of one grid that are easily taken for each other: each in its own name.
+
+Locally stable: small deviations from steady drilling die out; the linear loop tells, for ever
+and at once. Inside the level: J1 of the design's own run, nonlinear, from one start and over a
+finite time. Attracted: steady drilling is where long nonlinear runs from far away end.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design
+from drillctl.ensemble.grid import Axis, Group, axes_of, cell_design, groups, shape_of
+from drillctl.ensemble.sweeps import sweep
+from drillctl.errors import InputError
+from drillctl.linear.ends import ends_of
+from drillctl.linear.loop_analysis import tolerated_slope
+from drillctl.linear.operating_point import operating_point, rock_at
+from drillctl.linear.slope_margin import SlopeMargins, slope_margins
+from drillctl.progress import SILENT, Progress
+from drillctl.simulation.batch import Prepared, prepare, run_batch, trace
+from drillctl.simulation.lanes import Kind, Lanes
+from drillctl.simulation.measures import NARROW_BAND, STATUSES, WINDOW
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+HORIZON = 200.0
+"""Length of the runs (s): on the paper's map sticking that will end has ended by 80 s."""
+STARTS: tuple[Kind, ...] = ("rest", "wound_up")
+"""Starts that a cell must leave for steady drilling: both are far from it."""
+TRACED_LANES = 128
+"""Lanes traced together: some 70 MB at 20 ms."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ended:
+    """How runs from one start ended."""
+
+    # shape (lanes,): Bit speed within the band of the operating speed throughout the last window
+    attracted: Mask
+    sticking: Mask  # shape (lanes,): The bit stood still at some time in that window
+    failed: Mask  # shape (lanes,): No finite answer; neither of the others holds then
+
+
+def long_runs(group: Group) -> Prepared:
+    """The string of a group, prepared for runs over `HORIZON`."""
+    table = group.design.tables.simulation
+    return prepare(group.lanes, table.model_copy(update={"duration": HORIZON, "j1_from": 0.0}))
+
+
+def ends_from(kind: Kind, lanes: Lanes, operating_speed: Array, prepared: Prepared) -> Ended:
+    """Run every lane from a start and see where it ends.
+
+    A drive without any speed control has no set speed, only a frame: there the operating speed
+    takes its place, also as the speed of the top of a wound-up string. Proportional control
+    alone has a set speed that it never holds, and it cannot be moved: those lanes are traced.
+    """
+    kp, ki = gains_of(lanes)
+    steady = np.isfinite(operating_speed)
+    framed = steady & (kp == 0.0) & (ki == 0.0)
+    lanes = replace(lanes, start=kind, set_speed=np.where(framed, operating_speed, lanes.set_speed))
+    batch = run_batch(lanes, prepared)
+    # NaN is more than any time: not settled.
+    attracted = batch.measures["settling_time"] <= HORIZON - WINDOW
+    traced = np.flatnonzero(steady & (kp != 0.0) & (ki == 0.0))
+    for first in range(0, len(traced), TRACED_LANES):
+        some = traced[first : first + TRACED_LANES]
+        attracted[some] = _stays(lanes[some], operating_speed[some], prepared)
+    failed = batch.status == STATUSES.index("failed")
+    stuck = [STATUSES.index("sticking"), STATUSES.index("stalled")]
+    return Ended(attracted & steady & ~failed, np.isin(batch.status, stuck), failed)
+
+
+def _stays(lanes: Lanes, speed: Array, prepared: Prepared) -> Mask:
+    """Whether the bit speed stays in the band around `speed` (rad/s) to the end, lane by lane."""
+    time, signals = trace(lanes, prepared, prepared.scheme.step)
+    late = signals["bit_speed"][time >= HORIZON - WINDOW]
+    return np.asarray((np.abs(late - speed) <= NARROW_BAND * speed).all(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Steady:
+    """Steady drilling of a number of lanes."""
+
+    # shape (lanes,): Of top and bit (rad/s); NaN where drive, drag and rock balance at no speed
+    speed: Array
+    # shape (lanes,): Falling slope of the rock there (N m s/rad); NaN at the same lanes
+    slope: Array
+
+
+def steady_drilling(design: Design, axes: tuple[Axis, ...], group: Group) -> Steady:
+    """Operating speed of each cell of a group and the slope there."""
+    lanes = group.lanes
+    speed = lanes.set_speed.copy()
+    for lane in np.flatnonzero(gains_of(lanes)[1] == 0.0):
+        cell = cell_design(design, axes, int(group.cells[lane]))
+        try:
+            speed[lane] = operating_point(cell).speed
+        except InputError:  # there is none
+            speed[lane] = np.nan
+    _, slope = rock_at(lanes.friction, lanes.weight, speed)
+    return Steady(speed, np.where(np.isnan(speed), np.nan, -slope))
+
+
+def slopes_tolerated(
+    design: Design, axes: tuple[Axis, ...], group: Group, speed: Array
+) -> SlopeMargins:
+    """Slope margins of the cells of a group that drill steadily at `speed`, shape (lanes,).
+
+    All at once where two gains tell the loop, one by one for other drives and for a weight that
+    comes late.
+    """
+    lanes = group.lanes
+    if group.design.simple_loop:
+        return slope_margins(ends_of(group.design.string), *gains_of(lanes))
+    slope, omega = np.full((2, len(lanes)), np.nan)
+    for lane in np.flatnonzero(np.isfinite(speed)):
+        cell = cell_design(design, axes, int(group.cells[lane]))
+        slope[lane], omega[lane] = tolerated_slope(cell, float(speed[lane]))
+    return SlopeMargins(slope, omega)
+
+
+def gains_of(lanes: Lanes) -> tuple[Array, Array]:
+    """Proportional and integral gain of every lane (N m s/rad, N m/rad)."""
+    kp, ki = (np.broadcast_to(np.asarray(g, float), len(lanes)) for g in lanes.drive.gains())
+    return kp, ki
+
+
+PAPER_LEVEL = 33.0
+"""J1 above which Monteiro & Trindade (2012) call operation undesirable (s); of runs of 100 s."""
+
+FIELDS = {
+    "slope": ("N*m*s/rad", "falling slope of the rock at the operating speed"),
+    "slope_margin": ("N*m*s/rad", "friction-slope margin"),
+    "deciding_frequency": ("Hz", "frequency of the poles that decide the margin"),
+    "reference_speed": ("rad/s", "operating speed; NaN where there is none"),
+    "j1": ("s", "J1; NaN where the run failed"),
+}
+"""Unit and meaning of what is computed of each cell."""
+MASKS = {
+    "locally_stable": "slope under its margin",
+    "inside_level": "J1 at or under the level",
+    "from_rest": "drills steadily after a start from rest",
+    "from_wound_up": "drills steadily after a start wound up",
+    "sticking_from_rest": "still sticks long after a start from rest",
+    "sticking_from_wound_up": "still sticks long after a start wound up",
+    "failed": "one of the runs gave no finite answer",
+}
+"""Meaning of the masks."""
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeRegions:
+    """Local stability, J1 and attraction over one grid.
+
+    Attributes
+    ----------
+    design : Design
+        What was varied.
+    axes : tuple of Axis
+        Parameters and their values.
+    level : float
+        Level of J1 (s).
+    slope, slope_margin : ndarray, shape of the grid
+        Falling slope of the rock at the operating speed and the slope that the loop tolerates
+        there (N m s/rad); the slope is NaN where there is no operating speed.
+    deciding_frequency : ndarray, shape of the grid
+        Of the poles that decide the margin (Hz); 0 for a real pole.
+    locally_stable : ndarray of bool, shape of the grid
+        Cells whose slope is under the margin.
+    j1 : ndarray, shape of the grid
+        Over the design's own run (s), as a sweep gives it; NaN where it failed.
+    inside_level : ndarray of bool, shape of the grid
+        Cells with J1 at or under the level.
+    from_rest, from_wound_up : ndarray of bool, shape of the grid
+        Cells whose bit stays within `band` of the operating speed throughout the last `window`
+        of a run over `horizon` from that start.
+    sticking_from_rest, sticking_from_wound_up : ndarray of bool, shape of the grid
+        Cells whose bit stands still at some time in that window.
+    failed : ndarray of bool, shape of the grid
+        Cells of which a run gave no finite answer; in no region that this run decides.
+    reference_speed : ndarray, shape of the grid
+        Operating speed (rad/s): with integral action the set speed, else the cell's own
+        equilibrium nearest to the set speed, be it stable or not; NaN where there is none. A
+        drive at constant torque starts wound up with its top at this speed: it has no other.
+    horizon, window : float
+        Length of the runs from either start, and of their end that counts (s).
+    band : float
+        As a share of the operating speed.
+    total_seconds : float
+        From call to return (s).
+    """
+
+    design: Design
+    axes: tuple[Axis, ...]
+    level: float
+    slope: Array
+    slope_margin: Array
+    deciding_frequency: Array
+    locally_stable: Mask
+    j1: Array
+    inside_level: Mask
+    from_rest: Mask
+    from_wound_up: Mask
+    sticking_from_rest: Mask
+    sticking_from_wound_up: Mask
+    failed: Mask
+    reference_speed: Array
+    horizon: float
+    window: float
+    band: float
+    total_seconds: float
+
+    @property
+    def attracted(self) -> Mask:
+        """Cells in steady drilling after either start, shape of the grid."""
+        return self.from_rest & self.from_wound_up
+
+    @property
+    def sticking(self) -> Mask:
+        """Cells that stick in the last window after a start or both, shape of the grid."""
+        return self.sticking_from_rest | self.sticking_from_wound_up
+
+    @property
+    def bistable(self) -> Mask:
+        """Locally stable, yet sticking long after a start: two long-time answers from one rig.
+
+        A bit that turns outside the band is no proof: where damping is weak the way there
+        is longer than the horizon. Those cells are `undecided`.
+        """
+        return self.locally_stable & self.sticking & ~self.failed
+
+    @property
+    def undecided(self) -> Mask:
+        """Locally stable and free of sticking, yet out of the band at the end of the horizon."""
+        return self.locally_stable & ~self.sticking & ~self.attracted & ~self.failed
+
+    @property
+    def lingering(self) -> Mask:
+        """Not locally stable, yet in the band from both starts: it grows too slowly to show."""
+        return ~self.locally_stable & self.attracted
+
+    @property
+    def no_operating_point(self) -> Mask:
+        """Cells at which drive, drag and rock balance at no speed."""
+        return np.isnan(self.reference_speed)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Cells of each region and of what lies between them."""
+        names = (*MASKS, "attracted", "bistable", "undecided", "lingering", "no_operating_point")
+        return {name: int(getattr(self, name).sum()) for name in names}
+
+    @property
+    def combinations(self) -> dict[str, int]:
+        """Cells of every combination of regions; the failed apart, so that all add up."""
+        names = ("locally_stable", "inside_level", "from_rest", "from_wound_up")
+        found = {}
+        for signs in itertools.product((True, False), repeat=len(names)):
+            cells = ~self.failed
+            for name, sign in zip(names, signs, strict=True):
+                cells = cells & (getattr(self, name) == sign)
+            held = [name for name, sign in zip(names, signs, strict=True) if sign]
+            found[" + ".join(held) or "none"] = int(cells.sum())
+        return found | {"failed": int(self.failed.sum())}
+
+    @property
+    def data(self) -> xarray.Dataset:
+        """Fields and masks, labelled by parameter path, with units."""
+        import xarray
+
+        paths = [a.path for a in self.axes]
+        coordinates = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
+        variables: dict[str, Any] = {
+            name: (paths, getattr(self, name), {"units": unit, "long_name": meaning})
+            for name, (unit, meaning) in FIELDS.items()
+        }
+        for name, meaning in MASKS.items():
+            variables[name] = (paths, getattr(self, name), {"units": "1", "long_name": meaning})
+        return xarray.Dataset(variables, coordinates)
+
+    def summary(self) -> dict[str, Any]:
+        """Axes, level, counts, what attraction means here, time; strict JSON values, SI."""
+        return {
+            "axes": {
+                a.path: {"min": float(a.values[0]), "max": float(a.values[-1]), "points": len(a)}
+                for a in self.axes
+            },
+            "level": self.level,
+            "cells": int(self.j1.size),
+            "counts": self.counts,
+            "combinations": self.combinations,
+            "horizon": self.horizon,
+            "band": self.band,
+            "window": self.window,
+            "total_seconds": self.total_seconds,
+        }
+
+    def save(self, folder: str | Path) -> Path:
+        """Write design, dataset and summary into a folder; see `drillctl.store`."""
+        from drillctl.store import save
+
+        return save(self, folder)
+
+
+def three_regions(
+    design: Design,
+    axes: tuple[Axis, ...] | None = None,
+    level: float | None = None,
+    progress: Progress = SILENT,
+) -> ThreeRegions:
+    """Where a rig is locally stable, where J1 is low, and where it is drawn to steady drilling.
+
+    Parameters
+    ----------
+    design : Design
+        Its `[map]` table gives the axes, its start and duration are those of J1.
+    axes : tuple of Axis, optional
+        Instead of the design's own.
+    level : float, optional
+        Level of J1 (s); 33 s if none is given, the one level that the paper gives a meaning,
+        whatever levels the design wants drawn. It was judged on runs of 100 s.
+    progress : Progress
+        Told of blocks and cells.
+
+    Returns
+    -------
+    ThreeRegions
+        A run that fails is marked, not an exception.
+
+    Raises
+    ------
+    InputError
+        An axis that does not fit the design, a grid too large for the memory, or a level that
+        is not positive.
+    """
+    begin = time.perf_counter()
+    level = PAPER_LEVEL if level is None else float(level)
+    if not (np.isfinite(level) and level > 0.0):
+        raise InputError(f"{level:g} must be positive and finite", "level")
+    axes = axes_of(design, design.tables.map.axes) if axes is None else axes
+    swept = sweep(design, axes, audit_cells=0, progress=progress)
+    cells = swept.j1.size
+    fields = {name: np.full(cells, np.nan) for name in FIELDS if name != "j1"}
+    masks = {name: np.zeros(cells, dtype=bool) for name in MASKS if name != "inside_level"}
+    masks["failed"] = np.isnan(swept.j1.ravel())
+    progress.begin("long runs from either start", cells)
+    for group in groups(design, axes):
+        _fill(group, design, axes, fields, masks)
+        progress.advance(len(group.cells))
+    shape = shape_of(axes)
+    return ThreeRegions(
+        design=design,
+        axes=axes,
+        level=level,
+        j1=swept.j1,
+        # NaN is at or under no level.
+        inside_level=swept.j1 <= level,
+        **{name: values.reshape(shape) for name, values in (fields | masks).items()},
+        horizon=HORIZON,
+        band=NARROW_BAND,
+        window=WINDOW,
+        total_seconds=time.perf_counter() - begin,
+    )
+
+
+def _fill(
+    group: Group,
+    design: Design,
+    axes: tuple[Axis, ...],
+    fields: dict[str, Array],
+    masks: dict[str, Mask],
+) -> None:
+    """Put the linear answer and the long runs of a group into the flat arrays."""
+    cells = group.cells
+    steady = steady_drilling(design, axes, group)
+    margin = slopes_tolerated(design, axes, group, steady.speed)
+    fields["reference_speed"][cells] = steady.speed
+    fields["slope"][cells] = steady.slope
+    fields["slope_margin"][cells] = margin.slope
+    fields["deciding_frequency"][cells] = margin.omega / (2.0 * np.pi)
+    # NaN, where nothing is steady, is under no margin.
+    masks["locally_stable"][cells] = steady.slope < margin.slope
+    prepared = long_runs(group)
+    for kind in STARTS:
+        ended = ends_from(kind, group.lanes, steady.speed, prepared)
+        masks[f"from_{kind}"][cells] = ended.attracted
+        masks[f"sticking_from_{kind}"][cells] = ended.sticking
+        masks["failed"][cells] |= ended.failed
