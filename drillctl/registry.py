@@ -1,0 +1,50 @@
+"""What can be chosen by name: laws and studies. One line adds one.
+
+Modules stand here as text, so that nothing is imported before it is needed, and so that what lies
+low in the house can reach what it does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+from typing import Any
+
+FRICTION_LAWS = (
+    "drillctl.rig.bit_rock.navarro_lopez_suarez",
+    "drillctl.rig.bit_rock.printed_three_branch",
+    "drillctl.rig.bit_rock.jansen_van_den_steen",
+    "drillctl.rig.bit_rock.tabulated",
+    "drillctl.rig.bit_rock.tucker_wang",
+    "drillctl.rig.bit_rock.stribeck",
+)
+"""Each module holds `LAWS`, a tuple of `drillctl.rig.bit_rock.law.FrictionLaw`."""
+
+DRIVE_LAWS = (
+    "drillctl.rig.top_drive.pi",
+    "drillctl.rig.top_drive.constant_torque",
+    "drillctl.rig.top_drive.impedance_matching",
+    "drillctl.rig.top_drive.active_damping",
+)
+"""Each module holds `LAWS`, a tuple of `drillctl.rig.top_drive.law.DriveLaw`."""
+
+WEIGHT_LAWS = (
+    "drillctl.rig.weight_on_bit.constant",
+    "drillctl.rig.weight_on_bit.following_speed",
+    "drillctl.rig.weight_on_bit.stick_slip_alarm",
+)
+"""Each module holds `LAWS`, a tuple of `drillctl.rig.weight_on_bit.law.WeightOnBitLaw`."""
+
+STUDIES: tuple[str, ...] = ()
+"""Each package holds `STUDY`; its keys in a design file, if any, are in its `settings.py`."""
+
+
+def resolve(place: str) -> Any:
+    """What stands at `module:name`."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
+
+
+def gathered(modules: Iterable[str], name: str) -> tuple[Any, ...]:
+    """The tuples of that name in all modules, one after the other."""
+    return tuple(one for module in modules for one in resolve(f"{module}:{name}"))
