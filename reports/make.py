@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import drillctl
-from drillctl.json_files import write_json, write_text
+from drillctl.store.json_files import write_json, write_text
 
 HERE = Path(__file__).resolve().parent
 RUNS = HERE.parent / "runs" / "reports"

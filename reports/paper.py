@@ -10,8 +10,8 @@ import numpy as np
 
 import drillctl
 from drillctl import plots, studies
-from drillctl.json_files import write_json, write_text
 from drillctl.simulation.measures import STATUSES
+from drillctl.store.json_files import write_json, write_text
 from drillctl.studies import Sweep, Uncertainty
 
 MAP, FIG6, FIRST = (

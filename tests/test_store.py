@@ -203,7 +203,7 @@ def test_kept_strings_and_blocks_give_the_same_bits(design, result, tmp_path, mo
 
 
 def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
-    from drillctl.json_files import write_json
+    from drillctl.store.json_files import write_json
 
     target = tmp_path / "summary.json"
     write_json(target, {"a": 1})
@@ -218,7 +218,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 def test_strict_json():
-    from drillctl.json_files import strict
+    from drillctl.store.json_files import strict
 
     messy = {"a": np.float64("nan"), 2: (np.int64(3), [float("inf")]), "c": np.array([1.0, np.nan])}
     assert strict(messy) == {"a": None, "2": [3, [None]], "c": [1.0, None]}

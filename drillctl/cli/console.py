@@ -24,7 +24,7 @@ def note(text: str) -> None:
 
 def emit(summary: dict[str, Any]) -> None:
     """One strict JSON object on stdout."""
-    from drillctl.json_files import strict
+    from drillctl.store.json_files import strict
 
     print(json.dumps(strict(summary), allow_nan=False))  # noqa: T201
 

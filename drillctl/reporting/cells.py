@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from drillctl import store, units
 from drillctl.design import Design, parameter
 from drillctl.ensemble.grid import Axis, groups, shape_of
-from drillctl.json_files import strict, write_text
 from drillctl.progress import Progress
 from drillctl.reporting.words import Words, name_of
 from drillctl.simulation.batch import prepare, trace
 from drillctl.simulation.measures import STATUSES
+from drillctl.store.json_files import strict, write_text
 
 if TYPE_CHECKING:
     from drillctl.studies import Sweep

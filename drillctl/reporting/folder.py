@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from drillctl.errors import DrillctlError
-from drillctl.json_files import write_json, write_text
 from drillctl.reporting import html, markdown
 from drillctl.reporting import html as pdf
 from drillctl.reporting.blocks import Checks, Document, Table
 from drillctl.reporting.pictures import Album
+from drillctl.store.json_files import write_json, write_text
 
 NAMES = {"html": "report.html", "pdf": "report.pdf", "md": "report.md"}
 """Files by format."""

@@ -13,11 +13,11 @@ import drillctl
 from drillctl import store
 from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError
-from drillctl.json_files import read_json
 from drillctl.progress import SILENT, Progress
 from drillctl.reporting.profiles import Profile
 from drillctl.reporting.studies import ALL, RECIPES, Asked, Recipe
 from drillctl.reporting.words import Words
+from drillctl.store.json_files import read_json
 
 State = Literal["done", "failed", "interrupted", "left_out", "not_asked"]
 

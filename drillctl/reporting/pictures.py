@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl.errors import DrillctlError, InputError
-from drillctl.json_files import read_json, write_json, write_text
 from drillctl.plots.style import axes_or_new
 from drillctl.reporting.blocks import Document, Figure, InteractiveMap
 from drillctl.reporting.gather import Gathered
+from drillctl.store.json_files import read_json, write_json, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn

@@ -14,10 +14,10 @@ from typing import Any
 import drillctl
 from drillctl.design import Design, to_toml
 from drillctl.errors import InputError
-from drillctl.json_files import read_json, write_json, write_text
 from drillctl.provenance import provenance
 from drillctl.store.blocks import FolderBlocks
 from drillctl.store.differences import Growing, difference, refuse_other_machine
+from drillctl.store.json_files import read_json, write_json, write_text
 from drillctl.store.realizations import FolderShelf
 
 RUNS = Path("runs")

@@ -8,8 +8,8 @@ from typing import Any
 
 from drillctl.design import load
 from drillctl.errors import InputError
-from drillctl.json_files import read_json
 from drillctl.store.folder import about_run, claim
+from drillctl.store.json_files import read_json
 from drillctl.store.kind import Kind
 from drillctl.store.kinds import KINDS
 

@@ -3,11 +3,11 @@
 from small_report import TINY
 
 import drillctl
-from drillctl.json_files import write_json
 from drillctl.reporting.blocks import Figure, Table
 from drillctl.reporting.gather import Gathered, Study
 from drillctl.reporting.sections import advantage
 from drillctl.reporting.words import Words
+from drillctl.store.json_files import write_json
 
 
 def told(value, low, high):

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from small_report import TINY, small_design
 
-from drillctl.json_files import write_json
 from drillctl.reporting.blocks import Checks, Table
 from drillctl.reporting.gather import Gathered, NotThereError, Study
 from drillctl.reporting.sections import tuning
 from drillctl.reporting.words import Words
+from drillctl.store.json_files import write_json
 
 SUMMARY = {
     "gains": {"controller.kp": 612.5, "controller.ki": 140.0},

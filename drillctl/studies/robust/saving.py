@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl.design import Design, to_toml
-from drillctl.json_files import write_json, write_text
+from drillctl.store.json_files import write_json, write_text
 
 if TYPE_CHECKING:
     from drillctl.studies.robust.tune_study import Tune

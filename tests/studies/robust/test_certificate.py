@@ -13,7 +13,7 @@ from drillctl.ensemble.draws import drawn_lanes, run_draws
 from drillctl.ensemble.intervals import share_interval
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
-from drillctl.json_files import strict
+from drillctl.store.json_files import strict
 from drillctl.studies.robust import search, tune
 from drillctl.studies.robust.certificate import certified
 from drillctl.studies.robust.fresh import Fresh, FreshRuns
