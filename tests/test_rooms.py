@@ -1,0 +1,161 @@
+"""Imports go down only: from a room to those below it, and in no circle."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import drillctl
+
+PACKAGE = Path(drillctl.__file__).parent
+
+# From the ground up. `drillctl/__init__.py` is under all of them: it looks names up when they are
+# asked for, and imports nothing.
+GROUND = ("units", "errors", "progress", "provenance", "registry", "catalog")
+ROOMS = (
+    "drillctl", "ground", "rig", "design", "store", "linear", "simulation", "ensemble", "plots",
+    "studies", "reporting", "cli", "__main__",
+)  # fmt: skip
+
+# What is still wrong. These only get shorter: an entry that is no longer true fails as well.
+UPWARD = {
+    ("design", "linear"),
+    ("plots", "studies"),
+    ("store", "ensemble"),
+    ("store", "linear"),
+    ("store", "simulation"),
+    ("store", "studies"),
+}
+CIRCLES = {"linear"}  # rooms that hold one
+LEAVING = ("printing",)  # folders that are no room
+STRAY = {"machine"}  # modules beside the rooms that are not of the ground
+
+
+def name_of(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def room_of(module: str) -> str:
+    second = module.split(".")[1] if "." in module else module
+    return "cli" if second in LEAVING else second if second in ROOMS else "ground"
+
+
+def running(node: ast.AST) -> Iterator[ast.AST]:
+    """Every node that is run: inside functions as well, but not for the type checker only."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+            for other in child.orelse:
+                yield from (other, *running(other))
+        else:
+            yield from (child, *running(child))
+
+
+def imported(tree: ast.AST, package: str) -> set[str]:
+    """Full names of what a module of a package imports; a name may be that of an object."""
+    names: set[str] = set()
+    for node in running(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1]
+            base = ".".join(above * bool(node.level) + [node.module] * bool(node.module))
+            names |= {f"{base}.{alias.name}" for alias in node.names}
+    return names
+
+
+def module_of(name: str) -> str | None:
+    """The module of this package that a name is, or is of."""
+    while name and name not in MODULES:
+        name = name.rpartition(".")[0]
+    return name or None
+
+
+def edges() -> dict[str, set[str]]:
+    """The modules of this package that each of them imports."""
+    graph = {}
+    for module, path in MODULES.items():
+        package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+        names = imported(ast.parse(path.read_text(encoding="utf-8")), package)
+        found = {module_of(name) for name in names}
+        graph[module] = {other for other in found if other not in (None, module)}
+    return graph
+
+
+GRAPH = edges()
+
+
+def circle(modules: set[str]) -> list[str]:
+    """A circle among these modules; empty if there is none."""
+    inside = {module: GRAPH[module] & modules for module in modules}
+    try:
+        TopologicalSorter(inside).prepare()
+    except CycleError as error:
+        return error.args[1]
+    return []
+
+
+def test_every_module_is_in_a_room():
+    inside = {path.relative_to(PACKAGE).parts[0] for path in MODULES.values()}
+    rooms = {room for room in inside if not room.endswith(".py")}
+    assert rooms == {*ROOMS, *LEAVING} - {"drillctl", "ground", "__main__"}
+    files = {name.removesuffix(".py") for name in inside - rooms}
+    assert files - {*GROUND, "__init__", "__main__"} == STRAY
+
+
+def test_imports_go_down_only():
+    rank = {room: place for place, room in enumerate(ROOMS)}
+    up: dict[tuple[str, str], list[str]] = {}
+    for module, others in GRAPH.items():
+        for other in others:
+            pair = room_of(module), room_of(other)
+            if rank[pair[0]] < rank[pair[1]]:
+                up.setdefault(pair, []).append(f"{module} -> {other}")
+    new = {pair: found for pair, found in up.items() if pair not in UPWARD}
+    assert not new, new
+    assert set(up) >= UPWARD, f"no longer so, to be taken off the list: {UPWARD - set(up)}"
+
+
+def test_no_room_holds_a_circle():
+    found = {room: circle({m for m in MODULES if room_of(m) == room}) for room in ROOMS}
+    new = {room: path for room, path in found.items() if path and room not in CIRCLES}
+    assert not new, new
+    gone = {room for room in CIRCLES if not found[room]}
+    assert not gone, f"no longer so, to be taken off the list: {gone}"
+
+
+def test_of_the_package_itself_nothing_above_is_taken():
+    """Its names are looked up as they are asked for: an import up that no list of imports shows."""
+    for module, path in MODULES.items():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        taken = {name for name in imported(tree, module) if module_of(name) == "drillctl"}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "drillctl":
+                taken |= {n for n in [ast.unparse(node)] if module_of(n) == "drillctl"}
+        if room_of(module) not in ("drillctl", "reporting", "cli", "__main__"):
+            assert taken <= {"drillctl", "drillctl.__version__"}, module
+
+
+def test_what_counts_as_an_import():
+    source = """
+import drillctl.units
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    from drillctl.cli import app
+else:
+    from drillctl import errors
+def later():
+    from ..design import load
+    from . import near
+"""
+    found = imported(ast.parse(source), "drillctl.linear")
+    ours = {name for name in found if name.startswith("drillctl")}
+    assert ours == {
+        "drillctl.units", "drillctl.errors", "drillctl.design.load", "drillctl.linear.near",
+    }  # fmt: skip
+    assert module_of("drillctl.design.load") == "drillctl.design"
