@@ -6,22 +6,13 @@ python docs/make_design_file.py
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
-from drillctl.design import (
-    advantage_tables,
-    bit_rock_tables,
-    compare_tables,
-    controller_tables,
-    delay_tables,
-    scenario_tables,
-    tables,
-    tune_tables,
-    uncertain_tables,
-    weight_tables,
-)
 from drillctl.design.paths import kind_of
+from drillctl.design.tables import DesignTables
+from drillctl.rig.table import Table
 
 HEAD = """# Keys of a design file
 
@@ -34,60 +25,30 @@ bare numbers. Sections of a design and of its model are merged by name. A table 
 changes drops the numbers of the old law; `controller.drive` and `weight_on_bit.path` stay.
 """
 
-TABLES = (
-    ("[operating_point]", tables.OperatingPoint),
-    ("[drillstring]", tables.DrillstringTable),
-    ("[[drillstring.sections]]", tables.SectionTable),
-    ("[top_drive]", tables.TopDriveTable),
-    ("[bha]", tables.BhaTable),
-    ('[bit_rock] law = "navarro-lopez-suarez"', bit_rock_tables.NavarroLopezSuarezTable),
-    ('[bit_rock] law = "printed-three-branch"', bit_rock_tables.PrintedThreeBranchTable),
-    ("rows of bit_rock.table", bit_rock_tables.FrictionRow),
-    ('[bit_rock] law = "bit-radius-friction"', bit_rock_tables.BitRadiusFrictionTable),
-    ('[bit_rock] law = "jansen-van-den-steen"', bit_rock_tables.JansenVanDenSteenTable),
-    ('[bit_rock] law = "coulomb"', bit_rock_tables.CoulombTable),
-    ('[bit_rock] law = "tabulated"', bit_rock_tables.TabulatedFrictionTable),
-    ("entries of bit_rock.points", bit_rock_tables.FrictionPoint),
-    ('[bit_rock] law = "tucker-wang"', bit_rock_tables.TuckerWangTable),
-    ('[bit_rock] law = "stribeck"', bit_rock_tables.StribeckTable),
-    ('[controller] law = "pi"', controller_tables.PITable),
-    ('[controller] law = "constant-torque"', controller_tables.ConstantTorqueTable),
-    ('[controller] law = "stiff-speed"', controller_tables.StiffSpeedTable),
-    ('[controller] law = "soft-torque"', controller_tables.SoftTorqueTable),
-    ('[controller] law = "z-torque"', controller_tables.ZTorqueTable),
-    (
-        '[controller] law = "torsional-rectification"',
-        controller_tables.TorsionalRectificationTable,
-    ),
-    ('[controller] law = "active-damping"', controller_tables.ActiveDampingTable),
-    ("[controller.drive]", controller_tables.DriveTable),
-    ('[weight_on_bit] law = "constant"', weight_tables.ConstantWeightTable),
-    ('[weight_on_bit] law = "navarro-lopez-suarez"', weight_tables.FollowingSpeedTable),
-    ('[weight_on_bit] law = "surface-observer"', weight_tables.SurfaceObserverTable),
-    ('[weight_on_bit] law = "stick-slip-alarm"', weight_tables.StickSlipAlarmTable),
-    ("[weight_on_bit.path]", weight_tables.PathTable),
-    ("[scenario.speed]", scenario_tables.SpeedProgramTable),
-    ("[scenario.weight_on_bit]", scenario_tables.WeightProgramTable),
-    ("[scenario.bit_rock]", scenario_tables.RockProgramTable),
-    ("[start]", tables.StartTable),
-    ("[simulation]", tables.SimulationTable),
-    ("[map]", tables.MapTable),
-    ("entries of map.axes", tables.AxisTable),
-    ('[uncertain."dotted.path"]', uncertain_tables.DistributionTable),
-    ("[uncertainty]", uncertain_tables.UncertaintyTable),
-    ("entries of uncertainty.correlations", uncertain_tables.CorrelationTable),
-    ("[uncertainty.until]", uncertain_tables.UntilTable),
-    ("[uncertainty.sensitivity]", uncertain_tables.SensitivityTable),
-    ("[compare]", compare_tables.CompareTable),
-    ("entries of compare.cases", compare_tables.CaseTable),
-    ("[weight_delay]", delay_tables.WeightDelayTable),
-    ("[tune]", tune_tables.TuneTable),
-    ('[tune.parameters."dotted.path"]', tune_tables.RangeTable),
-    ("[tune.weights]", tune_tables.TuneWeightsTable),
-    ("[tune.constraints]", tune_tables.TuneConstraintsTable),
-    ("[advantage]", advantage_tables.AdvantageTable),
-    ("[tune.certificate]", tune_tables.TuneCertificateTable),
-)
+
+def tables_in(annotation: Any, path: str) -> Iterator[tuple[str, type[Table]]]:
+    """Every table inside a type of a design's keys, with the words that stand for it in a file."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        law = annotation.model_fields.get("law")
+        named = f' law = "{get_args(law.annotation)[0]}"' if law else ""
+        yield (path if path.startswith("[") else f"[{path}]") + named, annotation
+        inside = path.strip("[]")
+        for key, info in annotation.model_fields.items():
+            yield from tables_in(info.annotation, f"{inside}.{key}" if inside else key)
+        return
+    kind = get_origin(annotation)
+    path = {tuple: f"[[{path}]]", dict: f'[{path}."dotted.path"]'}.get(kind, path)
+    for argument in get_args(annotation):
+        yield from tables_in(argument, path)
+
+
+def tables() -> dict[type[Table], str]:
+    """Every table that a design may hold, in the order of the file, each once."""
+    found: dict[type[Table], str] = {}
+    for name, table in tables_in(DesignTables, ""):
+        found.setdefault(table, name)
+    del found[DesignTables]
+    return found
 
 
 def main() -> None:
@@ -97,10 +58,10 @@ def main() -> None:
 
 def page() -> str:
     """The whole page."""
-    return "\n".join([HEAD, *(_section(name, table) for name, table in TABLES)])
+    return "\n".join([HEAD, *(_section(name, table) for table, name in tables().items())])
 
 
-def _section(name: str, table: type[tables.Table]) -> str:
+def _section(name: str, table: type[Table]) -> str:
     lines = [f"## `{name}`", "", inspect.getdoc(table) or "", ""]
     lines += ["| key | unit | default |", "|---|---|---|"]
     for key, info in table.model_fields.items():
@@ -124,6 +85,8 @@ def _default(info: Any, kind: Any) -> str:
     value = info.default
     if value is None or info.default_factory is not None:
         return ""
+    if isinstance(value, Table):
+        return "its own table, below"
     if kind is not None:
         values = value if isinstance(value, tuple) else (value,)
         return ", ".join(units.write(one, kind) for one in values)

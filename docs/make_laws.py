@@ -12,16 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from drillctl.linear import tuning
-from drillctl.rig.bit_rock import (
-    JansenVanDenSteen,
-    NavarroLopezSuarez,
-    OverWeight,
-    PrintedThreeBranch,
-    Stribeck,
-    Tabulated,
-    TuckerWang,
-    tabulated,
-)
+from drillctl.rig.bit_rock.law import friction_laws
 from drillctl.rig.top_drive import PI, ConstantTorque, RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import (
     AlarmWeight,
@@ -33,24 +24,8 @@ from drillctl.rig.weight_on_bit import (
 
 HERE = Path(__file__).resolve().parent
 
-BIT_ROCK = (
-    (NavarroLopezSuarez, '`law = "navarro-lopez-suarez"` (a1, a2, beta, or a table over the weight '
-     'on bit); `law = "bit-radius-friction"` (the same with bit radius and friction coefficients)',
-     "The paper's law and the default of the shipped designs."),
-    (OverWeight, '`law = "navarro-lopez-suarez"` with a `table` and a weight on bit that moves',
-     "Taken by itself wherever the weight changes while the bit drills."),
-    (PrintedThreeBranch, '`law = "printed-three-branch"` (a1, a2, beta, or a table over the weight '
-     'on bit; tolerance, by default `"1e-4 rad/s"`)',
-     "To see what the paper's own numerical stand-in does beside the set, one run at a time: the "
-     "reference solver locates where its torque jumps; the batch engine refuses it by name."),
-    (JansenVanDenSteen, '`law = "jansen-van-den-steen"` (a1, a2), `law = "coulomb"` (a)',
-     "To tell what the static peak does from what the falling slope does."),
-    (Tabulated, '`law = "tabulated"` (points, static)', "For measured torque over speed."),
-    (TuckerWang, '`law = "tucker-wang"` (a, b1, b2, b3)', "To compare with the literature."),
-    (Stribeck, '`law = "stribeck"`, or `regularised_over` with either form of the first law',
-     "To compare with simulators that regularise; `drillctl regularisation` says what that "
-     "costs."),
-)  # fmt: skip
+FORMS = tuple(form for law in friction_laws().values() for form in law.forms)
+BIT_ROCK = tuple((form.numbers, form.keys, form.use) for form in FORMS)
 DRIVES = (
     (PI, '`law = "pi"` (kp, ki)', "Speed control as in the paper."),
     (ConstantTorque, '`law = "constant-torque"` (torque)', "A drive at its torque limit."),
@@ -137,17 +112,10 @@ def picture(path: Path) -> None:
     from drillctl.units import RPM
 
     weight = 140e3
-    laws = {
-        "Navarro-Lopez & Suarez, 140 kN": NavarroLopezSuarez(0.026, 0.085, 0.098),
-        "the same, regularised over 0.5 rad/s": Stribeck(0.085, 0.026, 0.098, 2.0),
-        "Jansen & van den Steen": JansenVanDenSteen(0.047, 0.085),
-        "tabulated": tabulated(0.09, (0.0, 3.0, 8.0, 20.0), (0.085, 0.06, 0.05, 0.035)),
-        "Tucker & Wang": TuckerWang(0.0239, 1.91, 8.5, 5.47),
-        "Stribeck, R 0.1 m": Stribeck(0.08, 0.05, 1.0, 20.0),
-    }
+    curves = [curve for form in FORMS for curve in form.curves]
     speed = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 21.0, 400)])
     figure, ax = style.axes_or_new(None, 8.0, 4.8)
-    for number, (name, law) in enumerate(laws.items()):
+    for number, (name, law) in enumerate(curves):
         torque, _ = law.torque_and_slope(weight, speed, np.exp)
         look = {"color": style.COLOURS[number], "linestyle": style.DASHES[number % 4]}
         ax.plot(speed / RPM, torque / 1e3, linewidth=style.LINE, label=name, **look)

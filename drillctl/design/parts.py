@@ -5,33 +5,11 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from drillctl.design.bit_rock_tables import (
-    BitRadiusFrictionTable,
-    CoulombTable,
-    FrictionCoefficients,
-    FrictionRow,
-    JansenVanDenSteenTable,
-    NavarroLopezSuarezTable,
-    PrintedThreeBranchTable,
-    StribeckTable,
-    TabulatedFrictionTable,
-    TuckerWangTable,
-)
 from drillctl.design.tables import DesignTables, SectionTable
 from drillctl.design.weight_tables import ConstantWeightTable
 from drillctl.errors import InputError
-from drillctl.rig.bit_rock import (
-    BitRockLaw,
-    JansenVanDenSteen,
-    NavarroLopezSuarez,
-    PrintedThreeBranch,
-    Stribeck,
-    TuckerWang,
-    WeightTable,
-    changed_rock,
-    over_weight,
-    tabulated,
-)
+from drillctl.rig.bit_rock import BitRockLaw
+from drillctl.rig.bit_rock.law import changed_rock, form_of, friction_laws
 from drillctl.rig.drillstring import GRADES, PIPES, Drillstring, Section, assemble, polar_moment
 from drillctl.rig.drillstring.section import torsional_yield
 from drillctl.rig.program import STILL, Program, Ramp
@@ -163,17 +141,13 @@ def refuse_massless_node(tables: DesignTables) -> None:
 
 def bit_rock(tables: DesignTables) -> BitRockLaw:
     """Bit-rock law at the operating weight on bit."""
-    law = _friction(tables)
-    _refuse_impossible_friction(law, tables)
-    over = getattr(tables.bit_rock, "regularised_over", None)
-    if over is None or isinstance(tables.bit_rock, StribeckTable):
+    table, weight = tables.bit_rock, tables.operating_point.weight_on_bit
+    entry = friction_laws()[table.law]
+    law = entry.make(table, weight, weight_moves(tables))
+    _refuse_impossible_friction(law, weight)
+    if entry.regularised is None or table.regularised_over is None:
         return law
-    if not isinstance(law, NavarroLopezSuarez):
-        raise InputError(
-            "does not go with a weight on bit that moves over a friction table",
-            "bit_rock.regularised_over",
-        )
-    return Stribeck(static=law.a2, sliding=law.a1, decay=law.beta, sharpness=1.0 / over)
+    return entry.regularised(law, table)
 
 
 def weight_moves(tables: DesignTables) -> bool:
@@ -195,66 +169,12 @@ def bit_rock_before(tables: DesignTables) -> BitRockLaw:
         raise InputError(error.problem, f"scenario.bit_rock.{error.where}") from None
 
 
-def _friction(tables: DesignTables) -> BitRockLaw:
-    table = tables.bit_rock
-    match table:
-        case NavarroLopezSuarezTable():
-            fixed = _navarro_lopez_suarez(table, tables.operating_point.weight_on_bit)
-            if table.table is None or not weight_moves(tables):
-                return fixed
-            factors = (table.a1_factor, table.a2_factor, table.beta_factor)
-            return over_weight(_rows(table.table), *factors)
-        case PrintedThreeBranchTable():
-            if table.table is not None and weight_moves(tables):
-                raise InputError(
-                    f"does not go with a weight on bit that moves under {table.law!r}; "
-                    "give a1, a2 and beta",
-                    "bit_rock.table",
-                )
-            turning = _navarro_lopez_suarez(table, tables.operating_point.weight_on_bit)
-            return PrintedThreeBranch(*turning, table.tolerance)
-        case BitRadiusFrictionTable():
-            return NavarroLopezSuarez(
-                a1=table.bit_radius * table.sliding_coefficient,
-                a2=table.bit_radius * table.static_coefficient,
-                beta=table.decay / table.reference_speed,
-            )
-        case JansenVanDenSteenTable():
-            return JansenVanDenSteen(table.a1, table.a2)
-        case CoulombTable():
-            return JansenVanDenSteen(table.a, table.a)
-        case TuckerWangTable():
-            return TuckerWang(table.a, table.b1, table.b2, table.b3)
-        case StribeckTable():
-            return Stribeck(
-                static=table.bit_radius * table.static_coefficient,
-                sliding=table.bit_radius * table.sliding_coefficient,
-                decay=1.0 / table.stribeck_speed,
-                sharpness=1.0 / table.regularised_over,
-            )
-        case TabulatedFrictionTable():
-            arms = tuple(point.a for point in table.points)
-            static = arms[0] if table.static is None else table.static
-            return tabulated(static, tuple(point.speed for point in table.points), arms)
-
-
-def _navarro_lopez_suarez(table: FrictionCoefficients, weight: float) -> NavarroLopezSuarez:
-    law = _coefficients(table, weight)
-    law = NavarroLopezSuarez(
-        law.a1 * table.a1_factor, law.a2 * table.a2_factor, law.beta * table.beta_factor
-    )
-    if law.a2 < law.a1:
-        raise InputError(
-            f"the factors give a2 = {law.a2:g}, less than a1 = {law.a1:g}", "bit_rock.a2_factor"
-        )
-    return law
-
-
-def _refuse_impossible_friction(law: BitRockLaw, tables: DesignTables) -> None:
+def _refuse_impossible_friction(law: BitRockLaw, weight: float) -> None:
     """Refuse coefficients that overflow, or turn negative far outside a table."""
-    weight = tables.operating_point.weight_on_bit
-    numbers = law._asdict() if isinstance(law, (NavarroLopezSuarez, PrintedThreeBranch)) else {}
-    for name, value in (*numbers.items(), ("static torque", law.static_torque(weight))):
+    form = form_of(law)
+    groups = (form.sliding, form.static, form.decay)
+    numbers = [(names[0], getattr(law, names[0])) for names in groups if len(names) == 1]
+    for name, value in (*numbers, ("static torque", law.static_torque(weight))):
         if not 0.0 <= value < math.inf:
             raise InputError(
                 f"its numbers give {name} = {value:g} at {weight / 1e3:g} kN", "bit_rock"
@@ -263,33 +183,10 @@ def _refuse_impossible_friction(law: BitRockLaw, tables: DesignTables) -> None:
 
 def table_range(tables: DesignTables) -> tuple[float, float]:
     """Lowest and highest weight (N) of the friction table; any weight without a table."""
-    table = tables.bit_rock
-    if not isinstance(table, FrictionCoefficients) or table.table is None:
+    rows = getattr(tables.bit_rock, "table", None)
+    if rows is None:
         return 0.0, HEAVIEST
-    return table.table[0].weight_on_bit, table.table[-1].weight_on_bit
-
-
-def _rows(table: tuple[FrictionRow, ...]) -> WeightTable:
-    return WeightTable(
-        weight=tuple(row.weight_on_bit for row in table),
-        a1=tuple(row.a1 for row in table),
-        a2=tuple(row.a2 for row in table),
-        beta=tuple(row.beta for row in table),
-    )
-
-
-def _coefficients(table: FrictionCoefficients, weight: float) -> NavarroLopezSuarez:
-    if table.table is None:
-        return NavarroLopezSuarez(table.a1, table.a2, table.beta)
-    rows = _rows(table.table)
-    if not rows.covers(weight) and table.outside_table == "refuse":
-        raise InputError(
-            f"{weight / 1e3:g} kN lies outside the friction table "
-            f"({rows.weight[0] / 1e3:g} to {rows.weight[-1] / 1e3:g} kN); "
-            'allowed with bit_rock.outside_table = "extrapolate"',
-            "operating_point.weight_on_bit",
-        )
-    return rows.at(weight)
+    return rows[0].weight_on_bit, rows[-1].weight_on_bit
 
 
 def torque_at_set_speed(tables: DesignTables) -> float:

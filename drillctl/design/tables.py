@@ -6,14 +6,13 @@ the class that holds both.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from drillctl import units
 from drillctl.design.advantage_tables import AdvantageTable
 from drillctl.design.axis_table import AxisTable as AxisTable
-from drillctl.design.bit_rock_tables import BitRockTable
 from drillctl.design.compare_tables import CompareTable
 from drillctl.design.controller_tables import ControllerTable, PITable
 from drillctl.design.delay_tables import WeightDelayTable
@@ -23,8 +22,14 @@ from drillctl.design.uncertain_tables import DistributionTable, UncertaintyTable
 from drillctl.design.weight_tables import ConstantWeightTable, WeightOnBitTable
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig import table as q
+from drillctl.rig.bit_rock.law import friction_laws
 from drillctl.rig.drillstring import GRADES, PIPES
-from drillctl.rig.table import Table
+from drillctl.rig.table import Table, one_of
+
+if TYPE_CHECKING:  # a law's own keys are known to its file alone
+    BitRockTable = Any
+else:
+    BitRockTable = one_of(friction_laws().values())
 
 
 class OperatingPoint(Table):

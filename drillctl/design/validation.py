@@ -6,10 +6,9 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from drillctl.design.bit_rock_tables import BitRockTable
 from drillctl.design.controller_tables import ControllerTable
 from drillctl.design.merging import Tree
-from drillctl.design.tables import DesignTables
+from drillctl.design.tables import BitRockTable, DesignTables
 from drillctl.design.weight_tables import WeightOnBitTable
 from drillctl.errors import InputError, nearest, shown
 

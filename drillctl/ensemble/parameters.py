@@ -24,22 +24,13 @@ from drillctl.design import Design, Parameter, parameter
 from drillctl.design.tables import DistributionTable
 from drillctl.ensemble.sampling import correlated, correlation_root, sampling_of
 from drillctl.errors import InputError
+from drillctl.rig.bit_rock.law import friction_laws
 
 Array = NDArray[np.float64]
 
 DEFAULT_COV = 0.05
-"""Coefficient of variation of the rock where a design names nothing uncertain."""
-DEFAULT_PATHS = {
-    "navarro-lopez-suarez": ("bit_rock.a1_factor", "bit_rock.a2_factor"),
-    "printed-three-branch": ("bit_rock.a1_factor", "bit_rock.a2_factor"),
-    "bit-radius-friction": ("bit_rock.sliding_coefficient", "bit_rock.static_coefficient"),
-    "stribeck": ("bit_rock.sliding_coefficient", "bit_rock.static_coefficient"),
-    "jansen-van-den-steen": ("bit_rock.a1", "bit_rock.a2"),
-    "coulomb": ("bit_rock.a",),
-    "tucker-wang": ("bit_rock.a",),
-}
-"""What is uncertain where a design names nothing: sliding and static torque of the rock,
-lognormal about the design's own values."""
+"""Coefficient of variation of the rock where a design names nothing uncertain: lognormal draws of
+sliding and static torque about its own values."""
 
 FAR = 8.0
 """Standard deviations beyond which a limit cuts nothing off a normal distribution."""
@@ -136,7 +127,7 @@ def draw(design: Design, count: int, seed: int, first: int = 0) -> Draws:
     Parameters
     ----------
     design : Design
-        Its `[uncertain]` tables, or the defaults of `DEFAULT_PATHS`.
+        Its `[uncertain]` tables, or the default draws of its friction law.
     count : int
         How many draws.
     seed : int
@@ -186,7 +177,7 @@ def uncertain_parameters(design: Design) -> tuple[Uncertain, ...]:
     Parameters
     ----------
     design : Design
-        Its `[uncertain]` tables, or the defaults of `DEFAULT_PATHS`.
+        Its `[uncertain]` tables, or the default draws of its friction law.
 
     Raises
     ------
@@ -208,14 +199,15 @@ def uncertain_parameters(design: Design) -> tuple[Uncertain, ...]:
 
 def _defaults(design: Design) -> dict[str, DistributionTable]:
     law = design.tables.bit_rock.law
-    if law not in DEFAULT_PATHS:
+    keys = friction_laws()[law].draws
+    if not keys:
         raise InputError(
             f"nothing is named uncertain, and there is no default for the friction law {law!r}; "
             'give a table such as [uncertain."operating_point.weight_on_bit"]',
             "uncertain",
         )
     table = DistributionTable(distribution="lognormal", cov=DEFAULT_COV)
-    return dict.fromkeys(DEFAULT_PATHS[law], table)
+    return dict.fromkeys([f"bit_rock.{key}" for key in keys], table)
 
 
 def _read(design: Design, path: str, table: DistributionTable) -> Uncertain:

@@ -27,7 +27,7 @@ from drillctl.linear.modal import Expansion
 from drillctl.linear.observer import Observer
 from drillctl.linear.poles import natural_frequencies
 from drillctl.linear.transmission import Banded, EndMobility, Lines, Model
-from drillctl.rig.bit_rock.contact import by_weight
+from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.drillstring import Drillstring, Parts
 from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 

@@ -12,7 +12,7 @@ from drillctl import units
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import contact
-from drillctl.rig.bit_rock.contact import by_weight
+from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
 
 Array = NDArray[np.float64]

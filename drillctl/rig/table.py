@@ -6,10 +6,10 @@ What every table of a design file is.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Annotated
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, Union, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from drillctl import units
 from drillctl.errors import InputError, shown
@@ -174,6 +174,16 @@ class Table(BaseModel):
     """A table of a design: unknown keys refused, frozen when made."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def law_name(table: type[Table]) -> str:
+    """The law that a table is of: the one word that its `law` allows."""
+    return str(get_args(table.model_fields["law"].annotation)[0])
+
+
+def one_of(laws: Iterable[Any]) -> Any:
+    """The type of a table that is one of several, as its `law` says."""
+    return Annotated[Union[tuple(law.table for law in laws)], Field(discriminator="law")]  # noqa: UP007
 
 
 def number_or_quantity(value: object) -> object:

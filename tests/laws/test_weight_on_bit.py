@@ -13,7 +13,7 @@ from drillctl import units
 from drillctl.errors import InputError
 from drillctl.linear import cancelling_weight_gain, operating_point
 from drillctl.rig.bit_rock import NavarroLopezSuarez, WeightTable, contact, over_weight
-from drillctl.rig.bit_rock.contact import by_weight
+from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed
 
 DESIGN = "monteiro-trindade-140kn"

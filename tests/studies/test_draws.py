@@ -9,9 +9,22 @@ from scipy import stats
 import drillctl
 from drillctl.design import to_toml
 from drillctl.ensemble.draws import drawn_lanes
-from drillctl.ensemble.parameters import DEFAULT_COV, DEFAULT_PATHS, draw, uncertain_parameters
+from drillctl.ensemble.parameters import DEFAULT_COV, draw, uncertain_parameters
 from drillctl.ensemble.sampling import probabilities
 from drillctl.errors import InputError
+from drillctl.rig.bit_rock.law import friction_laws
+
+DEFAULT_PATHS = {
+    "navarro-lopez-suarez": ("bit_rock.a1_factor", "bit_rock.a2_factor"),
+    "printed-three-branch": ("bit_rock.a1_factor", "bit_rock.a2_factor"),
+    "bit-radius-friction": ("bit_rock.sliding_coefficient", "bit_rock.static_coefficient"),
+    "stribeck": ("bit_rock.sliding_coefficient", "bit_rock.static_coefficient"),
+    "jansen-van-den-steen": ("bit_rock.a1", "bit_rock.a2"),
+    "coulomb": ("bit_rock.a",),
+    "tucker-wang": ("bit_rock.a",),
+    "tabulated": (),
+}
+
 
 HOLDS = (
     (
@@ -96,6 +109,12 @@ def test_every_shipped_design_has_something_uncertain(name):
     assert found
     if not design.tables.uncertain:
         assert tuple(p.path for p in found) == DEFAULT_PATHS[design.tables.bit_rock.law]
+
+
+def test_every_friction_law_says_what_is_uncertain_by_default_or_refuses():
+    assert {
+        name: tuple(f"bit_rock.{key}" for key in law.draws) for name, law in friction_laws().items()
+    } == DEFAULT_PATHS
 
 
 # --- a draw is a function of seed, parameter and number alone ----------------------------------

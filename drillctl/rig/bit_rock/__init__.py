@@ -15,21 +15,25 @@ calls them with symbols; hence the exponential comes in as an argument.
 - `set_valued`: whether it is one. The smooth laws of the literature are not: a bit creeps under
   them where it should stand still. They are here to be compared. The printed law of
   Monteiro & Trindade is another stand-in, which the reference solver alone can run.
+
+Each law has a file, which `drillctl.registry` names: its equation, its keys in a design, how it is
+made from them, and its `LAWS` entry with what studies and documents know of it.
 """
 
 from __future__ import annotations
 
-from drillctl.rig.bit_rock.change import changed_rock
-from drillctl.rig.bit_rock.contact import contact
 from drillctl.rig.bit_rock.jansen_van_den_steen import JansenVanDenSteen
-from drillctl.rig.bit_rock.navarro_lopez_suarez import NavarroLopezSuarez
-from drillctl.rig.bit_rock.over_weight import OverWeight, over_weight
+from drillctl.rig.bit_rock.law import BitRockLaw, changed_rock, contact
+from drillctl.rig.bit_rock.navarro_lopez_suarez import (
+    NavarroLopezSuarez,
+    OverWeight,
+    WeightTable,
+    over_weight,
+)
 from drillctl.rig.bit_rock.printed_three_branch import PrintedThreeBranch
-from drillctl.rig.bit_rock.protocol import BitRockLaw
 from drillctl.rig.bit_rock.stribeck import Stribeck
 from drillctl.rig.bit_rock.tabulated import Tabulated, tabulated
 from drillctl.rig.bit_rock.tucker_wang import TuckerWang
-from drillctl.rig.bit_rock.weight_table import WeightTable
 
 __all__ = [
     "BitRockLaw",

@@ -1,10 +1,14 @@
-"""A static peak over a constant sliding torque (Jansen & van den Steen 1995, simplified)."""
+"""A static peak over a constant sliding torque (Jansen & van den Steen 1995), and Coulomb's law."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from drillctl.rig.bit_rock.protocol import Exp
+from pydantic import model_validator
+
+from drillctl.rig import table as q
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, refuse_rising
+from drillctl.rig.table import Table
 
 
 class JansenVanDenSteen(NamedTuple):
@@ -48,3 +52,47 @@ class JansenVanDenSteen(NamedTuple):
         """Torque (N m) and slope (N m s/rad) at `speed` >= 0 (rad/s) under `weight` (N)."""
         none = 0.0 * weight * speed
         return self.a1 * weight + none, none
+
+
+class JansenVanDenSteenTable(Table):
+    """A static peak over a constant sliding torque (after Jansen & van den Steen 1995)."""
+
+    law: Literal["jansen-van-den-steen"]
+    a1: q.NonNegativeNumber
+    a2: q.NonNegativeNumber
+
+    @model_validator(mode="after")
+    def _peak(self) -> JansenVanDenSteenTable:
+        refuse_rising(self.a2, self.a1)
+        return self
+
+
+class CoulombTable(Table):
+    """The same torque at rest and at any speed: a x weight on bit."""
+
+    law: Literal["coulomb"]
+    a: q.NonNegativeNumber
+
+
+LAWS = (
+    FrictionLaw(
+        JansenVanDenSteenTable,
+        lambda table, weight, moves: JansenVanDenSteen(table.a1, table.a2),
+        draws=("a1", "a2"),
+        forms=(
+            Form(
+                JansenVanDenSteen,
+                static=("a2",),
+                sliding=("a1",),
+                keys='`law = "jansen-van-den-steen"` (a1, a2), `law = "coulomb"` (a)',
+                use="To tell what the static peak does from what the falling slope does.",
+                curves=(("Jansen & van den Steen", JansenVanDenSteen(0.047, 0.085)),),
+            ),
+        ),
+    ),
+    FrictionLaw(
+        CoulombTable,
+        lambda table, weight, moves: JansenVanDenSteen(table.a, table.a),
+        draws=("a",),
+    ),
+)

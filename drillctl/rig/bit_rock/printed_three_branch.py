@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from drillctl.rig.bit_rock.navarro_lopez_suarez import NavarroLopezSuarez
-from drillctl.rig.bit_rock.protocol import Exp
+from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw
+from drillctl.rig.bit_rock.navarro_lopez_suarez import FrictionCoefficients, NavarroLopezSuarez
 
 
 class PrintedThreeBranch(NamedTuple):
@@ -72,3 +74,42 @@ class PrintedThreeBranch(NamedTuple):
         Within the tolerance the torque depends on the string, which only a simulation knows.
         """
         return self.turning.torque_and_slope(weight, speed, exp)
+
+
+class PrintedThreeBranchTable(FrictionCoefficients):
+    """The same in three branches as Monteiro & Trindade print it; reference solver only."""
+
+    law: Literal["printed-three-branch"]
+    tolerance: q.PositiveSpeed = 1e-4
+
+
+def _law(table: PrintedThreeBranchTable, weight: float, moves: bool) -> PrintedThreeBranch:
+    if table.table is not None and moves:
+        raise InputError(
+            f"does not go with a weight on bit that moves under {table.law!r}; "
+            "give a1, a2 and beta",
+            "bit_rock.table",
+        )
+    return PrintedThreeBranch(*table.at(weight), table.tolerance)
+
+
+LAWS = (
+    FrictionLaw(
+        PrintedThreeBranchTable,
+        _law,
+        draws=("a1_factor", "a2_factor"),
+        forms=(
+            Form(
+                PrintedThreeBranch,
+                static=("a2",),
+                sliding=("a1",),
+                decay=("beta",),
+                keys='`law = "printed-three-branch"` (a1, a2, beta, or a table over the weight on '
+                'bit; tolerance, by default `"1e-4 rad/s"`)',
+                use="To see what the paper's own numerical stand-in does beside the set, one run "
+                "at a time: the reference solver locates where its torque jumps; the batch engine "
+                "refuses it by name.",
+            ),
+        ),
+    ),
+)

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from drillctl.rig.bit_rock.protocol import Exp
+from pydantic import model_validator
+
+from drillctl.rig import table as q
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, refuse_rising
+from drillctl.rig.table import Table
+
+COEFFICIENTS = ("static_coefficient", "sliding_coefficient")
 
 
 class Stribeck(NamedTuple):
@@ -56,3 +62,49 @@ class Stribeck(NamedTuple):
         level = self.sliding * weight + falling
         rise = self.sharpness * (1.0 - tanh * tanh)
         return level * tanh, level * rise - self.decay * falling * tanh
+
+
+class StribeckTable(Table):
+    """Stribeck friction regularised by tanh, smooth; defaults of a public simulator."""
+
+    law: Literal["stribeck"]
+    bit_radius: q.Diameter
+    static_coefficient: q.NonNegativeNumber = 0.8
+    sliding_coefficient: q.NonNegativeNumber = 0.5
+    stribeck_speed: q.PositiveSpeed = 1.0
+    regularised_over: q.PositiveSpeed = 0.05
+
+    @model_validator(mode="after")
+    def _falling(self) -> StribeckTable:
+        refuse_rising(self.static_coefficient, self.sliding_coefficient, COEFFICIENTS)
+        return self
+
+
+def _law(table: StribeckTable, weight: float, moves: bool) -> Stribeck:
+    return Stribeck(
+        static=table.bit_radius * table.static_coefficient,
+        sliding=table.bit_radius * table.sliding_coefficient,
+        decay=1.0 / table.stribeck_speed,
+        sharpness=1.0 / table.regularised_over,
+    )
+
+
+LAWS = (
+    FrictionLaw(
+        StribeckTable,
+        _law,
+        draws=("sliding_coefficient", "static_coefficient"),
+        forms=(
+            Form(
+                Stribeck,
+                static=("static",),
+                sliding=("sliding",),
+                decay=("decay",),
+                keys='`law = "stribeck"`, or `regularised_over` with either form of the first law',
+                use="To compare with simulators that regularise; `drillctl regularisation` says "
+                "what that costs.",
+                curves=(("Stribeck, R 0.1 m", Stribeck(0.08, 0.05, 1.0, 20.0)),),
+            ),
+        ),
+    ),
+)

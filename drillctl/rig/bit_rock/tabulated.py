@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from itertools import pairwise
+from typing import Any, Literal, NamedTuple
 
-from drillctl.rig.bit_rock.protocol import Exp
+from pydantic import model_validator
+
+from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw
+from drillctl.rig.table import Table
 
 KNOTS = 12
 """Most points after the first."""
@@ -124,3 +130,60 @@ def tabulated(static: float, speeds: tuple[float, ...], torques: tuple[float, ..
         *changes,
         *([0.0] * unused),
     )
+
+
+class FrictionPoint(Table):
+    """Torque over weight on bit at one speed."""
+
+    speed: q.Speed
+    a: q.NonNegativeNumber
+
+
+class TabulatedFrictionTable(Table):
+    """Measured points of torque over weight, straight lines between them."""
+
+    law: Literal["tabulated"]
+    points: tuple[FrictionPoint, ...]
+    static: q.NonNegativeNumber | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> TabulatedFrictionTable:
+        if not 2 <= len(self.points) <= KNOTS + 1:
+            raise InputError(f"needs 2 to {KNOTS + 1} points, got {len(self.points)}")
+        speeds = [point.speed for point in self.points]
+        if speeds[0] != 0.0 or any(b <= a for a, b in pairwise(speeds)):
+            raise InputError("speeds of the points must begin at 0 and increase")
+        if self.static is not None and self.static < self.points[0].a:
+            raise InputError(
+                f"static = {self.static:g} must not be less than the first a = {self.points[0].a:g}"
+            )
+        return self
+
+
+def _law(table: TabulatedFrictionTable, weight: float, moves: bool) -> Tabulated:
+    arms = tuple(point.a for point in table.points)
+    static = arms[0] if table.static is None else table.static
+    return tabulated(static, tuple(point.speed for point in table.points), arms)
+
+
+LAWS = (
+    FrictionLaw(
+        TabulatedFrictionTable,
+        _law,
+        forms=(
+            Form(
+                Tabulated,
+                static=("static",),
+                sliding=("start", "rise", "fall", *(f"c{k}" for k in range(1, KNOTS + 1))),
+                keys='`law = "tabulated"` (points, static)',
+                use="For measured torque over speed.",
+                curves=(
+                    (
+                        "tabulated",
+                        tabulated(0.09, (0.0, 3.0, 8.0, 20.0), (0.085, 0.06, 0.05, 0.035)),
+                    ),
+                ),
+            ),
+        ),
+    ),
+)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from drillctl.rig.bit_rock.protocol import Exp
+from drillctl.rig import table as q
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw
+from drillctl.rig.table import Table
 
 
 class TuckerWang(NamedTuple):
@@ -60,3 +62,31 @@ class TuckerWang(NamedTuple):
         torque = scale * (tanh + self.b2 * speed * under)
         hump = self.b2 * (1.0 - self.b3 * speed * speed) * under * under
         return torque, scale * (self.b1 * (1.0 - tanh * tanh) + hump)
+
+
+class TuckerWangTable(Table):
+    """Smooth friction with a hump (Tucker & Wang family); defaults of a public model."""
+
+    law: Literal["tucker-wang"]
+    a: q.NonNegativeNumber = 0.0239
+    b1: q.PositiveNumber = 1.91
+    b2: q.NonNegativeNumber = 8.5
+    b3: q.NonNegativeNumber = 5.47
+
+
+LAWS = (
+    FrictionLaw(
+        TuckerWangTable,
+        lambda table, weight, moves: TuckerWang(table.a, table.b1, table.b2, table.b3),
+        draws=("a",),
+        forms=(
+            Form(
+                TuckerWang,
+                sliding=("a",),
+                keys='`law = "tucker-wang"` (a, b1, b2, b3)',
+                use="To compare with the literature.",
+                curves=(("Tucker & Wang", TuckerWang(0.0239, 1.91, 8.5, 5.47)),),
+            ),
+        ),
+    ),
+)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from drillctl.rig.bit_rock import OverWeight
-from drillctl.rig.bit_rock.protocol import Exp
+from drillctl.rig.bit_rock.law import Exp
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import at, put
 from drillctl.simulation.kernels.compiling import by_type, inlined

@@ -136,7 +136,7 @@ def moves(weight: Any) -> bool:
 
 
 def contact(friction: Any, weight: Any, speed: Any) -> Any:
-    """`bit_rock.contact.contact(friction, weight, speed, exp)`."""
+    """`bit_rock.law.contact(friction, weight, speed, exp)`."""
     raise NotImplementedError("compiled only")
 
 

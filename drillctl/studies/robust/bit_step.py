@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from drillctl.rig.bit_rock.contact import contact
+from drillctl.rig.bit_rock.law import contact
 from drillctl.simulation.kernels.lane_step import NEWTON_STEP
 
 NEWTON = 4

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.rig.bit_rock.contact import contact
+from drillctl.rig.bit_rock.law import contact
 from drillctl.rig.top_drive import PI, ConstantTorque, RealDrive
 from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed
 from drillctl.simulation.batch import Prepared
