@@ -7,24 +7,29 @@ DEMO := runs/demo
 
 .PHONY: demo test test-all test-lowest lint format docs bench reports clean
 
-$(BIN)/drillctl: pyproject.toml
+# The product alone; each kind of work adds its own tools, noted by a file of that name.
+$(VENV)/product: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=24"
-	$(BIN)/python -m pip install --quiet -e ".[dev]"
-	@touch $(BIN)/drillctl
+	$(BIN)/python -m pip install --quiet -e .
+	@touch $@
+
+$(VENV)/test $(VENV)/lint $(VENV)/docs $(VENV)/bench: $(VENV)/%: $(VENV)/product
+	$(BIN)/python -m pip install --quiet -e ".[$*]"
+	@touch $@
 
 # The source paper's case: modes, loop, one run, the J1 map; figures, data and summaries.
-demo: $(BIN)/drillctl
+demo: $(VENV)/product
 	$(BIN)/drillctl modes monteiro-trindade-140kn --out $(DEMO)/modes
 	$(BIN)/drillctl loop monteiro-trindade-140kn --out $(DEMO)/loop
 	$(BIN)/drillctl simulate monteiro-trindade-140kn --out $(DEMO)/simulate
 	$(BIN)/drillctl map monteiro-trindade-140kn --out $(DEMO)/map
 	@echo "pictures, data and summaries: $(CURDIR)/$(DEMO)"
 
-test: $(BIN)/drillctl
+test: $(VENV)/test
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow"
 
-test-all: $(BIN)/drillctl
+test-all: $(VENV)/test
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 # The lower bounds of pyproject.toml, in an environment of their own.
@@ -33,25 +38,25 @@ test-lowest:
 	$(VENV)-lowest/bin/python -m pip install --quiet -c lowest.txt -e ".[test]"
 	$(VENV)-lowest/bin/python -m pytest -q -n 2 -m "not slow"
 
-lint: $(BIN)/drillctl
+lint: $(VENV)/lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-format: $(BIN)/drillctl
+format: $(VENV)/lint
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
 # The documentation site, in build/docs; warnings and broken links are errors.
-docs: $(BIN)/drillctl
+docs: $(VENV)/docs
 	$(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
 	$(BIN)/python docs/check_links.py build/docs
 	@echo "site: $(CURDIR)/build/docs/index.html"
 
 # The table, the JSON file and the picture of benchmarks/README.md. A peer that cannot be installed
 # is told there as missing. `make bench BENCH=--quick` for a look.
-bench: $(BIN)/drillctl
-	-$(BIN)/python -m pip install --quiet -e ".[bench]"
+bench: $(VENV)/product
+	-$(MAKE) $(VENV)/bench
 	$(BIN)/python -m benchmarks.run $(BENCH)
 
 clean:
@@ -59,6 +64,6 @@ clean:
 	find . -name __pycache__ -not -path "./$(VENV)*" -prune -exec rm -rf {} +
 
 # Everything under reports/, made again; the HTML of each report under runs/reports/.
-reports: $(BIN)/drillctl
+reports: $(VENV)/product
 	$(BIN)/python reports/make.py
 	$(BIN)/python docs/make_weight_on_bit.py

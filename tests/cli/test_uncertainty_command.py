@@ -362,8 +362,7 @@ def test_a_full_disk_is_told_and_loses_no_finished_block(call, monkeypatch):
     same(drillctl.open("run"), whole)
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_read_only_folder_is_told(call):
+def test_a_read_only_folder_is_told(call, permissions_count):
     Path("run").mkdir(mode=0o555)
     code, out, err = call("uncertainty", PAPER, *FEW, "--out", "run/here")
     assert (code, out) == (2, "")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import subprocess
 from collections.abc import Iterator
-from pathlib import Path
 from shutil import which
 from typing import Any
 
@@ -14,10 +13,8 @@ import pytest
 from drillctl.reporting import Report
 from drillctl.reporting import html as pdf
 
-CHROMIUM = "/usr/bin/chromium"
-
 pytestmark = [
-    pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no Chromium"),
+    pytest.mark.skipif(pdf.browser() is None, reason="no Chromium"),
 ]
 
 # Text on what it stands on; WCAG 2.1 asks for 4.5, and 3 for large text. Also: labels, names of
@@ -92,7 +89,7 @@ def browser() -> Iterator[Any]:
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as started:
         found = started.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--disable-quic"]
+            executable_path=pdf.browser(), args=["--no-sandbox", "--disable-gpu", "--disable-quic"]
         )
         yield found
         found.close()
