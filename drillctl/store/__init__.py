@@ -11,18 +11,42 @@ No pickle anywhere; a folder that holds anything else is never written to. `fold
 folders, `kinds/` says of each kind of result what it was asked for and how it is read back.
 """
 
-from drillctl.store.differences import growing_realizations
-from drillctl.store.folder import RunFolder, claim, identity
-from drillctl.store.kinds.maps import asked_measures
-from drillctl.store.saving import open, save, write_data
+from __future__ import annotations
 
-__all__ = [
-    "RunFolder",
-    "asked_measures",
-    "claim",
-    "growing_realizations",
-    "identity",
-    "open",
-    "save",
-    "write_data",
-]
+from typing import TYPE_CHECKING, Any
+
+from drillctl.registry import resolve
+
+if TYPE_CHECKING:
+    from drillctl.store.differences import growing_realizations as growing_realizations
+    from drillctl.store.folder import RunFolder as RunFolder
+    from drillctl.store.folder import claim as claim
+    from drillctl.store.folder import identity as identity
+    from drillctl.store.kinds.maps import asked_measures as asked_measures
+    from drillctl.store.saving import open as open
+    from drillctl.store.saving import save as save
+    from drillctl.store.saving import write_data as write_data
+
+_HOME = {
+    "RunFolder": "folder",
+    "asked_measures": "kinds.maps",
+    "claim": "folder",
+    "growing_realizations": "differences",
+    "identity": "folder",
+    "open": "saving",
+    "save": "saving",
+    "write_data": "saving",
+}
+
+__all__ = [*_HOME]
+
+
+def __getattr__(name: str) -> Any:
+    # A list of names is written as JSON from here, and needs nothing of a design.
+    if name in _HOME:
+        return resolve(f"drillctl.store.{_HOME[name]}:{name}")
+    raise AttributeError(f"module 'drillctl.store' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
