@@ -11,9 +11,9 @@ from pathlib import Path
 
 import drillctl
 from drillctl import plots
+from drillctl.ensemble.cases import Crossing
 from drillctl.studies import WeightDelay, weight_delay
-from drillctl.studies.weight_delay.limits import EndedShare, HarmfulFrom
-from drillctl.studies.weight_delay.study import DelayedBenefit
+from drillctl.studies.delay.compute import DelayedBenefit
 
 PAGE = Path(__file__).with_name("weight-on-bit.md")
 DESIGN = "dynamic-wob-delay-140kn"
@@ -72,9 +72,9 @@ def limits(result: WeightDelay) -> list[str]:
     rows = [
         [
             f"{found.gain / 1e3:g}",
-            "at no delay" if found.ends_up_to.at is None else f"{found.ends_up_to.at.delay:g} s",
-            _share(found.ends_up_to.at),
-            _share(found.ends_up_to.next),
+            "at no delay" if found.ends_at is None else f"{found.ends_at.delay:g} s",
+            _share(found.ends_at),
+            _share(found.ends_before),
             *_harm(found.harmful_from, float(result.delays[-1])),
         ]
         for found in result.limits
@@ -86,23 +86,23 @@ def limits(result: WeightDelay) -> list[str]:
 
 
 def _difference(one: DelayedBenefit) -> str:
-    low, high = one.difference_interval
-    return f"{one.difference:+.1f} ({low:.1f} to {high:.1f})"
+    low, high = one.difference.ends
+    return f"{one.difference.value:+.1f} ({low:.1f} to {high:.1f})"
 
 
-def _share(one: EndedShare | None) -> str:
+def _share(one: DelayedBenefit | None) -> str:
     if one is None:
         return "-"
-    low, high = (100.0 * end for end in one.interval_95)
-    return f"{100.0 * one.share:.1f} % ({low:.1f} to {high:.1f}) at {one.delay:g} s"
+    low, high = (100.0 * end for end in one.ended.interval)
+    return f"{100.0 * one.ended.value:.1f} % ({low:.1f} to {high:.1f}) at {one.delay:g} s"
 
 
-def _harm(found: HarmfulFrom, longest: float) -> list[str]:
-    low, high = found.interval_95
-    if found.delay is None:
+def _harm(found: Crossing, longest: float) -> list[str]:
+    low, high = found.interval
+    if found.at is None:
         return [f"beyond {longest:g} s", "-"]
     ends = (f"beyond {longest:g}" if end is None else f"{end:.2f}" for end in (low, high))
-    return [f"{found.delay:.2f} s", " to ".join(ends)]
+    return [f"{found.at:.2f} s", " to ".join(ends)]
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -40,11 +40,11 @@ if TYPE_CHECKING:
     from drillctl.simulation import simulate as simulate
     from drillctl.simulation.limit_cycle import limit_cycle as limit_cycle
     from drillctl.store import open as open
-    from drillctl.studies import compare as compare
     from drillctl.studies import doctor as doctor
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
     from drillctl.studies.advantage import advantage as advantage
+    from drillctl.studies.compare.compute import compare as compare
     from drillctl.studies.robust import tune as tune
     from drillctl.studies.uncertainty import uncertainty as uncertainty
 
@@ -58,7 +58,7 @@ _HOME = {
     "limit_cycle": "drillctl.simulation.limit_cycle",
     "sweep": "drillctl.studies",
     "advantage": "drillctl.studies.advantage",
-    "compare": "drillctl.studies",
+    "compare": "drillctl.studies.compare.compute",
     "doctor": "drillctl.studies",
     "stability_map": "drillctl.studies",
     "uncertainty": "drillctl.studies.uncertainty",

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.ensemble.cases import Runs, resampled_draws
 from drillctl.ensemble.grid import SHARED
-from drillctl.ensemble.parameters import Draws
+from drillctl.ensemble.parameters import Draws, draw
 from drillctl.errors import InputError
 from drillctl.rig.weight_on_bit import AlarmWeight, ConstantWeight
 from drillctl.simulation.batch import FLOATS, Prepared, prepare, run_batch
@@ -122,25 +124,12 @@ MOST_SHIFTS = 40
 """Shifts of the nominal weight that are tried."""
 
 
-@dataclass(frozen=True, eq=False)
-class DrawnRuns:
-    """What was measured at every draw."""
-
-    # shape (draws,): By the names of `simulation.batch.FLOATS`, and `mean_weight_after_start`
-    # (N); NaN where undefined
-    measures: dict[str, Array]
-    status: NDArray[np.int8]  # shape (draws,): Index into `simulation.measures.STATUSES`
-    # scheme; None where it differs from draw to draw
-    step: float | None
-    modes: int | None
-
-
 def start_up(duration: float) -> float:
     """Time (s) at the beginning of a run that `mean_weight_after_start` leaves out."""
     return min(START_UP, START_UP_SHARE * duration)
 
 
-def run_draws(drawn: DrawnLanes, count: int, shift: float = 0.0) -> DrawnRuns:
+def run_draws(drawn: DrawnLanes, count: int, shift: float = 0.0) -> Runs:
     """Simulate a design at every draw with the batch engine."""
     measures = {name: np.full(count, np.nan) for name in (*FLOATS, "mean_weight_after_start")}
     status = np.full(count, STATUSES.index("failed"), dtype=np.int8)
@@ -156,7 +145,7 @@ def run_draws(drawn: DrawnLanes, count: int, shift: float = 0.0) -> DrawnRuns:
         measures["mean_weight_after_start"][group.numbers] = _after_start(lanes, prepared, whole)
         status[group.numbers] = batch.status
     step, modes = next(iter(schemes)) if len(schemes) == 1 else (None, None)
-    return DrawnRuns(measures, status, step, modes)
+    return Runs(measures, status, step, modes)
 
 
 def _after_start(lanes: Lanes, prepared: Prepared, whole: Array) -> Array:
@@ -256,3 +245,28 @@ def _zero(
         known[trial] = excess(trial)
     best = min(known, key=lambda shift: abs(known[shift]))
     return best, known[best]
+
+
+@dataclass(frozen=True)
+class CommonDraws:
+    """The same draws for every design that is run at them."""
+
+    count: int
+    seed: int  # what they follow from
+
+    def values(self, design: Design) -> dict[str, Array]:
+        """Values of the uncertain parameters of a design by path (SI)."""
+        return draw(design, self.count, self.seed).values
+
+    def lanes(self, design: Design) -> DrawnLanes:
+        """Lanes of a design at these draws."""
+        return drawn_lanes(design, draw(design, self.count, self.seed))
+
+    def run(self, design: Design, shift: float = 0.0) -> Runs:
+        """A design at these draws, its nominal weight shifted (N)."""
+        return run_draws(self.lanes(design), self.count, shift)
+
+    @cached_property
+    def resamples(self) -> NDArray[np.int64]:
+        """Draws of each resample of an objective, the same for all designs."""
+        return resampled_draws(self.count, self.seed)

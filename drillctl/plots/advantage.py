@@ -29,8 +29,9 @@ from drillctl.plots.style import (
 )
 
 if TYPE_CHECKING:
+    from drillctl.ensemble.cases import Crossing
     from drillctl.studies.advantage import Advantage
-    from drillctl.studies.advantage.delays import Crossing, DelayLine
+    from drillctl.studies.advantage.delays import DelayLine
 
 Array = NDArray[np.float64]
 
@@ -167,11 +168,11 @@ def advantage_delay(result: Advantage, ax: Axes | None = None) -> Figure:
         axes.plot(line.delays, line.advantage, MARKS[number], color=colour, linewidth=LINE,
                   linestyle=DASHES[number], markersize=4.0,
                   label=f"{name}: {_vanishes(crossing, level)}")  # fmt: skip
-        if crossing.delay is not None:
+        if crossing.at is not None:
             longest = float(found.delays[-1])
-            ends = [longest if end is None else end for end in crossing.interval_95]
-            bar = np.abs(np.array([[e] for e in ends]) - crossing.delay)
-            axes.errorbar([crossing.delay], [level], xerr=bar, fmt="X", color=colour, zorder=6,
+            ends = [longest if end is None else end for end in crossing.interval]
+            bar = np.abs(np.array([[e] for e in ends]) - crossing.at)
+            axes.errorbar([crossing.at], [level], xerr=bar, fmt="X", color=colour, zorder=6,
                           markersize=8.0, markeredgecolor=BLACK, capsize=4.0)  # fmt: skip
     axes.axhline(0.0, color=BLACK, linewidth=0.9)
     axes.set_xlim(0.0, max(float(found.delays[-1]), 1e-3) * 1.02)
@@ -238,10 +239,10 @@ def _objective(result: Advantage) -> str:
 
 def _vanishes(found: Crossing, level: float) -> str:
     what = "none" if level == 0.0 else f"under {level:.2g} s"
-    if found.delay is None:
+    if found.at is None:
         return f"never {what} up to the longest delay"
-    low, high = ("beyond" if end is None else f"{end:.2f}" for end in found.interval_95)
-    return f"{what} from {found.delay:.2f} s ({low} to {high})"
+    low, high = ("beyond" if end is None else f"{end:.2f}" for end in found.interval)
+    return f"{what} from {found.at:.2f} s ({low} to {high})"
 
 
 def _caption(result: Advantage, more: str = "") -> str:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drillctl import units
-from drillctl.ensemble.intervals import mean_interval
+from drillctl.ensemble.cases import mean_interval
 from drillctl.errors import InputError
 from drillctl.plots.style import (
     BLACK,
@@ -27,7 +27,7 @@ from drillctl.plots.style import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from drillctl.studies.comparison.study import ComparedCase, Comparison
+    from drillctl.studies.compare.compute import ComparedCase, Comparison
 
 _WORDS = {
     "j1": "J1", "stuck_time": "stuck time", "stick_slip_index": "stick-slip index",
@@ -219,10 +219,10 @@ def _percent(
     paired = base[~np.isnan(base) & ~np.isnan(case.measures[name])]
     found = result.paired[case.name][name]
     mean = abs(float(paired.mean())) if paired.size else 0.0
-    if found.difference is None or mean == 0.0:
+    if found.value is None or mean == 0.0:
         return None
-    low, high = found.interval or (found.difference, found.difference)
-    return 100 * found.difference / mean, 100 * low / mean, 100 * high / mean
+    low, high = found.interval or (found.value, found.value)
+    return 100 * found.value / mean, 100 * low / mean, 100 * high / mean
 
 
 def _shared(result: Comparison) -> np.ndarray:

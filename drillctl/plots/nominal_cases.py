@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import shapely
 
     from drillctl.ensemble.grid import Axis
-    from drillctl.studies.comparison.study import ComparedCase, Comparison
+    from drillctl.studies.compare.compute import ComparedCase, Comparison
 
 Array = NDArray[np.float64]
 

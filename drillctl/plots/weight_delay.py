@@ -23,11 +23,11 @@ from drillctl.plots.style import (
     grid_or_new,
     title_of,
 )
-from drillctl.studies.weight_delay.limits import ENOUGH
+from drillctl.studies.delay.compute import ENOUGH
 
 if TYPE_CHECKING:
-    from drillctl.studies.weight_delay.limits import HarmfulFrom
-    from drillctl.studies.weight_delay.study import DelayedBenefit, WeightDelay
+    from drillctl.ensemble.cases import Crossing
+    from drillctl.studies.delay.compute import DelayedBenefit, WeightDelay
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def weight_delay(
     Parameters
     ----------
     result : WeightDelay
-        From `drillctl.studies.weight_delay.study`.
+        From `drillctl.studies.delay`.
     ax : sequence of Axes, optional
         Two panels.
     system : {'si', 'field'}
@@ -71,11 +71,12 @@ def weight_delay(
         _share_line(right, result.delays, result.benefits[i], number, number - len(moving) / 2)
         _harm(left, result, result.limits[i].harmful_from, number)
     constant = result.baseline
-    if constant.j1 is not None:
-        low, high = constant.j1_interval or (constant.j1, constant.j1)
+    level = constant.j1.value
+    if level is not None:
+        low, high = constant.j1.interval or (level, level)
         left.axhspan(low, high, color=BLACK, alpha=0.12, linewidth=0.0)
-        left.axhline(constant.j1, color=BLACK, linewidth=LINE, label="constant weight")
-    right.axhline(constant.ended_share.share, color=BLACK, linewidth=LINE)
+        left.axhline(level, color=BLACK, linewidth=LINE, label="constant weight")
+    right.axhline(constant.ended.value, color=BLACK, linewidth=LINE)
     right.axhline(ENOUGH, color=BLACK, linewidth=0.8, linestyle=":")
     right.annotate(
         f"{ENOUGH:.0%}", (1.0, ENOUGH), xycoords=("axes fraction", "data"), fontsize=SMALL,
@@ -101,8 +102,8 @@ def _j1_line(
     ax: Axes, delays: Array, benefits: Sequence[DelayedBenefit], number: int, label: str
 ) -> None:
     colour = COLOURS[number % len(COLOURS)]
-    mean = np.array([one.j1 for one in benefits], dtype=float)
-    ends = np.array([one.j1_interval or (None, None) for one in benefits], dtype=float)
+    mean = np.array([one.j1.value for one in benefits], dtype=float)
+    ends = np.array([one.j1.ends for one in benefits], dtype=float)
     ax.fill_between(delays, ends[:, 0], ends[:, 1], color=colour, alpha=BAND, linewidth=0.0)
     ax.plot(
         delays, mean, MARKS[number % len(MARKS)], color=colour, markersize=4.0, linewidth=LINE,
@@ -113,8 +114,8 @@ def _j1_line(
 def _share_line(
     ax: Axes, delays: Array, benefits: Sequence[DelayedBenefit], number: int, place: float
 ) -> None:
-    shares = np.array([one.ended_share.share for one in benefits])
-    ends = np.array([one.ended_share.interval_95 for one in benefits])
+    shares = np.array([one.ended.value for one in benefits])
+    ends = np.array([one.ended.interval for one in benefits])
     bars = np.abs(ends.T - shares)
     # Set apart as the eye sees it: on the axis of square roots.
     where = np.square(_root(delays) + (place + 0.5) * APART * np.sqrt(delays[-1]))
@@ -125,16 +126,16 @@ def _share_line(
     )  # fmt: skip
 
 
-def _harm(ax: Axes, result: WeightDelay, found: HarmfulFrom, number: int) -> None:
+def _harm(ax: Axes, result: WeightDelay, found: Crossing, number: int) -> None:
     """A cross on the level of the constant weight, and the interval of its place."""
-    level = result.baseline.j1
-    if found.delay is None or level is None:
+    level = result.baseline.j1.value
+    if found.at is None or level is None:
         return
     longest = float(result.delays[-1])
-    low, high = found.interval_95
-    ends = [found.delay - (low or 0.0), (longest if high is None else high) - found.delay]
+    low, high = found.interval
+    ends = [found.at - (low or 0.0), (longest if high is None else high) - found.at]
     ax.errorbar(
-        [found.delay], [level], xerr=np.maximum(np.array(ends)[:, None], 0.0), fmt="X",
+        [found.at], [level], xerr=np.maximum(np.array(ends)[:, None], 0.0), fmt="X",
         markersize=8.0, markeredgecolor=BLACK, markeredgewidth=0.8, capsize=4.0, zorder=6,
         color=COLOURS[number % len(COLOURS)], elinewidth=2.0,
     )  # fmt: skip
@@ -160,8 +161,8 @@ def _label(result: WeightDelay, number: int, system: units.System) -> str:
     gain, unit = units.displayed(float(result.gains[number]), "N", system)
     found = result.limits[number].harmful_from
     told = f"not harmful up to {result.delays[-1]:g} s"
-    if found.delay is not None:
-        told = f"harmful from {found.delay:.2f} s"
+    if found.at is not None:
+        told = f"harmful from {found.at:.2f} s"
     return f"{gain:g} {unit} s/rad, {told}"
 
 

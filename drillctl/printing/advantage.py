@@ -12,11 +12,11 @@ from drillctl.ensemble.draws import EQUAL_TO
 from drillctl.printing.words import title_of
 
 if TYPE_CHECKING:
+    from drillctl.ensemble.cases import Crossing, Estimate
     from drillctl.studies.advantage import Advantage
     from drillctl.studies.advantage.cases import Case
-    from drillctl.studies.advantage.chart import Chart
-    from drillctl.studies.advantage.delays import Crossing, DelayLine
-    from drillctl.studies.advantage.measured import Estimate
+    from drillctl.studies.advantage.delays import DelayLine
+    from drillctl.studies.advantage.sweeps import Chart
 
 
 def advantage(result: Advantage, system: units.System) -> None:
@@ -68,8 +68,9 @@ def told(found: Estimate, form: str) -> str:
 
 
 def _share(case: Case, level: float) -> str:
-    share, (low, high) = case.share(level)
-    return f"{share:.1%} ({100.0 * low:.1f} to {100.0 * high:.1f})"
+    share = case.share(level)
+    low, high = share.interval
+    return f"{share.value:.1%} ({100.0 * low:.1f} to {100.0 * high:.1f})"
 
 
 def _areas(result: Advantage) -> None:
@@ -152,12 +153,10 @@ def _at(line: DelayLine, delay: float) -> str:
 
 
 def _crossing(found: Crossing, longest: float) -> str:
-    if found.delay is None:
+    if found.at is None:
         return f"beyond {longest:g} s (in {found.within:.1%} of the resamples before)"
-    low, high = (
-        f"beyond {longest:g}" if end is None else f"{end:.3f}" for end in found.interval_95
-    )
-    return f"{found.delay:.3f} s (95 % interval {low} to {high})"
+    low, high = (f"beyond {longest:g}" if end is None else f"{end:.3f}" for end in found.interval)
+    return f"{found.at:.3f} s (95 % interval {low} to {high})"
 
 
 def _unequal(result: Advantage) -> None:

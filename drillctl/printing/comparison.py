@@ -9,13 +9,14 @@ from drillctl.cli.console import line, table
 from drillctl.printing.words import head_of, title_of
 
 if TYPE_CHECKING:
+    from drillctl.ensemble.cases import Estimate, Share
     from drillctl.studies import Comparison, Region
-    from drillctl.studies.comparison.study import ComparedCase, Difference
+    from drillctl.studies.compare.compute import ComparedCase
 
 
 def comparison(result: Comparison, system: units.System) -> None:
     """Distributions of the cases, differences from the first, shares and areas under each level."""
-    from drillctl.studies.comparison.study import MEASURES
+    from drillctl.studies.compare.compute import MEASURES
 
     names = [case.name for case in result.cases]
     rows = []
@@ -38,9 +39,7 @@ def comparison(result: Comparison, system: units.System) -> None:
         table(f"difference from {names[0]!r} draw by draw, mean (95 % interval)", heads, rows)
     rows = []
     for level in result.levels:
-        shares = [case.share(level) for case in result.cases]
-        cells = [f"{share:.1%} ({low:.1%} to {high:.1%})" for _, share, (low, high) in shares]
-        rows.append([f"J1 <= {level:g} s", *cells])
+        rows.append([f"J1 <= {level:g} s", *(_share(case.share(level)) for case in result.cases)])
     table("share of the draws (95 % interval)", ["level", *names], rows)
     if any(case.nominal.map is not None for case in result.cases):
         rows = [
@@ -65,6 +64,11 @@ def _case_notes(case: ComparedCase, system: units.System) -> None:
         line(f"{case.name}: {failure.count} of {len(case.status)} draws failed; {reason}")
 
 
+def _share(found: Share) -> str:
+    low, high = found.interval
+    return f"{found.value:.1%} ({low:.1%} to {high:.1%})"
+
+
 def _area(found: Region | None) -> str:
     return "-" if found is None else f"{found.area_fraction:.1%} ({found.cells})"
 
@@ -76,10 +80,10 @@ def _spread(found: dict[str, Any], factor: float) -> str:
     return f"{mean} ({low} to {high})"
 
 
-def _apart(found: Difference, factor: float) -> str:
-    if found.difference is None:
+def _apart(found: Estimate, factor: float) -> str:
+    if found.value is None:
         return "-"
     if found.interval is None:
-        return f"{found.difference * factor:+.4g}"
+        return f"{found.value * factor:+.4g}"
     low, high = (f"{end * factor:.4g}" for end in found.interval)
-    return f"{found.difference * factor:+.4g} ({low} to {high})"
+    return f"{found.value * factor:+.4g} ({low} to {high})"

@@ -9,9 +9,9 @@ from drillctl.cli.console import line, sized, table
 from drillctl.printing.words import title_of
 
 if TYPE_CHECKING:
+    from drillctl.ensemble.cases import Crossing, Share
     from drillctl.studies import WeightDelay
-    from drillctl.studies.weight_delay.limits import EndedShare, EndsUpTo, HarmfulFrom
-    from drillctl.studies.weight_delay.study import DelayedBenefit
+    from drillctl.studies.delay.compute import DelayedBenefit, GainLimits
 
 
 def weight_delay(result: WeightDelay, system: units.System) -> None:
@@ -30,13 +30,13 @@ def weight_delay(result: WeightDelay, system: units.System) -> None:
         rows,
     )
     rows = [
-        [f"{delay:g} s", *(_ended(result.benefits[i][k]) for i in moving)]
+        [f"{delay:g} s", *(_share(result.benefits[i][k].ended) for i in moving)]
         for k, delay in enumerate(result.delays)
     ]
     table("stick-slip has ended, share of the draws (95 % interval)", heads, rows)
     longest = float(result.delays[-1])
     rows = [
-        [names[i], *_ends(found.ends_up_to), *_harm(found.harmful_from, longest)]
+        [names[i], *_ends(found), *_harm(found.harmful_from, longest)]
         for i, found in ((i, result.limits[i]) for i in moving)
     ]
     heads = ["gain", "stick-slip ends up to", "share there", "share at the next delay",
@@ -44,8 +44,8 @@ def weight_delay(result: WeightDelay, system: units.System) -> None:
     table("delay that each gain bears", heads, rows)
     constant = result.baseline
     line(
-        f"constant weight: J1 {sized(constant.j1, 4)} s, stick-slip ended in {_ended(constant)} "
-        f"of the draws"
+        f"constant weight: J1 {sized(constant.j1.value, 4)} s, stick-slip ended in "
+        f"{_share(constant.ended)} of the draws"
     )
     for failure in result.failures:
         line(
@@ -56,32 +56,29 @@ def weight_delay(result: WeightDelay, system: units.System) -> None:
 
 
 def _less_j1(one: DelayedBenefit) -> str:
-    if one.difference is None:
+    if one.difference.value is None:
         return "-"
-    if one.difference_interval is None:
-        return f"{one.difference:+.1f}"
-    low, high = one.difference_interval
-    return f"{one.difference:+.1f} ({low:.1f} to {high:.1f})"
+    if one.difference.interval is None:
+        return f"{one.difference.value:+.1f}"
+    low, high = one.difference.interval
+    return f"{one.difference.value:+.1f} ({low:.1f} to {high:.1f})"
 
 
-def _ended(one: DelayedBenefit) -> str:
-    return _share_told(one.ended_share)
+def _ends(found: GainLimits) -> list[str]:
+    at, after = found.ends_at, found.ends_before
+    shares = ["-" if one is None else _share(one.ended) for one in (at, after)]
+    return ["at no delay" if at is None else f"{at.delay:g} s", *shares]
 
 
-def _ends(found: EndsUpTo) -> list[str]:
-    shares = ["-" if one is None else _share_told(one) for one in (found.at, found.next)]
-    return ["at no delay" if found.at is None else f"{found.at.delay:g} s", *shares]
+def _share(one: Share) -> str:
+    low, high = (f"{100.0 * end:.1f}" for end in one.interval)
+    return f"{one.value:.1%} ({low} to {high})"
 
 
-def _share_told(one: EndedShare) -> str:
-    low, high = (f"{100.0 * end:.1f}" for end in one.interval_95)
-    return f"{one.share:.1%} ({low} to {high})"
-
-
-def _harm(found: HarmfulFrom, longest: float) -> list[str]:
+def _harm(found: Crossing, longest: float) -> list[str]:
     """Where it turns harmful, and the interval; nothing is known beyond the longest delay."""
     beyond = f"beyond {longest:g} s"
-    low, high = (beyond if end is None else f"{end:.2f} s" for end in found.interval_95)
-    if found.interval_95 == (None, None):
+    low, high = (beyond if end is None else f"{end:.2f} s" for end in found.interval)
+    if found.interval == (None, None):
         return [beyond, "-"]
-    return [beyond if found.delay is None else f"{found.delay:.2f} s", f"{low} to {high}"]
+    return [beyond if found.at is None else f"{found.at:.2f} s", f"{low} to {high}"]

@@ -8,8 +8,8 @@
 - `three_regions/`: locally stable, J1 under a level, attracted: three regions of one map.
 - `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
 - `draws/`: what is uncertain, and draws from it.
-- `comparison/`: cases at the same draws.
-- `weight_delay/`: a weight on bit that follows the bit speed, against the delay of its path.
+- `compare/`: cases at the same draws.
+- `delay/`: a weight on bit that follows the bit speed, against the delay of its path.
 - `uncertainty/`: a map at thousands of draws.
 - `robust/`: gains searched for many realizations at once, and certified at fresh ones.
 - `advantage/`: PI against PI with dynamic weight on bit, each at its robust optimum.
@@ -23,7 +23,8 @@ from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.parameters import Draws, draw, uncertain_parameters
 from drillctl.ensemble.regions import Region, region
 from drillctl.ensemble.sweeps import Sweep, stability_map, sweep
-from drillctl.studies.comparison.study import Comparison, compare
+from drillctl.studies.compare.compute import Comparison
+from drillctl.studies.delay.compute import WeightDelay, weight_delay
 from drillctl.studies.diagnosis.examination import doctor
 from drillctl.studies.diagnosis.result import Doctor
 from drillctl.studies.loop_maps import LoopMap, loop_map
@@ -38,7 +39,6 @@ from drillctl.studies.tables import (
 from drillctl.studies.three_regions.compute import ThreeRegions, three_regions
 from drillctl.studies.uncertainty import Uncertainty, uncertainty
 from drillctl.studies.uncertainty.tables import write_uncertainty_tables
-from drillctl.studies.weight_delay.study import WeightDelay, weight_delay
 
 __all__ = [
     "Axis",
@@ -52,7 +52,6 @@ __all__ = [
     "ThreeRegions",
     "Uncertainty",
     "WeightDelay",
-    "compare",
     "doctor",
     "draw",
     "loop_map",

@@ -5,12 +5,12 @@ from __future__ import annotations
 from drillctl.design import Design
 from drillctl.ensemble.grid import axes_of
 from drillctl.ensemble.parameters import uncertain_parameters
+from drillctl.studies.advantage.compute import checked
 from drillctl.studies.advantage.policies import policies
-from drillctl.studies.advantage.study import checked
-from drillctl.studies.comparison.cases import case_designs, refuse_unequal
+from drillctl.studies.compare.cases import case_designs, refuse_unequal
+from drillctl.studies.delay.lanes import following_design
 from drillctl.studies.robust import tuned_parameters
 from drillctl.studies.uncertainty.study import map_axes, refuse_impossible
-from drillctl.studies.weight_delay.lanes import following_design
 
 
 def refuse_what_studies_would(design: Design) -> None:

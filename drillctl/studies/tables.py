@@ -6,11 +6,12 @@ import csv
 import itertools
 from pathlib import Path
 
+from drillctl.ensemble.cases import QUANTILES
 from drillctl.ensemble.sweeps import Sweep
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.comparison.study import MEASURES, QUANTILES, Comparison
+from drillctl.studies.compare.compute import MEASURES, Comparison
+from drillctl.studies.delay.compute import WeightDelay
 from drillctl.studies.loop_maps import LoopMap
-from drillctl.studies.weight_delay.study import WeightDelay
 
 
 def write_tables(result: Sweep, folder: Path) -> None:
@@ -89,16 +90,15 @@ def write_comparison(result: Comparison, folder: Path) -> None:
                 rows.append([*row, *(None for _ in apart)])
             else:
                 paired = result.paired[case.name][name]
-                interval = paired.interval or (None, None)
-                rows.append([*row, paired.difference, *interval, paired.pairs])
+                rows.append([*row, paired.value, *paired.ends, paired.draws])
     _write(folder / "comparison.csv", ["case", "measure", "unit", *figures, *apart], rows)
     rows = []
     for case in result.cases:
         for level in result.levels:
-            hits, share, interval = case.share(level)
+            share = case.share(level)
             inside = case.region(level)
             area = (None, None) if inside is None else (inside.cells, inside.area_fraction)
-            rows.append([case.name, level, hits, share, *interval, *area])
+            rows.append([case.name, level, share.hits, share.value, *share.interval, *area])
     heads = ["case", "level", "draws", "share", "low", "high", "cells", "area_fraction"]
     _write(folder / "shares.csv", heads, rows)
     rows = []
@@ -123,11 +123,10 @@ def write_weight_delay(result: WeightDelay, folder: Path) -> None:
     rows: list[list[object]] = []
     for gain, benefits in zip(result.gains, result.benefits, strict=True):
         for one in benefits:
-            around, apart = one.j1_interval or (None, None), one.difference_interval or (None, None)
-            share = one.ended_share
+            j1, apart, ended = one.j1, one.difference, one.ended
             rows.append([
-                float(gain), share.delay, one.j1, *around, one.difference, *apart, one.pairs,
-                one.ended, share.share, *share.interval_95, one.peak_bit_speed,
+                float(gain), one.delay, j1.value, *j1.ends, apart.value, *apart.ends, apart.draws,
+                ended.hits, ended.value, *ended.interval, one.peak_bit_speed,
                 one.peak_pipe_torque, one.mean_weight,
             ])  # fmt: skip
     heads = [

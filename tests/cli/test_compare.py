@@ -61,13 +61,13 @@ def test_folder_holds_tables_pictures_and_the_run(call):
         rows = {(row["case"], row["measure"]): row for row in csv.DictReader(stream)}
     told = rows["6 kN s/rad", "j1"]
     expected = result.paired["6 kN s/rad"]["j1"]
-    assert float(told["difference"]) == expected.difference
+    assert float(told["difference"]) == expected.value
     assert (float(told["difference_low"]), float(told["difference_high"])) == expected.interval
     assert rows["constant weight", "j1"]["difference"] == ""
     with Path("run/shares.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 16
-    assert int(rows[0]["draws"]) == result.cases[0].share(20.0)[0]
+    assert int(rows[0]["draws"]) == result.cases[0].share(20.0).hits
     region = result.cases[1].region(30.0)
     assert (rows[5]["cells"], rows[5]["area_fraction"]) == (
         str(region.cells), str(region.area_fraction)

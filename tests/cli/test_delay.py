@@ -47,8 +47,8 @@ def test_folder_holds_table_picture_and_the_run(call):
         rows = list(csv.DictReader(stream))
     assert len(rows) == 6
     point = result.benefits[1][1]
-    assert float(rows[4]["difference"]) == point.difference
-    assert float(rows[4]["ended_high"]) == point.ended_share.interval_95[1]
+    assert float(rows[4]["difference"]) == point.difference.value
+    assert float(rows[4]["ended_high"]) == point.ended.interval[1]
     assert [float(rows[4][key]) for key in ("gain", "delay")] == [6000.0, 0.2]
 
 
@@ -72,7 +72,7 @@ def test_finished_run_is_shown_again(call, monkeypatch):
     def fail(*arguments, **options):
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("drillctl.studies.weight_delay.study", fail, raising=False)
+    monkeypatch.setattr("drillctl.studies.weight_delay", fail, raising=False)
     code, again, err = call("delay", SHIPPED, *SMALL, "--out", "run")
     assert (code, err) == (0, "already done: run\n")
     assert again == first.replace("results: run\n", "")

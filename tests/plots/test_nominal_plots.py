@@ -17,7 +17,7 @@ from drillctl.errors import InputError
 from drillctl.plots import compared_regions, compared_responses
 from drillctl.plots.nominal_cases import _rings
 from drillctl.plots.style import COLOURS
-from drillctl.studies.comparison.study import compare
+from drillctl.studies.compare.compute import compare
 from drillctl.units import RPM
 
 KN = 1000.0

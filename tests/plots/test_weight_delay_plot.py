@@ -27,33 +27,31 @@ def test_panels_show_means_bands_and_shares(result):
     assert "J1 (s)" in left.get_ylabel()
     line = next(x for x in left.get_lines() if x.get_label().startswith("6 kN s/rad"))
     np.testing.assert_allclose(line.get_xdata(), result.delays)
-    np.testing.assert_allclose(line.get_ydata(), [one.j1 for one in result.benefits[2]])
+    np.testing.assert_allclose(line.get_ydata(), [one.j1.value for one in result.benefits[2]])
     constant = next(x for x in left.get_lines() if x.get_label() == "constant weight")
-    assert constant.get_ydata()[0] == result.baseline.j1
+    assert constant.get_ydata()[0] == result.baseline.j1.value
     band = left.collections[0].get_paths()[0].vertices
-    low, high = result.benefits[1][3].j1_interval
+    low, high = result.benefits[1][3].j1.interval
     assert np.isclose(band[band[:, 0] == 1.0][:, 1], high).any()
     assert np.isclose(band[band[:, 0] == 1.0][:, 1], low).any()
     shares = right.containers[1]
     np.testing.assert_allclose(
-        shares.lines[0].get_ydata(), [one.ended_share.share for one in result.benefits[2]]
+        shares.lines[0].get_ydata(), [one.ended.value for one in result.benefits[2]]
     )
     # Set apart a little, lest bars hide each other.
     places = np.sqrt(shares.lines[0].get_xdata())
     np.testing.assert_allclose(places, np.sqrt(result.delays), atol=0.02)
     ends = [segment[:, 1] for segment in shares.lines[2][0].get_segments()]
-    np.testing.assert_allclose(
-        ends, [one.ended_share.interval_95 for one in result.benefits[2]], atol=1e-12
-    )
+    np.testing.assert_allclose(ends, [one.ended.interval for one in result.benefits[2]], atol=1e-12)
     figure.savefig("/dev/null", format="png", dpi=20)
 
 
 def test_the_harmful_delay_is_marked_on_the_level_of_the_constant_weight(result):
     left, _ = plots.weight_delay(result).axes
     marks = [tuple(np.ravel(c.lines[0].get_xydata())) for c in left.containers]
-    expected = [(result.limits[i].harmful_from.delay, result.baseline.j1) for i in (1, 2)]
+    expected = [(result.limits[i].harmful_from.at, result.baseline.j1.value) for i in (1, 2)]
     np.testing.assert_allclose(marks, expected)
-    told = f"harmful from {result.limits[2].harmful_from.delay:.2f} s"
+    told = f"harmful from {result.limits[2].harmful_from.at:.2f} s"
     assert any(told in x.get_label() for x in left.get_lines())
 
 
@@ -72,5 +70,5 @@ def test_a_single_delay_can_be_drawn():
         found = weight_delay(design, [6e3], [delay], 1)
         figure = plots.weight_delay(found)
         figure.savefig("/dev/null", format="png", dpi=20)
-        assert not found.limits[0].harmful_from.delay
+        assert not found.limits[0].harmful_from.at
         assert any("not harmful up to" in x.get_label() for x in figure.axes[0].get_lines())

@@ -10,13 +10,13 @@ import pytest
 from scipy import stats
 
 import drillctl
+from drillctl.ensemble.cases import mean_interval, share_interval
 from drillctl.ensemble.draws import EQUAL_TO, drawn_lanes, equalising_shift, run_draws, start_up
-from drillctl.ensemble.intervals import mean_interval, share_interval
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, trace
-from drillctl.studies.comparison.cases import ALONE, case_designs
-from drillctl.studies.comparison.study import MEASURES, compare
+from drillctl.studies.compare.cases import ALONE, case_designs
+from drillctl.studies.compare.compute import MEASURES, compare
 
 HOLDS = (
     (
@@ -62,7 +62,7 @@ def test_dynamic_weight_without_limits_at_the_nominal_rock(paper, gain, j1):
     design = paper.replace({"uncertain": {A1: narrow}})
     result = compare({"constant": design, "moving": following(design, gain)}, realizations=2)
     assert result.cases[1].distribution("j1")["mean"] == pytest.approx(j1, abs=0.02)
-    assert result.paired["moving"]["j1"].difference == pytest.approx(
+    assert result.paired["moving"]["j1"].value == pytest.approx(
         j1 - result.baseline.distribution("j1")["mean"], abs=0.02
     )
 
@@ -74,8 +74,8 @@ def test_each_gain_of_the_shipped_design_is_better_than_the_one_before(shipped):
     assert ends[0][1] < 0.0
     assert ends[1][1] < ends[0][0]
     assert ends[2][1] < ends[1][0]
-    assert shipped.cases[0].share(30.0)[0] == 0
-    assert shipped.cases[3].share(30.0)[0] == 40
+    assert shipped.cases[0].share(30.0).hits == 0
+    assert shipped.cases[3].share(30.0).hits == 40
 
 
 def test_a_draw_is_the_run_that_simulate_gives(shipped):
@@ -92,9 +92,9 @@ def test_a_draw_is_the_run_that_simulate_gives(shipped):
 def test_a_case_against_itself_differs_by_exactly_nothing(paper):
     result = compare({"one": paper, "same": paper.replace({})}, realizations=15)
     for name, found in result.paired["same"].items():
-        if found.pairs:
-            assert (found.difference, found.interval) == (0.0, (0.0, 0.0)), name
-    assert result.paired["same"]["j1"].pairs == 15
+        if found.draws:
+            assert (found.value, found.interval) == (0.0, (0.0, 0.0)), name
+    assert result.paired["same"]["j1"].draws == 15
 
 
 def test_more_realizations_begin_with_the_same_runs(shipped):
@@ -146,7 +146,8 @@ def test_undefined_measures_are_counted_not_averaged(shipped):
     assert case.distribution("settling_time") == {
         "mean": None, "std": None, "p05": None, "p50": None, "p95": None, "defined": 0,
     }  # fmt: skip
-    assert shipped.paired["6 kN s/rad"]["settling_time"].summary() == {
+    assert shipped.paired["6 kN s/rad"]["settling_time"] == (None, None, 0)
+    assert shipped.summary()["paired"]["6 kN s/rad"]["settling_time"] == {
         "difference": None, "interval_95": None, "pairs": 0,
     }  # fmt: skip
 
@@ -214,9 +215,9 @@ def test_impossible_draws_are_failed_counted_and_under_no_level(half_impossible)
     assert told["statuses"]["failed"] == failure.count
     assert told["failures"][0]["count"] == failure.count
     assert told["measures"]["j1"]["defined"] == 60 - failure.count
-    hits, share, _ = case.share(1e9)
-    assert hits == 60 - failure.count
-    assert share == hits / 60
+    share = case.share(1e9)
+    assert share.hits == 60 - failure.count
+    assert share.value == share.hits / 60
     json.dumps(half_impossible.summary(), allow_nan=False)
 
 
@@ -244,7 +245,7 @@ def test_pairs_need_both(half_impossible, short):
     result = compare({"a": coulomb, "b": design}, realizations=60)
     counts = [case.distribution("j1")["defined"] for case in result.cases]
     assert counts[1] < counts[0]
-    assert result.paired["b"]["j1"].pairs == counts[1]
+    assert result.paired["b"]["j1"].draws == counts[1]
 
 
 # --- weight ------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -11,9 +12,8 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.progress import Within
 from drillctl.simulation.trajectory import SIGNALS
-from drillctl.studies.comparison.cases import case_designs
-from drillctl.studies.comparison.nominal import NOT_ASKED
-from drillctl.studies.comparison.study import compare
+from drillctl.studies.compare.cases import NO_MAPS, case_designs
+from drillctl.studies.compare.compute import compare
 
 HOLDS = (
     (
@@ -75,7 +75,7 @@ def test_regions_stand_beside_the_shares(result):
             row = told[f"{level:g}"]
             inside = int((case.nominal.map.j1 <= level).sum())
             assert (row["cells"], row["area_fraction"]) == (inside, inside / 15)
-            assert row["draws"] == case.share(level)[0]
+            assert row["draws"] == case.share(level).hits
 
 
 def test_levels_are_those_of_the_comparison(short):
@@ -125,7 +125,7 @@ def test_the_baseline_may_be_the_one_without(short, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"compare.maps": False}, NOT_ASKED),
+        ({"compare.maps": False}, NO_MAPS),
         ({"map.axes": AXES[:1]}, "a map runs over 2 parameters, [map] has 1"),
         ({"map.axes": [AXES[0], {"path": WEIGHT, "min": "100 kN", "max": "900 kN", "points": 2}]},
          "map.axes"),
@@ -142,7 +142,7 @@ def test_without_maps_nothing_is_swept_and_all_comes_back(short, tmp_path, monke
     def swept(*arguments, **options):
         raise AssertionError("swept")
 
-    monkeypatch.setattr("drillctl.studies.comparison.nominal.sweep", swept)
+    monkeypatch.setattr(sys.modules[case_designs.__module__], "sweep", swept)
     made = compare(short.replace({"compare.maps": False}), realizations=2)
     assert not [name for name in made.data.variables if name.startswith("map_")]
     same_nominal(made, drillctl.open(made.save(tmp_path / "run")))

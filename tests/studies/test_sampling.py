@@ -11,7 +11,8 @@ from drillctl.design import to_toml
 from drillctl.ensemble.parameters import draw, uncertain_parameters
 from drillctl.ensemble.sampling import Sampling, correlation_root
 from drillctl.errors import InputError
-from drillctl.studies import compare, weight_delay
+from drillctl.studies import weight_delay
+from drillctl.studies.compare.compute import compare
 
 HOLDS = (
     (

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from drillctl.design.uncertain_tables import UntilTable
-from drillctl.ensemble.intervals import share_interval, share_intervals
+from drillctl.ensemble.cases import share_interval, share_intervals
 from drillctl.errors import InputError
 from drillctl.studies.uncertainty import areas as area_module
 from drillctl.studies.uncertainty.areas import region_areas

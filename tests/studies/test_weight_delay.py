@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +11,14 @@ import pytest
 
 import drillctl
 from drillctl import units
-from drillctl.ensemble.intervals import share_interval
+from drillctl.ensemble.cases import Runs, crossing, first_not_negative, share_interval
 from drillctl.errors import InputError
 from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies import compare, weight_delay
-from drillctl.studies.weight_delay.lanes import Runs, following_design
-from drillctl.studies.weight_delay.limits import (
-    EndedShare,
-    ends_up_to,
-    first_not_negative,
-    harmful_from,
-)
+from drillctl.studies import weight_delay
+from drillctl.studies.compare.compute import compare
+from drillctl.studies.delay.compute import lasting
+from drillctl.studies.delay.lanes import following_design
 
 HOLDS = (
     (
@@ -95,11 +92,11 @@ def test_differences_are_those_of_a_comparison(result, design):
     other = late(constant, GAINS[2], DELAYS[2])
     compared = compare({"constant": constant, "late": other})
     found, expected = result.benefits[2][2], compared.paired["late"]["j1"]
-    assert found.difference == pytest.approx(expected.difference, rel=1e-9)
-    assert found.difference_interval == pytest.approx(expected.interval, rel=1e-9)
-    assert found.pairs == DRAWS
+    assert found.difference.value == pytest.approx(expected.value, rel=1e-9)
+    assert found.difference.interval == pytest.approx(expected.interval, rel=1e-9)
+    assert found.difference.draws == DRAWS
     case = compared.cases[1]
-    assert found.j1 == pytest.approx(case.distribution("j1")["mean"], rel=1e-9)
+    assert found.j1.value == pytest.approx(case.distribution("j1")["mean"], rel=1e-9)
     assert found.mean_weight == pytest.approx(
         case.distribution("mean_weight_after_start")["mean"], rel=1e-9
     )
@@ -110,10 +107,10 @@ def test_differences_are_those_of_a_comparison(result, design):
 
 def test_a_gain_of_zero_is_the_constant_weight_at_any_delay(result):
     for one in result.benefits[0]:
-        assert (one.difference, one.difference_interval) == (0.0, (0.0, 0.0))
+        assert one.difference == (0.0, (0.0, 0.0), DRAWS)
         assert one.j1 == result.baseline.j1
         assert one.mean_weight == pytest.approx(140e3, rel=1e-12)
-    assert result.limits[0].harmful_from.delay is None
+    assert result.limits[0].harmful_from.at is None
 
 
 def test_other_delays_and_gains_change_nothing(result, design):
@@ -163,9 +160,9 @@ def test_impossible_draws_are_counted_and_have_not_ended(short):
     (failure,) = found.failures
     assert 0 < failure.count < 20
     one = found.benefits[0][0]
-    assert one.pairs == 20 - failure.count
-    assert one.ended <= one.pairs
-    assert one.ended_share.share == one.ended / 20
+    assert one.difference.draws == 20 - failure.count
+    assert one.ended.hits <= one.difference.draws
+    assert one.ended.value == one.ended.hits / 20
     assert found.summary()["failures"][0]["count"] == failure.count
     # The same draws at every delay, each in its place.
     failed = np.isnan(found.runs.measures["j1"][0])
@@ -182,25 +179,25 @@ def test_delay_turns_a_smooth_rig_to_stick_slip(result):
     # Kp 625, Ki 125: smooth at a constant weight, smoother with one that follows at once, harmed
     # by one that follows late.
     first, *_, last = result.benefits[2]
-    assert first.difference_interval[1] < 0.0 < last.difference_interval[0]
-    assert first.ended_share.share == 1.0
-    assert last.ended_share.share < 0.3
+    assert first.difference.interval[1] < 0.0 < last.difference.interval[0]
+    assert first.ended.value == 1.0
+    assert last.ended.value < 0.3
     harmful = result.limits[2].harmful_from
-    assert 0.1 < harmful.interval_95[0] <= harmful.delay <= harmful.interval_95[1] < 0.5
-    up_to = result.limits[2].ends_up_to
-    assert (up_to.at.delay, up_to.next.delay) == (0.1, 0.5)
+    assert 0.1 < harmful.interval[0] <= harmful.at <= harmful.interval[1] < 0.5
+    limits = result.limits[2]
+    assert (limits.ends_at.delay, limits.ends_before.delay) == (0.1, 0.5)
 
 
 def test_shares_have_their_intervals(result):
     one = result.benefits[2][2]
     ended = result.runs.ended[2, 2]
-    assert one.ended == ended.sum()
-    assert one.ended_share.interval_95 == share_interval(int(ended.sum()), DRAWS)
+    assert one.ended.hits == ended.sum()
+    assert one.ended.interval == share_interval(int(ended.sum()), DRAWS)
     assert one.peak_bit_speed == pytest.approx(result.runs.measures["peak_bit_speed"][2, 2].mean())
 
 
 def test_ended_is_neither_sticking_nor_stalled_nor_failed():
-    found = Runs({}, np.arange(len(STATUSES), dtype=np.int8)).ended
+    found = Runs({}, np.arange(len(STATUSES), dtype=np.int8), None, None).ended
     assert [name for name, ended in zip(STATUSES, found, strict=True) if ended] == [
         "ok", "not_settled", "censored",
     ]  # fmt: skip
@@ -211,9 +208,9 @@ def test_data_is_labelled(result):
     assert data["j1"].sizes == {"gain": 3, "delay": 4, "realization": DRAWS}
     assert data["delay"].attrs["units"] == "s"
     picked = data["difference"].sel(gain=6e3, delay=0.5)
-    assert float(picked) == result.benefits[2][2].difference
+    assert float(picked) == result.benefits[2][2].difference.value
     high = data["difference_high"].sel(gain=6e3, delay=0.5)
-    assert float(high) == result.benefits[2][2].difference_interval[1]
+    assert float(high) == result.benefits[2][2].difference.interval[1]
 
 
 def test_the_constant_weight_is_kept_beside_the_gains(short, tmp_path):
@@ -239,13 +236,13 @@ def test_the_numbers_of_the_page_are_those_of_the_shipped_design():
     page = (Path(__file__).parents[2] / "docs" / "weight-on-bit.md").read_text(encoding="utf-8")
     (row,) = weight_delay(drillctl.load(SHIPPED), [6e3], [0.0, 0.1, 0.2]).benefits
     told = [
-        f"{one.difference:+.1f} ({one.difference_interval[0]:.1f} to "
-        f"{one.difference_interval[1]:.1f})"
+        f"{one.difference.value:+.1f} ({one.difference.interval[0]:.1f} to "
+        f"{one.difference.interval[1]:.1f})"
         for one in row
     ]
     assert f"| 6 | {' | '.join(told)} |" in page
-    low, high = (100.0 * end for end in row[1].ended_share.interval_95)
-    share = f"{100.0 * row[1].ended_share.share:.1f} % ({low:.1f} to {high:.1f}) at 0.1 s"
+    low, high = (100.0 * end for end in row[1].ended.interval)
+    share = f"{100.0 * row[1].ended.value:.1f} % ({low:.1f} to {high:.1f}) at 0.1 s"
     assert f"| 6 | 0.1 s | {share} |" in page
 
 
@@ -273,27 +270,44 @@ def test_where_a_difference_stops_being_negative(values, expected):
 
 def test_interval_of_the_harmful_delay_is_where_the_bounds_cross():
     mean = np.array([-4.0, -2.0, 2.0, 6.0])
-    found = harmful_from(AT, mean, mean - 3.0, mean + 1.0)
-    assert found.delay == 1.5
-    assert found.interval_95 == (1.25, 2.5)
-    assert found.summary() == {"delay": 1.5, "interval_95": [1.25, 2.5]}
-    open_end = harmful_from(AT, mean - 6.0, mean - 9.0, mean - 5.0)
-    assert (open_end.delay, open_end.interval_95) == (4.0, (3.5, None))
+    found = crossing(AT, mean, mean - 3.0, mean + 1.0)
+    assert found.at == 1.5
+    assert found.interval == (1.25, 2.5)
+    assert found.summary("delay") == {"delay": 1.5, "interval_95": [1.25, 2.5]}
+    open_end = crossing(AT, mean - 6.0, mean - 9.0, mean - 5.0)
+    assert (open_end.at, open_end.interval) == (4.0, (3.5, None))
 
 
 @pytest.mark.parametrize(
-    ("shares", "at", "following"),
+    ("shares", "expected"),
     [
-        ([1.0, 0.95, 0.9, 0.99], 1.0, 2.0),  # what a longer delay brings back does not count
-        ([0.94, 1.0, 1.0, 1.0], None, 0.0),
-        ([1.0, 1.0, 1.0, 1.0], 4.0, None),
+        ([1.0, 0.95, 0.9, 0.99], 2),  # what a longer delay brings back does not count
+        ([0.94, 1.0, 1.0, 1.0], 0),
+        ([1.0, 1.0, 1.0, 1.0], 4),
     ],
 )
-def test_stick_slip_ends_up_to_a_delay_and_at_all_shorter_ones(shares, at, following):
-    found = ends_up_to([EndedShare(d, s, (0.0, 1.0)) for d, s in zip(AT, shares, strict=True)])
-    assert (found.at.delay if found.at else None) == at
-    assert (found.next.delay if found.next else None) == following
-    assert found.summary()["delay"] == at
+def test_stick_slip_ends_up_to_a_delay_and_at_all_shorter_ones(shares, expected):
+    assert lasting(shares) == expected
+
+
+def ended_at(result, *delays):
+    """The result with stick-slip ended in all draws of the gain 6 kN s/rad at some delays alone."""
+    status = np.full_like(result.runs.status, STATUSES.index("sticking"))
+    status[2, [DELAYS.index(delay) for delay in delays]] = STATUSES.index("ok")
+    return replace(result, runs=replace(result.runs, status=status))
+
+
+@pytest.mark.parametrize(
+    ("delays", "at", "after"),
+    [((0.0, 0.1, 1.0), 0.1, 0.5), ((0.5,), None, 0.0), (DELAYS, 1.0, None)],
+)
+def test_limits_are_the_last_delay_that_ends_it_and_the_next(result, delays, at, after):
+    limits = ended_at(result, *delays).limits[2]
+    told = limits.summary()["ends_up_to"]
+    assert told["delay"] == at
+    assert [one and one["delay"] for one in (told["at"], told["next"])] == [at, after]
+    if limits.ends_at:
+        assert told["at"]["share"] == 1.0
 
 
 # --- designs -----------------------------------------------------------------------------------

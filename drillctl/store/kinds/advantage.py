@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl.design import Design
+from drillctl.ensemble.cases import Crossing, Estimate
 from drillctl.store.kind import Kind
 from drillctl.studies.advantage import Advantage
 from drillctl.studies.advantage.cases import MEASURES, Case
-from drillctl.studies.advantage.chart import FIGURES, Chart
-from drillctl.studies.advantage.delays import Crossing, DelayCurve, DelayLine
-from drillctl.studies.advantage.measured import Estimate
-from drillctl.studies.advantage.regions import Regions
+from drillctl.studies.advantage.delays import DelayCurve, DelayLine
+from drillctl.studies.advantage.sweeps import FIGURES, Chart, Regions
 
 if TYPE_CHECKING:
     import xarray
@@ -49,6 +48,9 @@ def _case(told: dict[str, Any], data: xarray.Dataset) -> Case:
         objective=_estimate(told["objective"]),
         objective_less=_estimate(told["objective_difference"]),
         measures={name: data[f"case_{name}"].values for name in MEASURES},
+        status=data["case_status"].values.astype(np.int8),
+        step=told["step"],
+        modes=told["modes"],
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from drillctl.design import Design, to_toml
 from drillctl.design.validation import validated
 from drillctl.ensemble.audit import Audit
+from drillctl.ensemble.cases import Runs
 from drillctl.ensemble.draws import Failures
 from drillctl.ensemble.sweeps import Sweep
 from drillctl.errors import InputError
@@ -19,12 +20,10 @@ from drillctl.simulation.measures import Measures
 from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.store.kind import Kind
 from drillctl.store.names import axis_of, stored_name
-from drillctl.studies.comparison.cases import case_designs
-from drillctl.studies.comparison.nominal import Nominal, map_dimension, nominal_design
-from drillctl.studies.comparison.study import MEASURES, ComparedCase, Comparison
-from drillctl.studies.weight_delay.lanes import MEASURES as DELAY_MEASURES
-from drillctl.studies.weight_delay.lanes import Runs
-from drillctl.studies.weight_delay.study import WeightDelay
+from drillctl.studies.compare.cases import Nominal, case_designs, map_dimension, shifted_design
+from drillctl.studies.compare.compute import MEASURES, ComparedCase, Comparison
+from drillctl.studies.delay.compute import WeightDelay
+from drillctl.studies.delay.lanes import MEASURES as DELAY_MEASURES
 
 if TYPE_CHECKING:
     import xarray
@@ -35,7 +34,8 @@ def read_weight_delay(design: Design, data: xarray.Dataset, summary: dict[str, A
 
     def runs(prefix: str) -> Runs:
         measures = {name: data[f"{prefix}{name}"].values for name in DELAY_MEASURES}
-        return Runs(measures, data[f"{prefix}status"].values.astype(np.int8))
+        status = data[f"{prefix}status"].values.astype(np.int8)
+        return Runs(measures, status, summary["step"], summary["modes"])
 
     return WeightDelay(
         design=design,
@@ -43,7 +43,7 @@ def read_weight_delay(design: Design, data: xarray.Dataset, summary: dict[str, A
         runs=runs(""),
         constant=runs("constant_"),
         failures=tuple(Failures(**failure) for failure in summary["failures"]),
-        **{name: summary[name] for name in ("step", "modes", "total_seconds")},
+        total_seconds=summary["total_seconds"],
         provenance={key: str(value) for key, value in data.attrs.items()},
     )
 
@@ -76,7 +76,7 @@ def _case(name: str, design: Design, data: xarray.Dataset, summary: dict[str, An
         weight_shift=told["weight_shift"],
         step=told["step"],
         modes=told["modes"],
-        nominal=_nominal(nominal_design(design, told["weight_shift"]), data, summary, told),
+        nominal=_nominal(shifted_design(design, told["weight_shift"]), data, summary, told),
     )
 
 

@@ -1,26 +1,29 @@
-"""The table: every policy at its own robust optimum, on all terms, at the same fresh draws."""
+"""Every policy at its own robust optimum, on all terms, at the same fresh draws.
+
+A weight that follows the bit speed has its nominal value on the mean only if the bit turns at the
+set speed on the mean. Terms other than the nominal one shift its nominal weight until the mean of
+a measure over the draws is that of the constant weight. Gains and shift depend on each other: they
+are computed in turns, at the draws of the tuning; then the shift once more at the fresh draws, so
+that what is reported as equal is equal there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.ensemble.intervals import Interval, mean_interval, share_interval
+from drillctl.design import Design
+from drillctl.ensemble.cases import Estimate, Runs, percentile_estimate
+from drillctl.ensemble.draws import CommonDraws, matching_shift
 from drillctl.progress import Progress
-from drillctl.studies.advantage.equalities import (
-    ALL_TERMS,
-    NOMINAL,
-    Terms,
-    fresh_shift,
-    tuned_on_terms,
-)
-from drillctl.studies.advantage.measured import Estimate, Fresh, Measured, estimate, less
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import CONSTANT, GAIN, KI, KP, Policies, Policy
+from drillctl.studies.robust.objective import Objective, objective_of
 
 Array = NDArray[np.float64]
 
@@ -30,11 +33,85 @@ MEASURES = {
 }  # fmt: skip
 """What is kept of every draw, with its unit."""
 PATHS = (KP, KI, GAIN)
+STARTS = (0.0, 500.0, 1500.0)
+"""Gains of the weight (N s/rad) that are tried with the constant weight's gains of the drive."""
+ROUNDS = 4
+"""Most turns of gains and shift."""
+STILL = 1e-3
+"""Change of the shift over the nominal weight that ends them."""
+
+
+class Terms(NamedTuple):
+    """On what terms a policy is compared."""
+
+    name: str  # what they are called
+    # whose mean over the draws is made that of the constant weight; None for the same nominal
+    # weight
+    measure: str | None
+
+
+NOMINAL = Terms("equal nominal weight", None)
+MEAN = Terms("equal mean weight", "mean_weight_after_start")
+ROP = Terms("equal ROP proxy", "rop_proxy")
+ALL_TERMS = (NOMINAL, MEAN, ROP)
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
-    """A policy at its robust optimum on some terms, at fresh draws."""
+class Measured:
+    """A design at fresh draws."""
+
+    runs: Runs
+    objective: Objective  # that it was tuned to
+    draws: CommonDraws
+
+    @cached_property
+    def objectives(self) -> Array:
+        """Objective (s) of the draws, then of every resample, shape (1 + resamples,)."""
+        needed = {name: self.runs.measures[name] for name in self.objective.needs}
+        needed["j1"] = self.j1
+        again = {name: values[self.draws.resamples] for name, values in needed.items()}
+        return np.append(self.objective.value(needed), self.objective.value(again))
+
+    @property
+    def j1(self) -> Array:
+        """J1 (s); infinite where a draw has no result."""
+        values = self.runs.measures["j1"]
+        return np.where(np.isnan(values), np.inf, values)
+
+    @property
+    def value(self) -> float:
+        """Objective (s)."""
+        return float(self.objectives[0])
+
+    @property
+    def estimate(self) -> Estimate:
+        """Objective (s) with its interval."""
+        return percentile_estimate(self.objectives)
+
+    def less(self, other: Measured) -> Estimate:
+        """Objective less that of another design, by resampled pairs (s)."""
+        return percentile_estimate(less(self.objectives, other.objectives))
+
+
+def measured(design: Design, draws: CommonDraws, shift: float = 0.0) -> Measured:
+    """A design at fresh draws, its nominal weight shifted (N)."""
+    return Measured(draws.run(design, shift), objective_of(design), draws)
+
+
+def fresh_draws(design: Design) -> CommonDraws:
+    """Draws of the `[advantage]` table, which no tuning uses."""
+    return CommonDraws(design.tables.advantage.realizations, design.tables.advantage.seed)
+
+
+def less(one: Array, other: Array) -> Array:
+    """One less the other; nothing where both are infinite."""
+    with np.errstate(invalid="ignore"):
+        return np.where(one == other, 0.0, one - other)
+
+
+@dataclass(frozen=True, eq=False)
+class Case(Runs):
+    """A policy at its robust optimum on some terms, at fresh draws, by the names of `MEASURES`."""
 
     # names
     policy: str
@@ -45,51 +122,20 @@ class Case:
     off: float  # what the terms' mean is off by at that shift, over that of the constant weight
     tuned_value: float  # objective at the draws of the tuning (s), which flatters
     objective: Estimate  # at the fresh draws (s)
-    objective_less: Estimate  # less that of the constant weight, by resampled pairs (s)
-    # shape (realizations,): By the names of `MEASURES` (SI); NaN where undefined
-    measures: dict[str, Array]
+    objective_less: Estimate  # less that of the constant weight (s)
 
     @property
     def name(self) -> str:
         """Policy and terms."""
         return self.policy if self.policy == CONSTANT else f"{self.policy}, {self.terms}"
 
-    def mean(self, measure: str) -> float | None:
-        """Mean (SI) over the draws that define a measure."""
-        values = self.measures[measure]
-        values = values[~np.isnan(values)]
-        return float(values.mean()) if values.size else None
-
-    def difference(self, baseline: Case, measure: str, seed: int) -> Estimate:
-        """Mean over the draws of a measure less that of another case, with its interval (SI)."""
-        apart = self.measures[measure] - baseline.measures[measure]
-        apart = apart[~np.isnan(apart)]
-        if not apart.size:
-            return Estimate(None, None)
-        return Estimate(float(apart.mean()), mean_interval(apart, seed))
-
-    def hits(self, level: float) -> NDArray[np.bool_]:
-        """Draws with J1 at or under a level (s); one that failed is not."""
-        return np.asarray(np.nan_to_num(self.measures["j1"], nan=np.inf) <= level)
-
-    def share(self, level: float) -> tuple[float, Interval]:
-        """Their share, and its Clopper-Pearson interval."""
-        hits = self.hits(level)
-        return float(hits.mean()), share_interval(int(hits.sum()), len(hits))
-
-    def share_less(self, baseline: Case, level: float, seed: int) -> Estimate:
-        """The share less that of another case, pair by pair."""
-        apart = self.hits(level).astype(float) - baseline.hits(level)
-        return Estimate(float(apart.mean()), mean_interval(apart, seed))
-
     def summary(self, baseline: Case, levels: tuple[float, ...], seed: int) -> dict[str, Any]:
         """As strict JSON values, SI."""
         shares = {}
         for level in levels:
-            share, interval = self.share(level)
-            apart = self.share_less(baseline, level, seed)
+            share, apart = self.share(level), self.share_difference(baseline, level, seed)
             shares[f"{level:g}"] = {
-                "share": share, "interval_95": list(interval), "difference": apart.summary(),
+                **share.summary("share"), "difference": apart.summary(),
             }  # fmt: skip
         return {
             "policy": self.policy,
@@ -106,6 +152,8 @@ class Case:
                 name: self.difference(baseline, name, seed).summary() for name in MEASURES
             },
             "levels": shares,
+            "step": self.step,
+            "modes": self.modes,
         }
 
 
@@ -131,10 +179,6 @@ def own_optima(compared: Policies, progress: Progress) -> Optima:
     return Optima(constant, ideal, real)
 
 
-STARTS = (0.0, 500.0, 1500.0)
-"""Gains of the weight (N s/rad) that are tried with the constant weight's gains of the drive."""
-
-
 def optimum_beside(
     policy: Policy, realizations: int, constant: Optimum, starts: Sequence[Array] = ()
 ) -> Optimum:
@@ -145,43 +189,71 @@ def optimum_beside(
     return optimum(policy, realizations, [*own, *starts])
 
 
-def cases(compared: Policies, optima: Optima, fresh: Fresh, progress: Progress) -> tuple[Case, ...]:
+def cases(
+    compared: Policies, optima: Optima, draws: CommonDraws, progress: Progress
+) -> tuple[Case, ...]:
     """The table's cases, the constant weight first."""
     baseline = compared.constant.with_gains(optima.constant.values)
-    ground = fresh.run(baseline)
-    below = ground.resampled(fresh)
-    zero = Estimate(0.0, (0.0, 0.0))
-    start = (0.0, 0.0)
-    found = [_case(compared.constant, NOMINAL, optima.constant, start, ground, below, zero)]
+    ground = measured(baseline, draws)
+    found = [_case(compared.constant, NOMINAL, optima.constant, (0.0, 0.0), ground, ground)]
     for policy, first in ((compared.ideal, optima.ideal), (compared.real, optima.real)):
         for terms in ALL_TERMS:
-            on = tuned_on_terms(policy, terms, baseline, first)
-            design = policy.with_gains(on.found.values)
-            shift = fresh_shift(policy, terms, fresh.lanes(design), ground)
-            measured = fresh.run(design, shift[0])
-            own = measured.resampled(fresh)
-            apart = estimate(
-                float(less(np.array(measured.value), np.array(ground.value))), less(own, below)
-            )
-            found.append(_case(policy, terms, on.found, shift, measured, own, apart))
+            best = tuned_on_terms(policy, terms, baseline, first)
+            design = policy.with_gains(best.values)
+            shift = fresh_shift(policy, terms, design, ground)
+            own = measured(design, draws, shift[0])
+            found.append(_case(policy, terms, best, shift, own, ground))
             progress.advance(1)
     return tuple(found)
 
 
+def tuned_on_terms(policy: Policy, terms: Terms, baseline: Design, first: Optimum) -> Optimum:
+    """Gains of a policy on some terms, tuned at the shifted weight."""
+    table, own = policy.design.tables.tune, policy.design.tables.operating_point.weight_on_bit
+    if terms.measure is None or not policy.follows:
+        return first
+    draws = CommonDraws(table.realizations, table.seed)
+    target = float(np.nanmean(draws.run(baseline).measures[terms.measure]))
+    found, shift = first, 0.0
+    for _ in range(ROUNDS):
+        lanes = draws.lanes(policy.with_gains(found.values))
+        wanted, _off = matching_shift(lanes, draws.count, terms.measure, target)
+        if abs(wanted - shift) <= STILL * own:
+            break
+        shift = wanted
+        found = optimum(policy.shifted(shift), table.realizations, [found.values])
+    return found
+
+
+def fresh_shift(
+    policy: Policy, terms: Terms, design: Design, baseline: Measured
+) -> tuple[float, float]:
+    """Shift (N) at which a policy is on the terms at fresh draws, and how far off it is there."""
+    if terms.measure is None or not policy.follows:
+        return 0.0, 0.0
+    target = baseline.runs.mean(terms.measure)
+    assert target is not None
+    draws = baseline.draws
+    return matching_shift(draws.lanes(design), draws.count, terms.measure, target)
+
+
 def _case(
-    policy: Policy, terms: Terms, found: Optimum, shift: tuple[float, float],
-    measured: Measured, resampled: Array, apart: Estimate,
+    policy: Policy, terms: Terms, best: Optimum, shift: tuple[float, float],
+    own: Measured, ground: Measured,
 ) -> Case:  # fmt: skip
-    gains = {t.path: float(v) for t, v in zip(policy.tuned, found.values, strict=True)}
+    gains = {t.path: float(v) for t, v in zip(policy.tuned, best.values, strict=True)}
     return Case(
+        measures={name: own.runs.measures[name] for name in MEASURES},
+        status=own.runs.status,
+        step=own.runs.step,
+        modes=own.runs.modes,
         policy=policy.name,
         terms=terms.name,
         gains={path: gains.get(path, 0.0) for path in PATHS},
-        at_bounds=found.at_bounds,
+        at_bounds=best.at_bounds,
         shift=shift[0],
         off=shift[1],
-        tuned_value=found.value,
-        objective=estimate(measured.value, resampled),
-        objective_less=apart,
-        measures={name: measured.runs.measures[name] for name in MEASURES},
+        tuned_value=best.value,
+        objective=own.estimate,
+        objective_less=own.less(ground),
     )

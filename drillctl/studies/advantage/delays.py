@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.ensemble.intervals import CONFIDENCE
+from drillctl.ensemble.cases import Crossing, percentile_estimate, resampled_crossing
+from drillctl.ensemble.draws import CommonDraws
 from drillctl.progress import Progress
-from drillctl.studies.advantage.cases import Optima, optimum_beside
-from drillctl.studies.advantage.measured import Fresh, estimate, less
+from drillctl.studies.advantage.cases import Optima, less, measured, optimum_beside
 from drillctl.studies.advantage.optimum import Optimum
 from drillctl.studies.advantage.policies import DELAY, Policies, Policy
-from drillctl.studies.weight_delay.limits import first_not_negative
 
 Array = NDArray[np.float64]
 
@@ -29,20 +28,6 @@ STEPS = 10
 """Into which a step of the grid is divided where kept gains lose their advantage."""
 STEPS_ANEW = 5
 """The same where gains tuned anew do, each of which is a search."""
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """Delay at which an advantage first falls to a threshold."""
-
-    delay: float | None  # on straight lines between the delays (s); None if it never does
-    # percentiles over resampled draws; None for an end beyond the longest delay
-    interval_95: tuple[float | None, float | None]
-    within: float  # share of the resamples in which it does
-
-    def summary(self) -> dict[str, Any]:
-        """As strict JSON values."""
-        return {"delay": self.delay, "interval_95": list(self.interval_95), "within": self.within}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +74,8 @@ class DelayCurve:
                     "advantage": _plain(line.advantage),
                     "low": _plain(line.low),
                     "high": _plain(line.high),
-                    "zero": line.zero.summary(),
-                    "material": line.material.summary(),
+                    "zero": line.zero.summary("delay"),
+                    "material": line.material.summary("delay"),
                     "indistinct_from": line.indistinct_from,
                 }
                 for name, line in (("kept", self.kept), ("anew", self.anew))
@@ -98,29 +83,31 @@ class DelayCurve:
         }
 
 
-def delay_curve(compared: Policies, optima: Optima, fresh: Fresh, progress: Progress) -> DelayCurve:
+def delay_curve(
+    compared: Policies, optima: Optima, draws: CommonDraws, progress: Progress
+) -> DelayCurve:
     """Advantage of the real path over the delays of the design's `[advantage]` table."""
-    ground = fresh.run(compared.constant.with_gains(optima.constant.values))
-    constant = np.append(ground.value, ground.resampled(fresh))
+    constant = _objectives(compared.constant, optima.constant.values, draws)
+    ground = float(constant[0])
     table = compared.real.design.tables.advantage
     delays, fixed = np.array(table.delays), optima.ideal.values
-    anew = _tuned_anew(compared.real, optima, fresh, ground.value, progress)
+    anew = _tuned_anew(compared.real, optima, draws, ground, progress)
     kept: Points = {
-        delay: (fixed, _measured(_late(compared.real, delay), fixed, fresh))
+        delay: (fixed, _objectives(_late(compared.real, delay), fixed, draws))
         for delay in table.delays
     }
-    for delay in _between(delays, _advantages(ground.value, kept)):
-        kept[delay] = fixed, _measured(_late(compared.real, delay), fixed, fresh)
+    for delay in _between(delays, _advantages(ground, kept)):
+        kept[delay] = fixed, _objectives(_late(compared.real, delay), fixed, draws)
     return DelayCurve(
         delays,
-        ground.value,
+        ground,
         _line(kept, constant, table.material),
         _line(anew, constant, table.material),
     )
 
 
 def _tuned_anew(
-    policy: Policy, optima: Optima, fresh: Fresh, constant: float, progress: Progress
+    policy: Policy, optima: Optima, draws: CommonDraws, constant: float, progress: Progress
 ) -> Points:
     """Gains tuned at each delay of the grid, and closer where the advantage vanishes.
 
@@ -129,7 +116,7 @@ def _tuned_anew(
     """
     table, tune = policy.design.tables.advantage, policy.design.tables.tune
     found: dict[float, Optimum] = {}
-    measured: Points = {}
+    points: Points = {}
 
     def tuned(delay: float, start: Array) -> Optimum:
         # As many draws as the constant weight was tuned at: fewer would fit their own draws more.
@@ -139,7 +126,7 @@ def _tuned_anew(
 
     def keep(delay: float, one: Optimum) -> Array:
         found[delay] = one
-        measured[delay] = one.values, _measured(_late(policy, delay), one.values, fresh)
+        points[delay] = one.values, _objectives(_late(policy, delay), one.values, draws)
         return one.values
 
     last = optima.real.values
@@ -148,16 +135,16 @@ def _tuned_anew(
         progress.advance(1)
     none = table.material * constant
     while True:
-        over = [d for d in table.delays if constant - measured[d][1][0] <= none]
+        over = [d for d in table.delays if constant - points[d][1][0] <= none]
         before = [d for d in table.delays if over and d < over[0]]
         if not before:
-            return measured
+            return points
         last = found[before[-1]].values
         for delay in np.linspace(before[-1], over[0], STEPS_ANEW + 1)[1:-1].tolist():
             last = keep(delay, tuned(delay, last))
         again = tuned(over[0], last)
         if not again.value < found[over[0]].value:
-            return measured
+            return points
         keep(over[0], again)
 
 
@@ -174,10 +161,9 @@ def _late(policy: Policy, delay: float) -> Policy:
     return policy.at(DELAY, delay) if policy.follows else policy
 
 
-def _measured(policy: Policy, gains: Array, fresh: Fresh) -> Array:
+def _objectives(policy: Policy, gains: Array, draws: CommonDraws) -> Array:
     """Objective at the fresh draws, then of every resample, shape (1 + resamples,)."""
-    measured = fresh.run(policy.with_gains(gains))
-    return np.append(measured.value, measured.resampled(fresh))
+    return measured(policy.with_gains(gains), draws).objectives
 
 
 def _between(delays: Array, advantage: Array) -> list[float]:
@@ -200,7 +186,7 @@ def _line(points: Points, constant: Array, share: float) -> DelayLine:
     gains = np.stack([points[delay][0] for delay in delays.tolist()])
     found = np.stack([points[delay][1] for delay in delays.tolist()])
     apart = less(constant, found)
-    ends = [estimate(float(row[0]), row[1:]).interval or (np.nan, np.nan) for row in apart]
+    ends = np.array([percentile_estimate(row).ends for row in apart], dtype=float)
     padded = np.zeros((len(gains), 3))
     padded[:, : gains.shape[1]] = gains
     return DelayLine(
@@ -208,22 +194,11 @@ def _line(points: Points, constant: Array, share: float) -> DelayLine:
         gains=padded,
         objective=found[:, 0],
         advantage=apart[:, 0],
-        low=np.array([low for low, _ in ends]),
-        high=np.array([high for _, high in ends]),
-        zero=crossing(delays, apart),
-        material=crossing(delays, less(apart, share * constant)),
+        low=ends[:, 0],
+        high=ends[:, 1],
+        zero=resampled_crossing(delays, -apart),
+        material=resampled_crossing(delays, -less(apart, share * constant)),
     )
-
-
-def crossing(delays: Array, margin: Array) -> Crossing:
-    """Where a margin first is not positive."""
-    found = [first_not_negative(delays, -column) for column in margin.T]
-    again = np.sort([np.inf if delay is None else delay for delay in found[1:]])
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    # Order statistics: between a delay and none there is nothing to interpolate.
-    ends = np.quantile(again, [tail, 1.0 - tail], method="inverted_cdf")
-    low, high = (float(end) if np.isfinite(end) else None for end in ends)
-    return Crossing(found[0], (low, high), float(np.isfinite(again).mean()))
 
 
 def _plain(values: Array) -> list[float | None]:

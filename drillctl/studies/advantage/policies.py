@@ -19,8 +19,8 @@ from drillctl.design.delay_tables import LAW
 from drillctl.design.validation import validated
 from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.errors import InputError
+from drillctl.studies.delay.lanes import LAWS
 from drillctl.studies.robust.tuned import Tuned, put, tuned_parameters
-from drillctl.studies.weight_delay.lanes import LAWS
 
 Array = NDArray[np.float64]
 
@@ -47,6 +47,14 @@ class Policy:
     def at(self, path: str, value: float) -> Policy:
         """The same with another value (SI) of its design."""
         return replace(self, design=self.design.replace({path: units.SI(value)}))
+
+    def shifted(self, shift: float) -> Policy:
+        """The same with its nominal weight shifted (N), outside of the friction table too."""
+        weight = self.design.tables.operating_point.weight_on_bit + shift
+        if not hasattr(self.design.tables.bit_rock, "outside_table"):
+            return self.at(WEIGHT, weight)
+        values = {WEIGHT: units.SI(weight), "bit_rock.outside_table": "extrapolate"}
+        return replace(self, design=self.design.replace(values))
 
     def with_gains(self, values: Array) -> Design:
         """Its design with tuned values (SI), shape (parameters,)."""

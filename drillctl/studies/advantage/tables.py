@@ -6,10 +6,10 @@ import csv
 from collections.abc import Iterable
 from pathlib import Path
 
+from drillctl.ensemble.cases import Estimate
 from drillctl.studies.advantage.cases import MEASURES
-from drillctl.studies.advantage.chart import FIGURES, Chart
-from drillctl.studies.advantage.measured import Estimate
-from drillctl.studies.advantage.result import Advantage
+from drillctl.studies.advantage.compute import Advantage
+from drillctl.studies.advantage.sweeps import FIGURES, Chart
 
 
 def write_advantage(result: Advantage, folder: Path) -> None:
@@ -46,9 +46,9 @@ def _cases(result: Advantage) -> Iterable[list[object]]:
 def _shares(result: Advantage) -> Iterable[list[object]]:
     for case in result.cases:
         for level in result.levels:
-            share, interval = case.share(level)
-            apart = case.share_less(result.baseline, level, result.seed)
-            yield [case.name, level, share, *interval, *_three(apart)]
+            share = case.share(level)
+            apart = case.share_difference(result.baseline, level, result.seed)
+            yield [case.name, level, share.value, *share.interval, *_three(apart)]
 
 
 def _areas(result: Advantage) -> Iterable[list[object]]:
@@ -77,7 +77,7 @@ def _delays(result: Advantage) -> Iterable[list[object]]:
 
 
 def _three(found: Estimate) -> list[object]:
-    return [found.value, *(found.interval or (None, None))]
+    return [found.value, *found.ends]
 
 
 def _write(path: Path, heads: list[str], rows: Iterable[list[object]]) -> None:

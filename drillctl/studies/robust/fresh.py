@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
+from drillctl.ensemble.cases import Interval, share_interval
 from drillctl.ensemble.draws import Failures
-from drillctl.ensemble.intervals import Interval, share_interval
 from drillctl.studies.robust.evaluation import Evaluation
 from drillctl.studies.robust.judge import Judge, Point
 from drillctl.studies.robust.objective import rank_weights

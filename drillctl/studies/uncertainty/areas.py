@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.ensemble.intervals import CONFIDENCE, Interval
+from drillctl.ensemble.cases import CONFIDENCE, Interval
 from drillctl.studies.uncertainty.probability import ProbabilityMap, needed
 from drillctl.studies.uncertainty.scatter import Scatter
 

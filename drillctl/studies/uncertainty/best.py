@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.ensemble.intervals import CONFIDENCE, mean_interval, share_interval
+from drillctl.ensemble.cases import CONFIDENCE, mean_interval, share_interval
 from drillctl.errors import InputError
 from drillctl.studies.uncertainty.objectives import (
     Exceedance,

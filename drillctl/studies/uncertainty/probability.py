@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.ensemble.intervals import CONFIDENCE, share_intervals
+from drillctl.ensemble.cases import CONFIDENCE, share_intervals
 from drillctl.studies.uncertainty.scatter import Scatter
 
 Array = NDArray[np.float64]

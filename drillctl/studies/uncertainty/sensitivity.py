@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.ensemble.intervals import CONFIDENCE
+from drillctl.ensemble.cases import CONFIDENCE
 from drillctl.ensemble.parameters import uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design.uncertain_tables import UntilTable
-from drillctl.ensemble.intervals import CONFIDENCE, Interval
+from drillctl.ensemble.cases import CONFIDENCE, Interval
 from drillctl.errors import InputError
 from drillctl.studies.uncertainty.areas import region_areas
 from drillctl.studies.uncertainty.probability import probability_map

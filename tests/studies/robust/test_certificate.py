@@ -9,8 +9,8 @@ import pytest
 import drillctl
 from drillctl.design import to_toml
 from drillctl.ensemble.audit import reference_j1
+from drillctl.ensemble.cases import share_interval
 from drillctl.ensemble.draws import drawn_lanes, run_draws
-from drillctl.ensemble.intervals import share_interval
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.store.json_files import strict

@@ -7,40 +7,43 @@ other, and the mean of that. Most of what the draws scatter is common to both an
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design, to_toml
-from drillctl.ensemble.draws import (
-    DrawnRuns,
-    Failures,
-    drawn_lanes,
-    equalising_shift,
-    run_draws,
-    start_up,
-)
+from drillctl.ensemble.cases import Estimate, Runs
+from drillctl.ensemble.draws import CommonDraws, Failures, equalising_shift, run_draws, start_up
 from drillctl.ensemble.grid import refuse_too_large
-from drillctl.ensemble.intervals import Interval, mean_interval, share_interval
-from drillctl.ensemble.parameters import draw, refuse_dependent, uncertain_parameters
+from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.ensemble.regions import Region, region
 from drillctl.ensemble.sweeps import UNITS
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.comparison.cases import case_designs, in_case, refuse_unequal
-from drillctl.studies.comparison.nominal import Nominal, labelled, nominal_design, nominal_runs
+from drillctl.studies.compare.cases import (
+    Nominal,
+    case_designs,
+    in_case,
+    labelled,
+    nominal_runs,
+    refuse_unequal,
+    shifted_design,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import xarray
+
+    from drillctl.design.tables import AxisTable
 
 Array = NDArray[np.float64]
 
@@ -55,53 +58,21 @@ MEASURES = {
     "work_per_turn": UNITS["work_per_turn"], "time_outside_table": UNITS["time_outside_table"],
 }  # fmt: skip
 """What is compared, with its unit."""
-QUANTILES = {"p05": 0.05, "p50": 0.5, "p95": 0.95}
-"""Of the distribution of a measure over the draws."""
 NO_ANSWER = "no finite answer"
 """Reason of a run that broke down."""
 
 
 @dataclass(frozen=True, eq=False)
-class ComparedCase:
-    """One case at all draws."""
+class ComparedCase(Runs):
+    """One case at all draws, by the names of `MEASURES`."""
 
-    name: str  # what it is called
+    name: str
     design: Design  # what was simulated, but for the draws and the shift
-    # shape (realizations,): Values of the uncertain parameters by path (SI)
+    # shape (draws,): values of the uncertain parameters by path (SI)
     drawn: dict[str, Array]
-    # shape (realizations,): By the names of `MEASURES` (SI); NaN where undefined
-    measures: dict[str, Array]
-    status: NDArray[np.int8]  # shape (realizations,): Index into `simulation.measures.STATUSES`
-    failures: tuple[Failures, ...]  # why draws came to nothing
+    failures: tuple[Failures, ...]  # draws without a result, by reason
     weight_shift: float  # added to the nominal weight on bit for the sake of equal means (N)
-    # scheme of the batch engine; None where it differs from draw to draw
-    step: float | None
-    modes: int | None
     nominal: Nominal  # map and motion at its own values, the weight shifted as for the draws
-
-    def distribution(self, measure: str) -> dict[str, Any]:
-        """Mean, standard deviation, quantiles (SI) and number of draws that define a measure."""
-        values = self.measures[measure]
-        values = values[~np.isnan(values)]
-        if not values.size:
-            return {"mean": None, "std": None, **dict.fromkeys(QUANTILES), "defined": 0}
-        spread = float(values.std(ddof=1)) if values.size > 1 else None
-        quantiles = np.quantile(values, list(QUANTILES.values()))
-        return {
-            "mean": float(values.mean()),
-            "std": spread,
-            **dict(zip(QUANTILES, map(float, quantiles), strict=True)),
-            "defined": int(values.size),
-        }
-
-    def share(self, level: float) -> tuple[int, float, Interval]:
-        """Draws with J1 at or under a level (s), their share and its interval.
-
-        A draw that failed is not under any level: the share is of all draws.
-        """
-        total = len(self.status)
-        hits = int((np.nan_to_num(self.measures["j1"], nan=np.inf) <= level).sum())
-        return hits, hits / total, share_interval(hits, total)
 
     def region(self, level: float) -> Region | None:
         """Cells and outline of the nominal map at or under a level of J1 (s); None without map."""
@@ -112,43 +83,23 @@ class ComparedCase:
         """Measures, regions, statuses, failures, shift, scheme and nominal runs; SI."""
         regions = {}
         for level in levels:
-            hits, share, interval = self.share(level)
-            inside = self.region(level)
+            share, inside = self.share(level), self.region(level)
             regions[f"{level:g}"] = {
-                "draws": hits,
-                "share": share,
-                "interval_95": list(interval),
+                "draws": share.hits,
+                **share.summary("share"),
                 "cells": None if inside is None else inside.cells,
                 "area_fraction": None if inside is None else inside.area_fraction,
             }
         return {
             "measures": {name: self.distribution(name) for name in MEASURES},
             "regions": regions,
-            "statuses": {
-                name: int((self.status == code).sum())
-                for code, name in enumerate(STATUSES)
-                if (self.status == code).any()
-            },
+            "statuses": self.counts(),
             "failures": [asdict(failure) for failure in self.failures],
             "weight_shift": self.weight_shift,
             "step": self.step,
             "modes": self.modes,
             "nominal": self.nominal.summary(),
         }
-
-
-@dataclass(frozen=True)
-class Difference:
-    """Mean of a measure of one case less that of the baseline, draw by draw."""
-
-    difference: float | None  # mean over the pairs (SI); None without pairs
-    interval: Interval | None  # bootstrap interval; None for fewer than two pairs
-    pairs: int  # draws at which both cases define the measure
-
-    def summary(self) -> dict[str, Any]:
-        """As strict JSON values."""
-        interval = None if self.interval is None else list(self.interval)
-        return {"difference": self.difference, "interval_95": interval, "pairs": self.pairs}
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,20 +142,12 @@ class Comparison:
         return self.cases[0]
 
     @cached_property
-    def paired(self) -> dict[str, dict[str, Difference]]:
-        """Difference of every other case from the baseline, by case and measure."""
+    def paired(self) -> dict[str, dict[str, Estimate]]:
+        """Mean difference of every other case from the baseline, by case and measure."""
         return {
-            case.name: {name: self.difference(case, name) for name in MEASURES}
+            case.name: {name: case.difference(self.baseline, name, self.seed) for name in MEASURES}
             for case in self.cases[1:]
         }
-
-    def difference(self, case: ComparedCase, measure: str) -> Difference:
-        """Paired difference of a case from the baseline in one measure."""
-        apart = case.measures[measure] - self.baseline.measures[measure]
-        apart = apart[~np.isnan(apart)]
-        if not apart.size:
-            return Difference(None, None, 0)
-        return Difference(float(apart.mean()), mean_interval(apart, self.seed), int(apart.size))
 
     @property
     def data(self) -> xarray.Dataset:
@@ -235,7 +178,10 @@ class Comparison:
         return {
             "cases": {case.name: case.summary(self.levels) for case in self.cases},
             "paired": {
-                name: {measure: found.summary() for measure, found in differences.items()}
+                name: {
+                    measure: {**found.summary("difference"), "pairs": found.draws}
+                    for measure, found in differences.items()
+                }
                 for name, differences in self.paired.items()
             },
             "baseline": self.baseline.name,
@@ -307,24 +253,25 @@ def compare(
         first = next(iter(named.values()))
         design = first.replace(asked) if asked else first
     refuse_unequal(named)
-    draws, equal = design.tables.uncertainty, design.tables.compare.equal_mean_weight
+    table, equal = design.tables.uncertainty, design.tables.compare.equal_mean_weight
     refuse_dependent(design)
-    refuse_too_large([draws.realizations, len(named)], "uncertainty.realizations")
-    progress.begin("simulating cases", draws.realizations * len(named))
-    runs, own = [], {}
+    refuse_too_large([table.realizations, len(named)], "uncertainty.realizations")
+    axes = design.tables.map.axes if design.tables.compare.maps else None
+    cells = math.prod(one.points for one in axes) if axes else 0
+    if axes:
+        refuse_too_large([len(named), *(one.points for one in axes)])
+    progress.begin("simulating cases", (table.realizations + cells) * len(named))
+    draws = CommonDraws(table.realizations, table.seed)
+    found = []
     for name, variant in named.items():
         try:
-            runs.append(_run_case(variant, draws.realizations, draws.seed, equal))
-            own[name] = nominal_design(variant, runs[-1].shift)
+            found.append(_compared(name, variant, draws, equal, axes, progress))
         except InputError as error:
             raise in_case(error, variant, name) from None
-        progress.advance(draws.realizations)
-    axes = design.tables.map.axes if design.tables.compare.maps else None
-    nominal = nominal_runs(own, axes, progress)
     return Comparison(
         design=design,
-        cases=tuple(map(_compared, named, named.values(), runs, nominal)),
-        realizations=draws.realizations,
+        cases=tuple(found),
+        realizations=draws.count,
         seed=draws.seed,
         levels=design.tables.map.levels,
         weight_from=start_up(design.tables.simulation.duration),
@@ -333,38 +280,28 @@ def compare(
     )
 
 
-class _CaseRuns(NamedTuple):
-    """What the draws of a case came to."""
-
-    drawn: dict[str, Array]
-    failures: tuple[Failures, ...]
-    shift: float
-    runs: DrawnRuns
-
-
-def _run_case(design: Design, count: int, seed: int, equal: bool) -> _CaseRuns:
-    draws = draw(design, count, seed)
-    drawn = drawn_lanes(design, draws)
-    shift = equalising_shift(drawn, count) if equal else 0.0
-    runs = run_draws(drawn, count, shift)
+def _compared(
+    name: str, design: Design, draws: CommonDraws, equal: bool,
+    axes: tuple[AxisTable, ...] | None, progress: Progress,
+) -> ComparedCase:  # fmt: skip
+    drawn = draws.lanes(design)
+    shift = equalising_shift(drawn, draws.count) if equal else 0.0
+    runs = run_draws(drawn, draws.count, shift)
     impossible = sum(failure.count for failure in drawn.failures)
-    broken = int((runs.status == STATUSES.index("failed")).sum()) - impossible
+    broken = runs.counts().get("failed", 0) - impossible
     failures = drawn.failures
     if broken:
         failures = (*failures, Failures(NO_ANSWER, broken, "a number of the run is not finite"))
-    return _CaseRuns(draws.values, failures, shift, runs)
-
-
-def _compared(name: str, design: Design, case: _CaseRuns, nominal: Nominal) -> ComparedCase:
+    progress.advance(draws.count)
     return ComparedCase(
+        measures={measure: runs.measures[measure] for measure in MEASURES},
+        status=runs.status,
+        step=runs.step,
+        modes=runs.modes,
         name=name,
         design=design,
-        drawn=case.drawn,
-        measures={measure: case.runs.measures[measure] for measure in MEASURES},
-        status=case.runs.status,
-        failures=case.failures,
-        weight_shift=case.shift,
-        step=case.runs.step,
-        modes=case.runs.modes,
-        nominal=nominal,
+        drawn=draws.values(design),
+        failures=failures,
+        weight_shift=shift,
+        nominal=nominal_runs(shifted_design(design, shift), axes, progress),
     )

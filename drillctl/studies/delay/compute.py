@@ -8,7 +8,7 @@ with the constant weight, which is the same law with K_w = 0.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -18,21 +18,23 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.ensemble.cases import (
+    Crossing,
+    Estimate,
+    Runs,
+    Share,
+    crossing,
+    joined,
+    scheme_of,
+    share_of,
+)
 from drillctl.ensemble.draws import Failures
 from drillctl.ensemble.grid import refuse_too_large
-from drillctl.ensemble.intervals import Interval, mean_interval, share_interval
 from drillctl.ensemble.parameters import draw, refuse_dependent, uncertain_parameters
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.weight_delay.lanes import MEASURES, Runs, delayed_lanes, following_design
-from drillctl.studies.weight_delay.limits import (
-    EndedShare,
-    EndsUpTo,
-    HarmfulFrom,
-    ends_up_to,
-    harmful_from,
-)
+from drillctl.studies.delay.lanes import MEASURES, delayed_lanes, following_design
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,50 +44,76 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+ENOUGH = 0.95
+"""Share of the draws in which stick-slip must have ended."""
+
+
 @dataclass(frozen=True)
 class DelayedBenefit:
     """One gain at one delay, over all draws."""
 
-    j1: float | None  # mean of J1 over the draws that did not fail (s); None if all did
-    j1_interval: Interval | None  # its bootstrap interval; None for fewer than two draws
-    # mean over the draws of J1 less that of the constant weight at the same draw (s)
-    difference: float | None
-    difference_interval: Interval | None  # bootstrap interval of that mean
-    pairs: int  # draws that neither failed in
-    ended: int  # draws in which stick-slip has ended: the bit did not stick in the last 20 s
-    ended_share: EndedShare  # the same as a share of all draws, with its interval
-    peak_bit_speed: float | None  # mean of the largest bit speed of a run (rad/s)
-    # mean of the largest torque in the uppermost element of a run (N m)
-    peak_pipe_torque: float | None
-    mean_weight: float | None  # mean weight on bit after the start of the run (N)
+    delay: float  # total delay of the path (s)
+    j1: Estimate  # mean of J1 (s)
+    difference: Estimate  # mean of J1 less that of the constant weight at the same draw (s)
+    ended: Share  # of the draws in which stick-slip has ended: no sticking in the last 20 s
+    # means over the draws; None if all failed
+    peak_bit_speed: float | None  # rad/s
+    peak_pipe_torque: float | None  # N m
+    mean_weight: float | None  # after the start of the run (N)
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values, SI."""
         return {
-            "delay": self.ended_share.delay,
-            "j1": self.j1,
-            "j1_interval_95": _listed(self.j1_interval),
-            "difference": self.difference,
-            "difference_interval_95": _listed(self.difference_interval),
-            "pairs": self.pairs,
-            "ended": self.ended,
-            "ended_share": self.ended_share.share,
-            "ended_interval_95": _listed(self.ended_share.interval_95),
+            "delay": self.delay,
+            **self.j1.summary("j1", "j1_"),
+            **self.difference.summary("difference", "difference_"),
+            "pairs": self.difference.draws,
+            "ended": self.ended.hits,
+            "ended_share": self.ended.value,
+            "ended_interval_95": list(self.ended.interval),
             "peak_bit_speed": self.peak_bit_speed,
             "peak_pipe_torque": self.peak_pipe_torque,
             "mean_weight": self.mean_weight,
         }
 
+    def share_summary(self) -> dict[str, Any]:
+        """The share of draws in which stick-slip has ended, as strict JSON values."""
+        return {"delay": self.delay, **self.ended.summary("share")}
+
 
 @dataclass(frozen=True)
 class GainLimits:
-    """How much delay one gain bears."""
+    """How much delay one gain bears.
+
+    What a longer delay may bring back, as one near the period of the motion does, is not a limit
+    anyone would drill by.
+    """
 
     gain: float  # K_w (N s/rad)
-    # longest delay at which stick-slip has ended in 95 % of the draws, shorter ones included
-    ends_up_to: EndsUpTo
+    # longest delay at which stick-slip has ended in 95 % of the draws, shorter ones included, and
+    # the delay after it; None if there is none
+    ends_at: DelayedBenefit | None
+    ends_before: DelayedBenefit | None
     # delay at which the mean of J1 stops being under that of the constant weight
-    harmful_from: HarmfulFrom
+    harmful_from: Crossing
+
+    def summary(self) -> dict[str, Any]:
+        """As strict JSON values; the delay is null if stick-slip ends at none."""
+        at, after = self.ends_at, self.ends_before
+        return {
+            "gain": self.gain,
+            "ends_up_to": {
+                "delay": None if at is None else at.delay,
+                "at": None if at is None else at.share_summary(),
+                "next": None if after is None else after.share_summary(),
+            },
+            "harmful_from": self.harmful_from.summary("delay"),
+        }
+
+
+def lasting(shares: Sequence[float], enough: float = ENOUGH) -> int:
+    """How many of the shares, from the first on, are at least `enough`."""
+    return next((k for k, share in enumerate(shares) if share < enough), len(shares))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +132,6 @@ class WeightDelay:
         Of the constant weight, K_w = 0.
     failures : tuple of Failures
         Why draws came to nothing.
-    step, modes : float and int, or None
-        Scheme of the batch engine; None where it differs from gain to gain.
     total_seconds : float
         From call to return (s).
     provenance : dict of str
@@ -117,8 +143,6 @@ class WeightDelay:
     runs: Runs
     constant: Runs
     failures: tuple[Failures, ...]
-    step: float | None
-    modes: int | None
     total_seconds: float
     provenance: dict[str, str] = field(default_factory=provenance)
 
@@ -161,32 +185,24 @@ class WeightDelay:
         return tuple(map(self._limits, map(float, self.gains), self.benefits))
 
     def _benefit(self, runs: Runs, delay: float) -> DelayedBenefit:
-        j1 = runs.measures["j1"]
-        apart = j1 - self.constant.measures["j1"]
-        paired = ~np.isnan(apart)
-        ended = int(runs.ended.sum())
-        total = self.realizations
         return DelayedBenefit(
-            j1=_mean(j1),
-            j1_interval=mean_interval(j1[~np.isnan(j1)], self.seed),
-            difference=_mean(apart),
-            difference_interval=mean_interval(apart[paired], self.seed),
-            pairs=int(paired.sum()),
-            ended=ended,
-            ended_share=EndedShare(delay, ended / total, share_interval(ended, total)),
-            peak_bit_speed=_mean(runs.measures["peak_bit_speed"]),
-            peak_pipe_torque=_mean(runs.measures["peak_pipe_torque"]),
-            mean_weight=_mean(runs.measures["mean_weight_after_start"]),
+            delay=delay,
+            j1=runs.mean_estimate("j1", self.seed),
+            difference=runs.difference(self.constant, "j1", self.seed),
+            ended=share_of(runs.ended),
+            peak_bit_speed=runs.mean("peak_bit_speed"),
+            peak_pipe_torque=runs.mean("peak_pipe_torque"),
+            mean_weight=runs.mean("mean_weight_after_start"),
         )
 
     def _limits(self, gain: float, benefits: tuple[DelayedBenefit, ...]) -> GainLimits:
-        harmful = HarmfulFrom(None, (None, None))
+        harmful = Crossing(None, (None, None))
         if gain > 0.0:
-            lines = [(one.difference, *(one.difference_interval or (None, None)))
-                     for one in benefits]  # fmt: skip
-            difference, low, high = np.array(lines, dtype=float).T
-            harmful = harmful_from(self.delays, difference, low, high)
-        return GainLimits(gain, ends_up_to([one.ended_share for one in benefits]), harmful)
+            lines = [(one.difference.value, *one.difference.ends) for one in benefits]
+            harmful = crossing(self.delays, *np.array(lines, dtype=float).T)
+        held = lasting([one.ended.value for one in benefits])
+        at, after = ([None, *benefits, None][held + k] for k in (0, 1))
+        return GainLimits(gain, at, after, harmful)
 
     @property
     def data(self) -> xarray.Dataset:
@@ -217,34 +233,27 @@ class WeightDelay:
     def _figures(self) -> dict[str, tuple[str, Array]]:
         """What is told of each gain and delay, with its unit."""
 
-        def over(pick: Any) -> Array:
+        def over(pick: Callable[[DelayedBenefit], float | None]) -> Array:
             return np.array([[pick(one) for one in row] for row in self.benefits], dtype=float)
 
-        def end(number: int) -> Array:
-            return over(lambda one: (one.difference_interval or (None, None))[number])
-
         return {
-            "difference": ("s", over(lambda one: one.difference)),
-            "difference_low": ("s", end(0)),
-            "difference_high": ("s", end(1)),
-            "ended_share": ("1", over(lambda one: one.ended_share.share)),
-            "ended_low": ("1", over(lambda one: one.ended_share.interval_95[0])),
-            "ended_high": ("1", over(lambda one: one.ended_share.interval_95[1])),
+            "difference": ("s", over(lambda one: one.difference.value)),
+            "difference_low": ("s", over(lambda one: one.difference.ends[0])),
+            "difference_high": ("s", over(lambda one: one.difference.ends[1])),
+            "ended_share": ("1", over(lambda one: one.ended.value)),
+            "ended_low": ("1", over(lambda one: one.ended.interval[0])),
+            "ended_high": ("1", over(lambda one: one.ended.interval[1])),
         }
 
     def summary(self) -> dict[str, Any]:
         """Limits and figures of every gain and delay, settings; SI units."""
+        step, modes = scheme_of([self.constant, self.runs])
         constant = self.baseline.summary()
         for key in ("delay", "difference", "difference_interval_95", "pairs"):
             del constant[key]
         return {
             "gains": [
-                {
-                    "gain": limits.gain,
-                    "ends_up_to": limits.ends_up_to.summary(),
-                    "harmful_from": limits.harmful_from.summary(),
-                    "delays": [one.summary() for one in row],
-                }
+                {**limits.summary(), "delays": [one.summary() for one in row]}
                 for limits, row in zip(self.limits, self.benefits, strict=True)
             ],
             "constant": constant,
@@ -253,8 +262,8 @@ class WeightDelay:
             "seed": self.seed,
             "uncertain": list(self.drawn),
             "failures": [asdict(failure) for failure in self.failures],
-            "step": self.step,
-            "modes": self.modes,
+            "step": step,
+            "modes": modes,
             "total_seconds": self.total_seconds,
         }
 
@@ -315,22 +324,19 @@ def weight_delay(
     lanes = delayed_lanes(following, draws, np.array(table.delays))
     alone = delayed_lanes(following, draws, np.array(table.delays[:1]))
     progress.begin("simulating delays", count * len(table.delays) * len(table.gains))
-    constant, schemes = alone.run(0.0)
+    constant = alone.run(0.0).at(0)
+    shape = (len(table.delays), count)
     found = []
     for gain in table.gains:
-        runs, scheme = lanes.run(gain) if gain > 0.0 else (constant, schemes)
-        found.append(runs)
-        schemes = schemes | scheme
+        # The constant weight is the same at any delay.
+        found.append(lanes.run(gain) if gain > 0.0 else constant.over(shape, MEASURES))
         progress.advance(count * len(table.delays))
-    step, modes = next(iter(schemes)) if len(schemes) == 1 else (None, None)
     return WeightDelay(
         design=design,
         drawn=draws.values,
-        runs=_stacked(found, (len(table.delays), count)),
-        constant=constant.at(0),
+        runs=joined(found, np.stack),
+        constant=constant,
         failures=lanes.parts[0].failures,
-        step=step,
-        modes=modes,
         total_seconds=time.perf_counter() - begin,
     )
 
@@ -351,23 +357,3 @@ def _asked(
     if realizations is not None:
         values["uncertainty.realizations"] = realizations
     return design.replace(values) if values else design
-
-
-def _stacked(found: Sequence[Runs], shape: tuple[int, int]) -> Runs:
-    """Runs of all gains; those of the constant weight are the same at any delay."""
-    return Runs(
-        {
-            name: np.stack([np.broadcast_to(one.measures[name], shape) for one in found])
-            for name in MEASURES
-        },
-        np.stack([np.broadcast_to(one.status, shape) for one in found]),
-    )
-
-
-def _mean(values: Array) -> float | None:
-    values = values[~np.isnan(values)]
-    return float(values.mean()) if values.size else None
-
-
-def _listed(interval: Interval | None) -> list[float] | None:
-    return None if interval is None else list(interval)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.design.delay_tables import VARIED
+from drillctl.ensemble.cases import Runs, joined
 from drillctl.ensemble.draws import DrawnGroup, DrawnLanes, drawn_lanes, run_draws
 from drillctl.ensemble.parameters import Draws, uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.lanes import Lanes
-from drillctl.simulation.measures import STATUSES
 
 Array = NDArray[np.float64]
 
@@ -27,26 +27,6 @@ MEASURES = {
     "mean_weight_after_start": "N",
 }  # fmt: skip
 """What is kept of a run, with its unit."""
-
-
-@dataclass(frozen=True, eq=False)
-class Runs:
-    """What was measured."""
-
-    # by the names of `MEASURES` (SI), all of one shape; NaN where a run failed
-    measures: dict[str, Array]
-    status: NDArray[np.int8]  # index into `simulation.measures.STATUSES`
-
-    def at(self, *place: int) -> Runs:
-        """Those at a place along the first dimensions."""
-        measures = {name: values[place] for name, values in self.measures.items()}
-        return Runs(measures, np.asarray(self.status[place]))
-
-    @property
-    def ended(self) -> NDArray[np.bool_]:
-        """Whether stick-slip has ended; a run that failed has not."""
-        still = [STATUSES.index(name) for name in ("sticking", "stalled", "failed")]
-        return ~np.isin(self.status, still)
 
 
 def following_design(design: Design) -> Design:
@@ -89,21 +69,16 @@ class DelayedLanes:
     draws: int  # how many draws, the impossible ones included
     delays: Array  # shape (delays,): Increasing (s)
 
-    def run(self, gain: float) -> tuple[Runs, set[tuple[float | None, int | None]]]:
-        """Simulate all at one gain (N s/rad): runs, shape (delays, draws), and step and modes."""
+    def run(self, gain: float) -> Runs:
+        """Simulate all at one gain (N s/rad); runs of shape (delays, draws)."""
         found = []
         at = (self.delays > 0.0).astype(int)
         sizes = [int((at == k).sum()) for k in (0, 1) if (at == k).any()]
         for part, size in zip(self.parts, sizes, strict=True):
             given = _replaced(part, lambda lanes: _with(lanes, gain=np.full(len(lanes), gain)))
-            found.append(run_draws(given, size * self.draws))
-        shape = (len(self.delays), self.draws)
-        measures = {
-            name: np.concatenate([one.measures[name] for one in found]).reshape(shape)
-            for name in MEASURES
-        }
-        status = np.concatenate([one.status for one in found]).reshape(shape)
-        return Runs(measures, status), {(one.step, one.modes) for one in found}
+            runs = run_draws(given, size * self.draws)
+            found.append(runs.over((size, self.draws), MEASURES))
+        return joined(found, np.concatenate)
 
 
 def delayed_lanes(following: Design, draws: Draws, delays: Array) -> DelayedLanes:

@@ -1,7 +1,8 @@
-"""What the study of a weight that follows the bit speed against a constant one has found."""
+"""PI with a constant weight on bit against PI with one that follows the bit speed."""
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -9,14 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
+from drillctl.ensemble.cases import Estimate
+from drillctl.ensemble.grid import refuse_too_large
+from drillctl.errors import InputError
+from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
-from drillctl.studies.advantage.cases import MEASURES, Case
-from drillctl.studies.advantage.chart import FIGURES, Chart
-from drillctl.studies.advantage.delays import DelayCurve
-from drillctl.studies.advantage.equalities import MEAN
-from drillctl.studies.advantage.measured import Estimate
-from drillctl.studies.advantage.policies import IDEAL
-from drillctl.studies.advantage.regions import Regions
+from drillctl.simulation.measures import STATUSES
+from drillctl.studies.advantage.cases import (
+    ALL_TERMS,
+    MEAN,
+    MEASURES,
+    Case,
+    cases,
+    fresh_draws,
+    own_optima,
+)
+from drillctl.studies.advantage.delays import DelayCurve, delay_curve
+from drillctl.studies.advantage.policies import IDEAL, SPEED, WEIGHT, Policies, policies
+from drillctl.studies.advantage.sweeps import FIGURES, Chart, Regions, chart, regions
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -89,6 +100,9 @@ class Advantage:
             )
             for name, unit in MEASURES.items()
         }
+        flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
+        status = np.stack([case.status for case in self.cases])
+        variables["case_status"] = (("case", "realization"), status, flags)
         variables |= _regions(self.regions)
         for prefix, found, over in (
             ("front", self.front, ("policy", "weight")),
@@ -159,3 +173,79 @@ def _chart_summary(found: Chart) -> dict[str, Any]:
 
 def _plain(values: Array) -> list[list[float | None]]:
     return [[float(v) if np.isfinite(v) else None for v in row] for row in values]
+
+
+def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
+    """Compare PI with a constant weight on bit and PI with one that follows the bit speed.
+
+    Each is tuned to the objective of `[tune]` at the same draws and measured at fresh ones: at
+    equal nominal weight, equal mean weight and equal ROP proxy; with an ideal path and a real one;
+    over the gains of the drive, over weights and speeds, over delays of the path.
+
+    Parameters
+    ----------
+    design : Design
+        With a PI controller. Its `[advantage]` table gives law and path of the weight, what is
+        run over and how many draws.
+    progress : Progress
+        Told of gains found.
+
+    Returns
+    -------
+    Advantage
+        Positive advantage: the weight that follows is better.
+
+    Raises
+    ------
+    InputError
+        A controller or weight law that is not compared, a weight or speed outside what the rock or
+        the limits of the law allow, impossible bounds, or something drawn that the study sets.
+
+    Notes
+    -----
+    The law of the weight is that of Navarro-Lopez & Suarez, Proc. IEEE CCA (2004) 1454-1460.
+    """
+    begin = time.perf_counter()
+    compared = policies(design)
+    checked(compared)
+    table = design.tables.advantage
+    speeds = table.speeds if design.speed in table.speeds else (*table.speeds, design.speed)
+    cells = len(speeds) * len(table.weights) * len(compared)
+    progress.begin("comparing", 2 * len(compared) + 2 * len(ALL_TERMS) + cells + len(table.delays))
+    draws = fresh_draws(design)
+    optima = own_optima(compared, progress)
+    found = cases(compared, optima, draws, progress)
+    areas = regions(compared, optima, progress)
+    curve = delay_curve(compared, optima, draws, progress)
+    over = chart(compared, table.weights, table.speeds, draws, progress)
+    front = over.at_speed(design.speed) or chart(
+        compared, table.weights, (design.speed,), draws, progress
+    )
+    return Advantage(
+        design=design,
+        cases=found,
+        regions=areas,
+        front=front,
+        chart=over,
+        delay=curve,
+        total_seconds=time.perf_counter() - begin,
+    )
+
+
+def checked(compared: Policies) -> None:
+    """Refuse (`InputError`) what would be refused in the midst of the work."""
+    design = compared.constant.design
+    table, where = design.tables.advantage, f"{design.origin}: " if design.origin else ""
+    for key, path, values in (
+        ("weights", WEIGHT, table.weights), ("speeds", SPEED, table.speeds),
+    ):  # fmt: skip
+        for value in values:
+            try:
+                for policy in compared.at(path, value):
+                    policy.design.bit_rock  # noqa: B018  its friction, and the limits of the law
+                    policy.design.weight_on_bit  # noqa: B018
+            except InputError as error:
+                raise InputError(error.problem, f"{where}advantage.{key}") from None
+    points = [table.region_points, table.region_points, table.region_realizations]
+    refuse_too_large(points, "advantage.region_points", 1)
+    refuse_too_large([table.realizations], "advantage.realizations")

@@ -1,4 +1,4 @@
-"""Cases without draws: the J1 map of each over the same axes, and its motion in time."""
+"""Cases of a comparison: designs on equal terms, and the map and motion of each without draws."""
 
 from __future__ import annotations
 
@@ -10,27 +10,94 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.design import Design
-from drillctl.ensemble.grid import Axis, axes_of, refuse_too_large, shape_of
+from drillctl.design import Design, parameter
+from drillctl.ensemble.grid import axes_of, shape_of
+from drillctl.ensemble.parameters import Uncertain, uncertain_parameters
 from drillctl.ensemble.sweeps import UNITS, Sweep, sweep
 from drillctl.errors import InputError
-from drillctl.progress import SILENT, Progress, Within
+from drillctl.progress import Progress, Within
 from drillctl.simulation import Simulation, simulate
 from drillctl.simulation.measures import STATUSES
 from drillctl.simulation.trajectory import SIGNALS
-from drillctl.studies.comparison.cases import in_case
 
 if TYPE_CHECKING:
     from drillctl.design.tables import AxisTable
 
 Array = NDArray[np.float64]
 
+ALONE = "as designed"
+"""Name of the only case of a design without cases."""
 INTERVAL = 0.1
 """Sampling interval of the responses (s), rounded to a whole number of steps."""
-NOT_ASKED = "compare.maps is false"
-"""Reason of a map that nobody wanted."""
+NO_MAPS = "compare.maps is false"
+"""Reason where no maps are requested."""
 WEIGHT = "operating_point.weight_on_bit"
 """What is shifted for the sake of equal mean weights."""
+
+
+def case_designs(design: Design) -> dict[str, Design]:
+    """The cases of a design's `[compare]` table, the baseline first."""
+    cases = design.tables.compare.cases
+    if not cases:
+        return {ALONE: design}
+    found = {}
+    for case in cases:
+        try:
+            found[case.name] = design.replace(case.values)
+        except InputError as error:
+            raise in_case(error, design, case.name) from None
+    return found
+
+
+def refuse_unequal(cases: Mapping[str, Design]) -> tuple[Uncertain, ...]:
+    """Refuse cases that are not on equal terms: other starts, other runs, other draws."""
+    if not cases:
+        raise InputError("at least one case is needed", "compare.cases")
+    baseline = next(iter(cases.values()))
+    expected = uncertain_parameters(baseline)
+    for name, design in cases.items():
+        try:
+            _refuse_other_runs(design, baseline)
+            _refuse_other_draws(design, baseline, expected)
+        except InputError as error:
+            raise in_case(error, design, name) from None
+    return expected
+
+
+def _refuse_other_runs(design: Design, baseline: Design) -> None:
+    one, other = design.tables, baseline.tables
+    if one.start != other.start:
+        raise InputError("cases are compared from the same start as the first", "start")
+    for key in ("duration", "j1_from"):
+        if getattr(one.simulation, key) != getattr(other.simulation, key):
+            raise InputError("cases are compared over the same run as the first",
+                             f"simulation.{key}")  # fmt: skip
+
+
+def _refuse_other_draws(design: Design, baseline: Design, expected: tuple[Uncertain, ...]) -> None:
+    found = uncertain_parameters(design)
+    if design.tables.uncertain != baseline.tables.uncertain or (
+        [p.path for p in found] != [p.path for p in expected]
+    ):
+        raise InputError(
+            f"the first case draws {', '.join(p.path for p in expected)}; every case must draw "
+            "the same: name them in [uncertain] of the design",
+            "uncertain",
+        )
+    for drawn in (p for p in found if not p.own_mean):
+        if parameter(design, drawn.path).value != parameter(baseline, drawn.path).value:
+            raise InputError(
+                "is drawn, from one distribution in all cases, so that a value of its own has no "
+                "effect; a distribution without mean is drawn about the value of each case",
+                drawn.path,
+            )
+
+
+def in_case(error: InputError, design: Design, name: str) -> InputError:
+    """The same error with the case in front of its key, after the file."""
+    key = error.where.removeprefix(design.origin).removeprefix(": ")
+    where = f"{design.origin}: " if design.origin else ""
+    return InputError(error.problem, f"{where}compare.cases {name!r}: {key}".removesuffix(": "))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +119,7 @@ class Nominal:
         return {**self.response.summary(), "map": found, "no_map": self.no_map}
 
 
-def nominal_design(design: Design, shift: float) -> Design:
+def shifted_design(design: Design, shift: float) -> Design:
     """The design with its nominal weight on bit shifted (N)."""
     if shift == 0.0:
         return design
@@ -66,48 +133,23 @@ def nominal_design(design: Design, shift: float) -> Design:
 
 
 def nominal_runs(
-    cases: Mapping[str, Design],
-    axes: tuple[AxisTable, ...] | None,
-    progress: Progress = SILENT,
-) -> list[Nominal]:
-    """Map and response of every case."""
-    if axes is not None:
-        refuse_too_large([len(cases), *(table.points for table in axes)])
-    fitting = {name: _axes_or_reason(design, axes) for name, design in cases.items()}
-    grids = [shape_of(found) for found in fitting.values() if not isinstance(found, str)]
-    if grids:
-        progress.begin("mapping cases", sum(int(np.prod(grid)) for grid in grids))
-    found = []
-    for name, design in cases.items():
-        made, reason = _map_or_reason(design, fitting[name], progress)
-        try:
-            response = simulate(design, engine="batch", interval=INTERVAL)
-        except InputError as error:
-            raise in_case(error, design, name) from None
-        found.append(Nominal(made, reason, response))
-    return found
+    design: Design, tables: tuple[AxisTable, ...] | None, progress: Progress
+) -> Nominal:
+    """Map and response of a case; without tables of axes no map."""
+    found, reason = None, None
+    try:
+        found = _map(design, tables, progress)
+    except InputError as error:  # the axes do not fit this case, or a value on them is impossible
+        reason = str(error)
+    return Nominal(found, reason, simulate(design, engine="batch", interval=INTERVAL))
 
 
-def _axes_or_reason(design: Design, tables: tuple[AxisTable, ...] | None) -> tuple[Axis, ...] | str:
+def _map(design: Design, tables: tuple[AxisTable, ...] | None, progress: Progress) -> Sweep:
     if tables is None:
-        return NOT_ASKED
+        raise InputError(NO_MAPS)
     if len(tables) != 2:
-        return f"a map runs over 2 parameters, [map] has {len(tables)}"
-    try:
-        return axes_of(design, tables)
-    except InputError as error:
-        return str(error)
-
-
-def _map_or_reason(
-    design: Design, axes: tuple[Axis, ...] | str, progress: Progress
-) -> tuple[Sweep, None] | tuple[None, str]:
-    if isinstance(axes, str):
-        return None, axes
-    try:
-        return sweep(design, axes, audit_cells=0, progress=Within(progress)), None
-    except InputError as error:  # a value on an axis is impossible for this case
-        return None, str(error)
+        raise InputError(f"a map runs over 2 parameters, [map] has {len(tables)}")
+    return sweep(design, axes_of(design, tables), audit_cells=0, progress=Within(progress))
 
 
 def map_dimension(path: str, drawn: Sequence[str]) -> str:
