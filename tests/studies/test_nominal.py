@@ -284,7 +284,7 @@ def test_progress_is_told_of_runs_and_cells(short):
     told = Told()
     compare({"pi": short, "torque": short.replace(FIXED_TORQUE), "other": short},
             realizations=3, progress=told)  # fmt: skip
-    assert told.tasks == [["simulating cases", 9, 9], ["mapping cases", 30, 30]]
+    assert told.tasks == [["simulating cases", 54, 54]]
 
 
 def test_no_maps_are_no_task(short):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -132,6 +133,11 @@ def shifted_design(design: Design, shift: float) -> Design:
     return design.replace(values)
 
 
+def cells_of(tables: tuple[AxisTable, ...] | None) -> int:
+    """Cells of the map of each case."""
+    return math.prod(table.points for table in tables) if tables else 0
+
+
 def nominal_runs(
     design: Design, tables: tuple[AxisTable, ...] | None, progress: Progress
 ) -> Nominal:
@@ -141,6 +147,7 @@ def nominal_runs(
         found = _map(design, tables, progress)
     except InputError as error:  # the axes do not fit this case, or a value on them is impossible
         reason = str(error)
+        progress.advance(cells_of(tables))
     return Nominal(found, reason, simulate(design, engine="batch", interval=INTERVAL))
 
 

@@ -7,7 +7,6 @@ other, and the mean of that. Most of what the draws scatter is common to both an
 from __future__ import annotations
 
 import json
-import math
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -31,6 +30,7 @@ from drillctl.simulation.measures import STATUSES
 from drillctl.studies.compare.cases import (
     Nominal,
     case_designs,
+    cells_of,
     in_case,
     labelled,
     nominal_runs,
@@ -257,10 +257,9 @@ def compare(
     refuse_dependent(design)
     refuse_too_large([table.realizations, len(named)], "uncertainty.realizations")
     axes = design.tables.map.axes if design.tables.compare.maps else None
-    cells = math.prod(one.points for one in axes) if axes else 0
     if axes:
         refuse_too_large([len(named), *(one.points for one in axes)])
-    progress.begin("simulating cases", (table.realizations + cells) * len(named))
+    progress.begin("simulating cases", (table.realizations + cells_of(axes)) * len(named))
     draws = CommonDraws(table.realizations, table.seed)
     found = []
     for name, variant in named.items():
