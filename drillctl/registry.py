@@ -23,8 +23,7 @@ FRICTION_LAWS = (
 DRIVE_LAWS = (
     "drillctl.rig.top_drive.pi",
     "drillctl.rig.top_drive.constant_torque",
-    "drillctl.rig.top_drive.impedance_matching",
-    "drillctl.rig.top_drive.active_damping",
+    "drillctl.rig.top_drive.tuned",
 )
 """Each module holds `LAWS`, a tuple of `drillctl.rig.top_drive.law.DriveLaw`."""
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from drillctl.design import drive, parts, weight
+from drillctl.design import parts, weight
 from drillctl.design.merging import Tree, with_values
 from drillctl.design.tables import DesignTables
 from drillctl.design.validation import validated
@@ -16,6 +16,7 @@ from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.program import Program
 from drillctl.rig.top_drive import PI, ConstantTorque, TopDriveLaw
+from drillctl.rig.top_drive.law import top_drive
 from drillctl.rig.weight_on_bit import ObservedWeight, RealWeight, WeightLaw
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ class Design:
     @cached_property
     def top_drive(self) -> TopDriveLaw:
         """Top-drive law."""
-        return drive.top_drive(self.tables, lambda: self.string)
+        return top_drive(self.tables.controller, lambda: self.string)
 
     @cached_property
     def weight_on_bit(self) -> WeightLaw:
@@ -117,7 +118,7 @@ class Design:
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What is allowed but hardly meant, told once when a design is used."""
-        return drive.warnings(self.tables, self.bit_rock.static_torque(self._weight_at_rest))
+        return parts.warnings_of(self.tables, self.bit_rock.static_torque(self._weight_at_rest))
 
     @property
     def _weight_at_rest(self) -> float:

@@ -13,6 +13,7 @@ from drillctl.rig.bit_rock.law import changed_rock, form_of, friction_laws
 from drillctl.rig.drillstring import GRADES, PIPES, Drillstring, Section, assemble, polar_moment
 from drillctl.rig.drillstring.section import torsional_yield
 from drillctl.rig.program import STILL, Program, Ramp
+from drillctl.rig.top_drive.constant_torque import ConstantTorqueTable
 
 STEEL_SHEAR_MODULUS = 79.3e9
 """Shear modulus (Pa) where a design gives none: drill-pipe steel."""
@@ -238,3 +239,32 @@ def program(tables: DesignTables) -> Program:
         first = scenario.weight_on_bit.start / point.weight_on_bit - 1.0
         weight = Ramp(first, scenario.weight_on_bit.begin, scenario.weight_on_bit.end)
     return Program(speed, weight, scenario.bit_rock.until)
+
+
+def refuse_weak_drive(tables: DesignTables, string: Drillstring, torque: float) -> None:
+    """Refuse a drive that cannot hold its set speed."""
+    drive, speed = tables.controller.drive, tables.operating_point.speed
+    if isinstance(tables.controller, ConstantTorqueTable):  # holds no speed
+        return
+    needed = torque + float(string.ground_damping.sum()) * speed
+    for key, limit in (
+        ("torque_limit", drive.torque_limit),
+        ("power_limit", None if drive.power_limit is None else drive.power_limit / speed),
+    ):
+        if limit is not None and limit < needed:
+            raise InputError(
+                f"gives {limit / 1e3:.4g} kN*m at the set speed, less than the "
+                f"{needed / 1e3:.4g} kN*m that rock and drag take there",
+                f"controller.drive.{key}",
+            )
+
+
+def warnings_of(tables: DesignTables, static: float) -> tuple[str, ...]:
+    """What a user should know of a drive: that it cannot free a stuck bit."""
+    limit = tables.controller.drive.torque_limit
+    if limit is None or limit >= static:
+        return ()
+    return (
+        f"controller.drive.torque_limit {limit / 1e3:.4g} kN*m is less than the static torque of "
+        f"the bit, {static / 1e3:.4g} kN*m: once stuck it cannot be freed (status stalled)",
+    )

@@ -14,7 +14,6 @@ from drillctl import units
 from drillctl.design.advantage_tables import AdvantageTable
 from drillctl.design.axis_table import AxisTable as AxisTable
 from drillctl.design.compare_tables import CompareTable
-from drillctl.design.controller_tables import ControllerTable, PITable
 from drillctl.design.delay_tables import WeightDelayTable
 from drillctl.design.scenario_tables import ScenarioTable
 from drillctl.design.tune_tables import TuneTable
@@ -25,11 +24,15 @@ from drillctl.rig import table as q
 from drillctl.rig.bit_rock.law import friction_laws
 from drillctl.rig.drillstring import GRADES, PIPES
 from drillctl.rig.table import Table, one_of
+from drillctl.rig.top_drive.law import drive_laws
+from drillctl.rig.top_drive.pi import PITable
 
 if TYPE_CHECKING:  # a law's own keys are known to its file alone
     BitRockTable = Any
+    ControllerTable = Any
 else:
     BitRockTable = one_of(friction_laws().values())
+    ControllerTable = one_of(drive_laws().values())
 
 
 class OperatingPoint(Table):

@@ -6,11 +6,11 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from drillctl.design.controller_tables import ControllerTable
 from drillctl.design.merging import Tree
-from drillctl.design.tables import BitRockTable, DesignTables
+from drillctl.design.tables import BitRockTable, ControllerTable, DesignTables
 from drillctl.design.weight_tables import WeightOnBitTable
 from drillctl.errors import InputError, nearest, shown
+from drillctl.rig.top_drive.law import drive_laws, top_drive
 
 _LAWS = {"bit_rock": BitRockTable, "controller": ControllerTable, "weight_on_bit": WeightOnBitTable}
 
@@ -28,17 +28,17 @@ _TYPES = {
 
 def validated(tree: Tree, origin: str) -> DesignTables:
     """Validate plain TOML data."""
-    from drillctl.design import drive, parts
+    from drillctl.design import parts
 
     try:
         tables = DesignTables.model_validate(tree)
         parts.refuse_impossible_string(tables)
         parts.bit_rock_before(tables)
         parts.program(tables)
-        if tables.controller.law not in ("pi", "constant-torque"):
-            drive.top_drive(tables, lambda: parts.drillstring(tables))
+        if drive_laws()[tables.controller.law].tuned_to_string:
+            top_drive(tables.controller, lambda: parts.drillstring(tables))
         if not tables.controller.drive.ideal:
-            drive.refuse_weak_drive(
+            parts.refuse_weak_drive(
                 tables, parts.drillstring(tables), parts.torque_at_set_speed(tables)
             )
     except ValidationError as error:

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design, parameter
-from drillctl.design.drive import tracking
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
+from drillctl.rig.top_drive.law import tracking
 from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 

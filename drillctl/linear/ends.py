@@ -25,10 +25,10 @@ from drillctl.design import Design
 from drillctl.errors import InputError, nearest
 from drillctl.linear.modal import Expansion
 from drillctl.linear.observer import Observer
-from drillctl.linear.poles import natural_frequencies
-from drillctl.linear.transmission import Banded, EndMobility, Lines, Model
+from drillctl.linear.transmission import Banded, EndMobility, Lines
 from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.drillstring import Drillstring, Parts
+from drillctl.rig.drillstring.frequencies import Model, natural_frequencies
 from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 
 Array = NDArray[np.float64]

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from drillctl.errors import InputError, nearest
 from drillctl.linear.ends import Route, WeightPath, ends_of
-from drillctl.linear.poles import natural_frequencies
 from drillctl.linear.state_space import INPUTS, LOOP_OUTPUTS, OUTPUTS
 from drillctl.linear.transmission import EndMobility
 from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.drillstring.frequencies import natural_frequencies
 
 if TYPE_CHECKING:
     import control

@@ -27,12 +27,10 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from drillctl.rig.drillstring import Drillstring, Parts, Section
+from drillctl.rig.drillstring.frequencies import Model
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
-
-Model = Literal["finite-elements", "wave"]
-"""How a section is described: by its elements, or as the continuum they stand for."""
 
 
 class Line(NamedTuple):
@@ -51,7 +49,7 @@ class Line(NamedTuple):
 
 def element_line(section: Section, s: ComplexArray, mass: Literal["consistent", "lumped"]) -> Line:
     """The chain of elements of a section at complex frequencies `s` (1/s)."""
-    across, total = element_stiffness(section, s, mass)
+    across, total = section.element_stiffness(s, mass)
     n = section.elements
     # cosh(G/n) - 1 = -(a + b)/b, written so that small angles keep their digits.
     half = np.arcsinh(np.sqrt(-total / (2.0 * across)))
@@ -65,35 +63,15 @@ def element_line(section: Section, s: ComplexArray, mass: Literal["consistent", 
     return Line(decay, impedance * fall, shunt)
 
 
-def element_stiffness(
-    section: Section, s: ComplexArray, mass: Literal["consistent", "lumped"]
-) -> tuple[ComplexArray, ComplexArray]:
-    """B and a + b of the dynamic stiffness [[a, b], [b, a]] of one element (N m/rad)."""
-    inertia = s * _shunt(section, s) / section.elements
-    share = 1 / 6 if mass == "consistent" else 0.0
-    return share * inertia - section.elements * _spring(section, s), 0.5 * inertia
-
-
 def continuous_line(section: Section, s: ComplexArray) -> Line:
     """The continuum of a section at complex frequencies `s` (1/s); a lumped spring as it is."""
     if section.inertia == 0.0 and section.drag == 0.0:
         return element_line(section, s, "lumped")
-    spring, shunt = _spring(section, s), _shunt(section, s)
+    spring, shunt = section.spring(s), section.shunt(s)
     propagation = np.sqrt(s * shunt / spring)
     impedance = propagation * spring / s
     fall = -np.expm1(-2.0 * propagation)
     return Line(np.exp(-propagation), impedance * fall, fall / impedance)
-
-
-def _spring(section: Section, s: ComplexArray) -> ComplexArray:
-    """Stiffness of the whole section with its dampers (N m/rad)."""
-    damping = section.coupling_damping + section.stiffness_damping * section.stiffness
-    return section.stiffness + s * damping
-
-
-def _shunt(section: Section, s: ComplexArray) -> ComplexArray:
-    """Impedance to ground of the whole section when it turns as one body (N m s/rad)."""
-    return s * section.inertia + section.mass_damping * section.inertia + section.drag
 
 
 def _lump(section: Section, s: ComplexArray) -> ComplexArray:
@@ -190,8 +168,8 @@ class Lines:
         if self.model == "wave":
             return down, -above
         section = self.parts.sections[0]
-        across, total = element_stiffness(section, s, self.parts.mass)
-        spring = section.elements * _spring(section, s)
+        across, total = section.element_stiffness(s, self.parts.mass)
+        spring = section.elements * section.spring(s)
 
         def carried(into: ComplexArray) -> ComplexArray:
             # into = (a u0 + b u1) / v0 with u0 = v0 / s; wanted is spring (u0 - u1) / v0.

@@ -15,8 +15,8 @@ from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_margins import peak_sensitivities
 from drillctl.linear.loop_model import many_loop_poles
-from drillctl.linear.poles import natural_frequencies
 from drillctl.progress import SILENT, Progress
+from drillctl.rig.drillstring.frequencies import natural_frequencies
 from drillctl.studies.three_regions.compute import gains_of, slopes_tolerated, steady_drilling
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 
 import drillctl
 from drillctl import catalog
-from drillctl.linear.poles import natural_frequencies
 from drillctl.rig.drillstring import Section, assemble
+from drillctl.rig.drillstring.frequencies import natural_frequencies
 
 HOLDS = (
     (

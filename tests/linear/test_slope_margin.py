@@ -14,10 +14,10 @@ from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_model import with_slope
 from drillctl.linear.operating_point import operating_point
-from drillctl.linear.poles import natural_frequencies
 from drillctl.linear.slope_margin import crossings, slope_margin, slope_margins
 from drillctl.linear.state_space import closed_loop_matrices
 from drillctl.rig.drillstring import Section, assemble
+from drillctl.rig.drillstring.frequencies import natural_frequencies
 
 HOLDS = (
     (

@@ -2,46 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
 from numpy.typing import NDArray
 
-from drillctl.rig.drillstring.section import Section
+from drillctl.errors import InputError
+from drillctl.rig.drillstring import frequencies
+from drillctl.rig.drillstring.section import Parts, Section
+
+if TYPE_CHECKING:
+    import scipy.sparse
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Parts:
-    """Sections and ends of a string, before they become matrices.
-
-    Attributes
-    ----------
-    sections : tuple of Section
-        From top to bottom.
-    top_inertia, bit_inertia : float
-        Of the top drive and of the BHA with the bit (kg m2).
-    top_damping, bit_damping : float
-        Viscous dampers to ground at the two ends (N m s/rad).
-    modal_damping : float
-        Damping ratio added to every elastic free-free mode.
-    mass : {'consistent', 'lumped'}
-        Mass of an element, m/6 [[2, 1], [1, 2]] or m/2 at each end.
-    """
-
-    sections: tuple[Section, ...]
-    top_inertia: float
-    bit_inertia: float
-    top_damping: float
-    bit_damping: float
-    modal_damping: float
-    mass: Literal["consistent", "lumped"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +73,42 @@ class Drillstring:
         """Stiffness of the string between its ends (N m/rad)."""
         return float(1.0 / np.sum(1.0 / self.element_stiffness))
 
+    # What drives are tuned to.
+
+    @property
+    def pipe_impedance(self) -> float:
+        """Characteristic impedance of the uppermost pipe (N m s/rad): J sqrt(G rho).
+
+        A lumped spring has none (`InputError`).
+        """
+        first = self.parts.sections[0]
+        if first.inertia == 0.0:
+            raise InputError(
+                "a lumped spring has no impedance; describe the pipe by its geometry",
+                f"drillstring.sections.{first.name}",
+            )
+        return first.impedance
+
+    @property
+    def top_inertia(self) -> float:
+        """Inertia of the top drive J_d (kg m2)."""
+        return self.parts.top_inertia
+
+    @property
+    def stick_slip_frequency(self) -> float:
+        """Lowest angular frequency with the top held w_s (rad/s)."""
+        return frequencies.stick_slip_frequency(self.parts)
+
+    @property
+    def drive_spring(self) -> float:
+        """Spring that brings the drive to the stick-slip frequency, w_s^2 J_d (N m/rad)."""
+        return self.stick_slip_frequency**2 * self.top_inertia
+
+    @property
+    def drive_damper(self) -> float:
+        """Damper that takes most from string and drive together, 2 sqrt(k J_d) (N m s/rad)."""
+        return float(2.0 * math.sqrt(self.static_stiffness * self.top_inertia))
+
     @cached_property
     def undamped_modes(self) -> tuple[Array, Array]:
         """Angular frequencies (rad/s), shape (nodes,), and mass-normalised shapes by column.
@@ -104,6 +117,7 @@ class Drillstring:
         no other shape has a part of it, so that a string that turns as a whole stays untwisted.
         One BLAS thread, since another count gives other bits.
         """
+        import scipy.linalg
         from threadpoolctl import threadpool_limits
 
         with threadpool_limits(limits=1, user_api="blas"):
@@ -147,6 +161,8 @@ def assemble(
     Drillstring
         Frozen.
     """
+    import scipy.sparse  # a third of a second that reading a design need not wait for
+
     stiffness = _per_element(sections, lambda s: s.stiffness * s.elements)
     inertia = _per_element(sections, lambda s: s.inertia / s.elements)
     damping = _per_element(
@@ -194,6 +210,8 @@ def _per_element(sections: tuple[Section, ...], value: Callable[[Section], float
 
 def _spread(values: Array, share: tuple[float, float]) -> scipy.sparse.sparray:
     """Tridiagonal sum of the element matrices `values` x [[a, b], [b, a]]."""
+    import scipy.sparse
+
     own, other = share
     diagonal = np.zeros(len(values) + 1)
     diagonal[:-1] += own * values
@@ -222,6 +240,8 @@ def _classical(
 
 def _with_modal_damping(string: Drillstring, ratio: float) -> Drillstring:
     """Add C = M Phi diag(2 ratio omega) Phi^T M; the rigid body stays free."""
+    import scipy.sparse
+
     frequency, shapes = string.undamped_modes
     weighted = string.mass @ shapes
     extra = (weighted * (2.0 * ratio * frequency)) @ weighted.T

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, Literal
 
 
 def polar_moment(outer_diameter: float, inner_diameter: float) -> float:
@@ -76,6 +77,48 @@ class Section:
     def travel_time(self) -> float:
         """Time a torsional wave takes from end to end (s)."""
         return math.sqrt(self.inertia / self.stiffness)
+
+    def spring(self, s: Any) -> Any:
+        """Stiffness with its dampers (N m/rad) at complex frequencies `s` (1/s)."""
+        damping = self.coupling_damping + self.stiffness_damping * self.stiffness
+        return self.stiffness + s * damping
+
+    def shunt(self, s: Any) -> Any:
+        """Impedance to ground when it turns as one body (N m s/rad)."""
+        return s * self.inertia + self.mass_damping * self.inertia + self.drag
+
+    def element_stiffness(self, s: Any, mass: Literal["consistent", "lumped"]) -> tuple[Any, Any]:
+        """B and a + b of the dynamic stiffness [[a, b], [b, a]] of one element (N m/rad)."""
+        inertia = s * self.shunt(s) / self.elements
+        share = 1 / 6 if mass == "consistent" else 0.0
+        return share * inertia - self.elements * self.spring(s), 0.5 * inertia
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Sections and ends of a string, before they become matrices.
+
+    Attributes
+    ----------
+    sections : tuple of Section
+        From top to bottom.
+    top_inertia, bit_inertia : float
+        Of the top drive and of the BHA with the bit (kg m2).
+    top_damping, bit_damping : float
+        Viscous dampers to ground at the two ends (N m s/rad).
+    modal_damping : float
+        Damping ratio added to every elastic free-free mode.
+    mass : {'consistent', 'lumped'}
+        Mass of an element, m/6 [[2, 1], [1, 2]] or m/2 at each end.
+    """
+
+    sections: tuple[Section, ...]
+    top_inertia: float
+    bit_inertia: float
+    top_damping: float
+    bit_damping: float
+    modal_damping: float
+    mass: Literal["consistent", "lumped"]
 
 
 INCH = 0.0254

@@ -13,13 +13,17 @@ that both are zero in steady drilling.
 
 `RealDrive` and `SampledDrive` have a memory: filters, integral, motor. They have an `impedance` and
 the `torque` of steady motion; how they move is in `motion`.
+
+Each law has a file, which `drillctl.registry` names: its keys in a design, one pure function from
+these and the string to the numbers of its controller, and its `LAWS` entry. What makes a drive real
+goes around any of them (`law.py`).
 """
 
 from __future__ import annotations
 
 from drillctl.rig.top_drive.constant_torque import ConstantTorque
+from drillctl.rig.top_drive.law import TopDriveLaw
 from drillctl.rig.top_drive.pi import PI
-from drillctl.rig.top_drive.protocol import TopDriveLaw
 from drillctl.rig.top_drive.real_drive import RealDrive, SampledDrive
 
 __all__ = ["PI", "ConstantTorque", "RealDrive", "SampledDrive", "TopDriveLaw"]

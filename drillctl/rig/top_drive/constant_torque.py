@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
+
+from drillctl.errors import InputError
+from drillctl.rig import table as q
+from drillctl.rig.table import Table
+from drillctl.rig.top_drive.law import Controller, DriveLaw, DriveTable, Ranges
 
 
 class ConstantTorque(NamedTuple):
@@ -31,3 +36,31 @@ class ConstantTorque(NamedTuple):
     def impedance(self, s: Any) -> Any:
         """Torque that the drive takes per speed (N m s/rad) at `s` (1/s): none."""
         return 0.0 * s
+
+
+class ConstantTorqueTable(Table):
+    """A drive at constant torque."""
+
+    law: Literal["constant-torque"]
+    torque: q.Torque
+    drive: DriveTable = DriveTable()
+
+
+def _ranges(table: ConstantTorqueTable, string: Any) -> Ranges:
+    """From half to twice what the design has."""
+    torque = table.torque
+    if torque == 0.0:
+        raise InputError("a torque of 0 has no bounds about it: give some", "tune.parameters")
+    return {"torque": (min(0.5 * torque, 2 * torque), max(0.5 * torque, 2 * torque))}
+
+
+LAWS = (
+    DriveLaw(
+        ConstantTorqueTable,
+        lambda table, string: Controller(0.0, 0.0, feedforward=table.torque),
+        ideal=lambda controller: ConstantTorque(controller.feedforward),
+        tuned=("torque",),
+        ranges=_ranges,
+        tuned_to_string=False,
+    ),
+)

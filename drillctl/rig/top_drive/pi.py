@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
+
+from drillctl.rig import table as q
+from drillctl.rig.table import Table
+from drillctl.rig.top_drive.law import Controller, DriveLaw, DriveTable
 
 
 class PI(NamedTuple):
@@ -46,3 +50,24 @@ class PI(NamedTuple):
     def impedance(self, s: Any) -> Any:
         """Torque that the drive takes per speed of the string (N m s/rad) at `s` (1/s)."""
         return self.kp + self.ki / s
+
+
+class PITable(Table):
+    """Proportional-integral speed control."""
+
+    law: Literal["pi"]
+    kp: q.ProportionalGain
+    ki: q.IntegralGain
+    drive: DriveTable = DriveTable()
+
+
+LAWS = (
+    DriveLaw(
+        PITable,
+        lambda table, string: Controller(table.kp, table.ki),
+        ideal=lambda controller: PI(controller.kp, controller.ki),
+        tuned=("kp", "ki"),
+        ranges=lambda table, string: {"kp": (0.0, 1000.0), "ki": (0.0, 500.0)},
+        tuned_to_string=False,
+    ),
+)

@@ -16,13 +16,14 @@ from drillctl.errors import InputError
 from drillctl.simulation.batch import Prepared, prepare, run_batch, trace
 from drillctl.simulation.lanes import Lanes
 from drillctl.studies.robust.tuned import (
-    LAW_KEYS,
     StringNumbers,
     Tuned,
+    controller_paths,
     drive_numbers,
     middle,
     put,
     string_numbers,
+    tracked,
 )
 
 Array = NDArray[np.float64]
@@ -109,10 +110,8 @@ class Evaluation:
         columns = {t.path: np.repeat(points[:, k], len(members)) for k, t in enumerate(self.tuned)}
         numbers: dict[str, Any] = {}
         if any(path.startswith("controller.") for path in columns):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                numbers = drive_numbers(ready.group.design, columns, ready.string)
-            if "tracking" in numbers:  # as of a design: a drive without gains
-                numbers["tracking"] = np.nan_to_num(numbers["tracking"], posinf=1.0)
+            numbers = drive_numbers(ready.group.design, columns, ready.string)
+            numbers = tracked(ready.group.design, numbers)
         drive = lanes.drive._replace(
             **{
                 k: np.broadcast_to(np.asarray(v, float), len(lanes)).copy()
@@ -147,7 +146,7 @@ class Evaluation:
 
 def _at_once(design: Design, tuned: tuple[Tuned, ...]) -> bool:
     """Whether lanes differ in numbers of drive and weight law alone, which are known."""
-    known = [f"controller.{key}" for key in LAW_KEYS[design.tables.controller.law]]
+    known = [*controller_paths(design)]
     if hasattr(design.weight_on_bit, "gain"):
         known.append("weight_on_bit.gain")
     drawn = any(path.startswith("controller.") for path in design.tables.uncertain)

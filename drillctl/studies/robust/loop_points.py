@@ -49,7 +49,8 @@ def kind_of(loop: Loop, tuned: tuple[Tuned, ...]) -> tuple[Any, ...]:
     values = {t.path: 1.0 for t in tuned}
     fixed = drive_numbers(loop.design, values, loop.string)
     law: Any = loop.design.top_drive
-    kept = tuple(v for k, v in law._asdict().items() if k not in fixed)
+    # The anti-windup plays no part in a linear loop.
+    kept = tuple(v for k, v in law._asdict().items() if k not in {*fixed, "tracking"})
     side = loop.weight
     path = None if side is None else (side.gain, side.path.delay, side.path.sensor, side.path.hoist)
     return type(law), kept, loop.design.tables.controller.model_dump_json(), path

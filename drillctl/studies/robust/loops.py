@@ -23,10 +23,10 @@ from drillctl.linear.operating_point import at_speed
 from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
 from drillctl.studies.robust.line_data import Grid, grid_of
 from drillctl.studies.robust.tuned import (
-    LAW_KEYS,
     WEIGHT_KEYS,
     StringNumbers,
     Tuned,
+    controller_paths,
     drive_numbers,
     middle,
     string_numbers,
@@ -85,7 +85,7 @@ def refuse_not_linear(design: Design, tuned: tuple[Tuned, ...]) -> None:
     law = design.tables.controller.law
     if law == "constant-torque":
         raise InputError("a constant torque has no loop that could be tuned", "controller.law")
-    allowed = [f"controller.{key}" for key in LAW_KEYS[law]]
+    allowed = [*controller_paths(design)]
     if isinstance(design.weight_on_bit, (FollowingSpeed, RealWeight)):
         allowed += WEIGHT_KEYS
     for t in tuned:

@@ -15,7 +15,7 @@ from drillctl.linear.ends import BitSide
 from drillctl.linear.loop_analysis import ROUNDING
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.loop_model import loop_poles, model_poles
-from drillctl.linear.poles import natural_frequencies
+from drillctl.rig.drillstring.frequencies import natural_frequencies
 from drillctl.studies.robust.crossings import Crossing, by_path, crossings_of, slope_margin_of
 from drillctl.studies.robust.line_data import chain
 from drillctl.studies.robust.loops import Loop

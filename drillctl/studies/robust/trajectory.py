@@ -27,10 +27,11 @@ from drillctl.studies.robust.bit_step import Bit, meet_rock
 from drillctl.studies.robust.drive_steps import Ideal, Real, Top
 from drillctl.studies.robust.string_matrices import StringMatrices, string_matrices
 from drillctl.studies.robust.tuned import (
-    LAW_KEYS,
     Tuned,
+    controller_paths,
     drive_numbers,
     string_numbers,
+    tracked,
 )
 
 Array = NDArray[np.float64]
@@ -63,7 +64,7 @@ def why_not(design: Design, lanes: Lanes, tuned: tuple[Tuned, ...]) -> str | Non
     moves = np.any(program.speed.first != 0.0) or np.any(program.weight.first != 0.0)
     if moves or np.any(program.rock_until > 0.0):
         return "a program changes the run by the clock"
-    allowed = [f"controller.{key}" for key in LAW_KEYS[design.tables.controller.law]]
+    allowed = [*controller_paths(design)]
     if isinstance(lanes.weight, FollowingSpeed):
         allowed.append("weight_on_bit.gain")
     other = [t.path for t in tuned if t.path not in allowed]
@@ -175,7 +176,7 @@ class _Step:
         """Fields that the tuned values set; others stay the lane's own."""
         if not any(path.startswith("controller.") for path in values):
             return {}
-        numbers = drive_numbers(self.design, values, self.string)
+        numbers = tracked(self.design, drive_numbers(self.design, values, self.string))
         return {k: v for k, v in numbers.items() if k in drive._fields}
 
     def begin(self) -> Any:

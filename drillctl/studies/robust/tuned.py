@@ -1,8 +1,7 @@
 """What is tuned: paths of a design with their bounds, and the drive's numbers that follow.
 
 A design's controller holds numbers such as `share` or `absorption`, and a law made of it holds
-gains. `drive_numbers` is that step with symbols in place of numbers: what `design/drive.py` does
-with numbers alone, which a test holds it to.
+gains. `drive_numbers` is that step, by the same function of the law, for arrays and symbols.
 """
 
 from __future__ import annotations
@@ -10,7 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,32 +19,13 @@ from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.design.tune_tables import RangeTable
 from drillctl.errors import InputError, nearest
-from drillctl.linear.tuning import active_damping, pipe_impedance, stick_slip_frequency
 from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.top_drive.law import StringNumbers, drive_laws, tracking
 
 Array = NDArray[np.float64]
 
-LAW_KEYS = {
-    "pi": ("kp", "ki"),
-    "stiff-speed": ("stiffness", "rate"),
-    "soft-torque": ("share",),
-    "z-torque": ("absorption", "high_pass", "stiffness", "rate"),
-    "torsional-rectification": ("high_pass", "stiffness", "rate"),
-    "active-damping": ("spring", "damper", "stiffness", "rate"),
-    "constant-torque": ("torque",),
-}
-"""Numbers of each controller that may be tuned."""
 WEIGHT_KEYS = ("weight_on_bit.gain", "weight_on_bit.path.delay")
 """Numbers of a weight on bit that follows the bit speed that may be tuned."""
-DEFAULTS = {
-    "pi": {"kp": (0.0, 1000.0), "ki": (0.0, 500.0)},
-    "stiff-speed": {"stiffness": (0.5, 50.0), "rate": (0.01, 5.0)},
-    "soft-torque": {"share": (0.05, 1.0)},
-    "z-torque": {"absorption": (0.0, 1.0)},
-    "torsional-rectification": {"high_pass": (5.0, 60.0)},
-}
-"""Bounds where a design names no parameters (SI). Active damping and constant torque: from a
-quarter to four times, and from half to twice, what the design has."""
 
 
 @dataclass(frozen=True)
@@ -115,22 +96,18 @@ def _read(design: Design, path: str, entry: RangeTable) -> Tuned:
 
 
 def _defaults(design: Design) -> tuple[Tuned, ...]:
-    law = design.tables.controller.law
-    bounds: Mapping[str, tuple[float, float]]
-    if law == "active-damping":
-        damper, spring = active_damping(design.string)
-        bounds = {"spring": (spring / 4, 4 * spring), "damper": (damper / 4, 4 * damper)}
-    elif law == "constant-torque":
-        torque = float(getattr(design.tables.controller, "torque", 0.0))
-        bounds = {"torque": (min(0.5 * torque, 2 * torque), max(0.5 * torque, 2 * torque))}
-        if torque == 0.0:
-            raise InputError("a torque of 0 has no bounds about it: give some", "tune.parameters")
-    else:
-        bounds = DEFAULTS[law]
+    table = design.tables.controller
+    law = drive_laws()[table.law]
+    bounds = law.ranges(table, design.string)
     return tuple(
         Tuned(f"controller.{key}", parameter(design, f"controller.{key}").si_unit, low, high)
         for key, (low, high) in bounds.items()
     )
+
+
+def controller_paths(design: Design) -> tuple[str, ...]:
+    """Paths of a design's controller that may be tuned."""
+    return tuple(f"controller.{key}" for key in drive_laws()[design.tables.controller.law].tuned)
 
 
 def put(design: Design, tuned: tuple[Tuned, ...], values: Array) -> Design:
@@ -146,68 +123,38 @@ def middle(design: Design, tuned: tuple[Tuned, ...]) -> Design:
     return put(design, tuned, np.array([0.5 * (t.low + t.high) for t in tuned]))
 
 
-class StringNumbers(NamedTuple):
-    """What drives are tuned to of a string."""
-
-    pipe: Any  # impedance of the uppermost pipe (N m s/rad); NaN of a lumped spring
-    inertia: Any  # of the top drive (kg m2)
-    spring: Any  # w_s^2 J_d, with w_s the lowest frequency with the top held (N m/rad)
-    damper: Any  # of active damping by its own rule (N m s/rad)
-
-
 def string_numbers(string: Drillstring) -> StringNumbers:
-    """Those of a string."""
-    inertia = string.parts.top_inertia
-    spring = stick_slip_frequency(string) ** 2 * inertia
+    """What drives are tuned to of a string."""
     lumped = string.parts.sections[0].inertia == 0.0
-    pipe = math.nan if lumped else pipe_impedance(string)
-    return StringNumbers(pipe, inertia, spring, 2.0 * math.sqrt(string.static_stiffness * inertia))
+    pipe = math.nan if lumped else string.pipe_impedance
+    return StringNumbers(pipe, string.top_inertia, string.drive_spring, string.drive_damper)
 
 
 def drive_numbers(
     design: Design, values: Mapping[str, Any], string: StringNumbers
 ) -> dict[str, Any]:
-    """Numbers of the drive law of a design with some of the controller's numbers replaced."""
+    """Numbers of the drive law of a design with some of the controller's numbers replaced.
+
+    Values may be floats, arrays or symbols. The inertia that a drive senses is the rig's own.
+    """
     table = design.tables.controller
-    refuse_other_paths(table.law, values)
-    given = {k.removeprefix("controller."): v for k, v in values.items() if "controller." in k}
-
-    def number(key: str, other: Any = None) -> Any:
-        own = getattr(table, key, None)
-        return given.get(key, other if own is None else own)
-
-    if table.law == "constant-torque":
-        return {"level": number("torque"), "feedforward": number("torque")}
-    if table.law == "pi":
-        numbers = {"kp": number("kp"), "ki": number("ki")}
-    elif table.law == "soft-torque":
-        numbers = {"kp": string.pipe / number("share"), "ki": string.spring}
-    else:
-        numbers = {"kp": number("stiffness") * string.pipe, "ki": number("rate") * string.inertia}
-    if table.drive.anti_windup != "none" and table.drive.tracking_time is None:
-        numbers["tracking"] = _tracking(numbers["kp"], numbers["ki"])
-    if table.law in ("z-torque", "torsional-rectification"):
-        numbers["mobility"] = number("absorption", 1.0) / string.pipe
-        numbers["corner"] = 2.0 * math.pi / number("high_pass")
-    if table.law == "active-damping":
-        damper = number("damper", string.damper)
-        numbers["mobility"] = 1.0 / damper
-        numbers["corner"] = number("spring", string.spring) / damper
-    return numbers
-
-
-def _tracking(kp: Any, ki: Any) -> Any:
-    """Rate of the anti-windup (1/s), as `design/drive.py` chooses it."""
-    if isinstance(kp, float) and not kp > 0.0:
-        return 1.0
-    return ki / kp
-
-
-def refuse_other_paths(law: str, values: Mapping[str, Any]) -> None:
-    """Refuse (`InputError`) paths of a controller that its equations do not take as symbols."""
-    allowed = [f"controller.{key}" for key in LAW_KEYS[law]]
-    for path in values:
-        if path.startswith("controller.") and path not in allowed:
+    allowed = controller_paths(design)
+    given = {path: value for path, value in values.items() if path.startswith("controller.")}
+    for path in given:
+        if path not in allowed:
             raise InputError(
                 f"{path!r} has no derivative here; {nearest(path, allowed)}", "tune.parameters"
             )
+    replaced = {path.removeprefix("controller."): value for path, value in given.items()}
+    numbers = SimpleNamespace(**(dict(table) | replaced))
+    found = drive_laws()[table.law].controller(numbers, string)._asdict()
+    del found["sensed_inertia"]
+    return found | {"level": found["feedforward"]}
+
+
+def tracked(design: Design, numbers: dict[str, Any]) -> dict[str, Any]:
+    """Numbers of a drive with the rate of its anti-windup, where that follows from the gains."""
+    drive = design.tables.controller.drive
+    if drive.anti_windup == "none" or drive.tracking_time is not None:
+        return numbers
+    return numbers | {"tracking": tracking(numbers["kp"], numbers["ki"], drive)}
