@@ -11,24 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from drillctl.linear import tuning
 from drillctl.rig.bit_rock.law import friction_laws
-from drillctl.rig.top_drive import PI, ConstantTorque, RealDrive, SampledDrive
-from drillctl.rig.weight_on_bit import (
-    AlarmWeight,
-    ConstantWeight,
-    FollowingSpeed,
-    ObservedWeight,
-    RealWeight,
-)
+from drillctl.rig.top_drive import RealDrive, SampledDrive
+from drillctl.rig.top_drive.law import drive_laws
+from drillctl.rig.weight_on_bit.law import weight_laws
 
 HERE = Path(__file__).resolve().parent
 
 FORMS = tuple(form for law in friction_laws().values() for form in law.forms)
 BIT_ROCK = tuple((form.numbers, form.keys, form.use) for form in FORMS)
+DRIVE_FORMS = tuple(form for law in drive_laws().values() for form in law.forms)
 DRIVES = (
-    (PI, '`law = "pi"` (kp, ki)', "Speed control as in the paper."),
-    (ConstantTorque, '`law = "constant-torque"` (torque)', "A drive at its torque limit."),
+    *(form for form in DRIVE_FORMS if inspect.isclass(form[0])),
     (RealDrive, '`[controller.drive]` around any law (torque_limit, minimum_torque, power_limit, '
      'torque_rate_limit, lag, encoder_lag, torque_lag, anti_windup, tracking_time), and '
      '`law = "z-torque"`, `"torsional-rectification"`, `"active-damping"` with or without it',
@@ -36,28 +30,8 @@ DRIVES = (
     (SampledDrive, '`[controller.drive]` with `sampling_period` (10 ms is usual) and '
      '`one_sample_delay`', "For what a digital drive does to fast modes."),
 )  # fmt: skip
-TUNED = (
-    (tuning.stiff_speed, '`law = "stiff-speed"` (stiffness, rate)', "A PI; reflects all waves."),
-    (tuning.soft_torque, '`law = "soft-torque"` (share)', "A PI; takes waves at the stick-slip "
-     "frequency."),
-    (tuning.z_torque, '`law = "z-torque"` (absorption, high_pass, stiffness, rate)',
-     "Impedance matching; takes waves of all frequencies above the high-pass."),
-    (tuning.torsional_rectification, '`law = "torsional-rectification"` (high_pass, stiffness, '
-     'rate)', "The ideal limit of impedance matching."),
-    (tuning.active_damping, '`law = "active-damping"` (spring, damper, stiffness, rate)',
-     "Damping of the lowest modes through the motor torque."),
-)  # fmt: skip
-WEIGHTS = (
-    (ConstantWeight, '`law = "constant"`', "The default."),
-    (FollowingSpeed, '`law = "navarro-lopez-suarez"` (gain, minimum, maximum)',
-     "What dynamic weight on bit could do at best: no delay, no hoist."),
-    (RealWeight, '`law = "navarro-lopez-suarez"` with `[weight_on_bit.path]` (delay, '
-     'sampling_period, sensor_lag, hoist_lag, rate_limit)', "What it can do on a rig."),
-    (ObservedWeight, '`law = "surface-observer"` (gain, minimum, maximum, observer_modes) with '
-     '`[weight_on_bit.path]`', "Where nothing is sent up from the bit."),
-    (AlarmWeight, '`law = "stick-slip-alarm"` (alarm, calm, reduction, window, minimum) with '
-     '`[weight_on_bit.path]`', "What a driller does by hand."),
-)  # fmt: skip
+TUNED = tuple(form for form in DRIVE_FORMS if not inspect.isclass(form[0]))
+WEIGHTS = tuple(form for law in weight_laws().values() for form in law.forms)
 
 
 def section(thing: object, keys: str, use: str) -> str:

@@ -21,7 +21,6 @@ ROOMS = (
 
 # What is still wrong. These only get shorter: an entry that is no longer true fails as well.
 UPWARD = {
-    ("design", "linear"),
     ("plots", "studies"),
     ("store", "ensemble"),
     ("store", "linear"),

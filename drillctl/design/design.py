@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from drillctl.design import parts, weight
+from drillctl import registry
+from drillctl.design import parts
 from drillctl.design.merging import Tree, with_values
 from drillctl.design.tables import DesignTables
 from drillctl.design.validation import validated
-from drillctl.design.weight_tables import SurfaceObserverTable
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.drillstring import Drillstring
@@ -21,8 +21,6 @@ from drillctl.rig.weight_on_bit import ObservedWeight, RealWeight, WeightLaw
 
 if TYPE_CHECKING:
     import control
-
-    from drillctl.linear.observer import Observer
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ class Design:
     @cached_property
     def weight_on_bit(self) -> WeightLaw:
         """Weight-on-bit law."""
-        return weight.weight_on_bit(self.tables)
+        return parts.weight_on_bit(self.tables)
 
     @cached_property
     def bit_rock_before(self) -> BitRockLaw:
@@ -105,15 +103,6 @@ class Design:
     def program(self) -> Program:
         """What changes by the clock."""
         return parts.program(self.tables)
-
-    @cached_property
-    def observer(self) -> Observer | None:
-        """Observer of the bit, where the weight law has one."""
-        if not isinstance(self.tables.weight_on_bit, SurfaceObserverTable):
-            return None
-        from drillctl.linear.observer import observer
-
-        return observer(self.string, self.tables.weight_on_bit.observer_modes)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -148,12 +137,10 @@ class Design:
 
     def plant(self) -> control.StateSpace:
         """The string without control, see `drillctl.linear.plant`."""
-        from drillctl.linear import plant
-
-        return plant(self.string)
+        system: control.StateSpace = registry.resolve("drillctl.linear:plant")(self.string)
+        return system
 
     def loop(self) -> control.StateSpace:
         """The string closed with its controller, see `drillctl.linear.closed_loop`."""
-        from drillctl.linear import closed_loop
-
-        return closed_loop(self)
+        system: control.StateSpace = registry.resolve("drillctl.linear:closed_loop")(self)
+        return system

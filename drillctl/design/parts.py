@@ -6,7 +6,6 @@ import math
 from functools import lru_cache
 
 from drillctl.design.tables import DesignTables, SectionTable
-from drillctl.design.weight_tables import ConstantWeightTable
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.law import changed_rock, form_of, friction_laws
@@ -14,11 +13,10 @@ from drillctl.rig.drillstring import GRADES, PIPES, Drillstring, Section, assemb
 from drillctl.rig.drillstring.section import torsional_yield
 from drillctl.rig.program import STILL, Program, Ramp
 from drillctl.rig.top_drive.constant_torque import ConstantTorqueTable
+from drillctl.rig.weight_on_bit.law import HEAVIEST, WeightLaw, weight_laws
 
 STEEL_SHEAR_MODULUS = 79.3e9
 """Shear modulus (Pa) where a design gives none: drill-pipe steel."""
-HEAVIEST = 1e12
-"""Weight on bit (N) where a law has no upper limit."""
 STEEL_DENSITY = 7850.0
 """Density (kg/m3) where a design gives none."""
 STEEL_POISSON_RATIO = 0.3
@@ -151,9 +149,15 @@ def bit_rock(tables: DesignTables) -> BitRockLaw:
     return entry.regularised(law, table)
 
 
+def weight_on_bit(tables: DesignTables) -> WeightLaw:
+    """Weight-on-bit law with its numbers."""
+    table, point = tables.weight_on_bit, tables.operating_point
+    return weight_laws()[table.law].make(table, point.weight_on_bit, point.speed)
+
+
 def weight_moves(tables: DesignTables) -> bool:
     """Whether the weight on bit changes while the bit drills, by its law or by the clock."""
-    by_law = not isinstance(tables.weight_on_bit, ConstantWeightTable)
+    by_law = weight_laws()[tables.weight_on_bit.law].moves
     return by_law or tables.scenario.weight_on_bit.start is not None
 
 

@@ -18,7 +18,6 @@ from drillctl.design.delay_tables import WeightDelayTable
 from drillctl.design.scenario_tables import ScenarioTable
 from drillctl.design.tune_tables import TuneTable
 from drillctl.design.uncertain_tables import DistributionTable, UncertaintyTable, flattened
-from drillctl.design.weight_tables import ConstantWeightTable, WeightOnBitTable
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig import table as q
 from drillctl.rig.bit_rock.law import friction_laws
@@ -26,13 +25,17 @@ from drillctl.rig.drillstring import GRADES, PIPES
 from drillctl.rig.table import Table, one_of
 from drillctl.rig.top_drive.law import drive_laws
 from drillctl.rig.top_drive.pi import PITable
+from drillctl.rig.weight_on_bit.constant import ConstantWeightTable
+from drillctl.rig.weight_on_bit.law import weight_laws
 
 if TYPE_CHECKING:  # a law's own keys are known to its file alone
     BitRockTable = Any
     ControllerTable = Any
+    WeightOnBitTable = Any
 else:
     BitRockTable = one_of(friction_laws().values())
     ControllerTable = one_of(drive_laws().values())
+    WeightOnBitTable = one_of(weight_laws().values())
 
 
 class OperatingPoint(Table):

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
 from drillctl.design.merging import Tree
-from drillctl.design.tables import BitRockTable, ControllerTable, DesignTables
-from drillctl.design.weight_tables import WeightOnBitTable
+from drillctl.design.tables import DesignTables
 from drillctl.errors import InputError, nearest, shown
+from drillctl.rig.bit_rock.law import friction_laws
 from drillctl.rig.top_drive.law import drive_laws, top_drive
+from drillctl.rig.weight_on_bit.law import weight_laws
 
-_LAWS = {"bit_rock": BitRockTable, "controller": ControllerTable, "weight_on_bit": WeightOnBitTable}
+_LAWS: dict[str, Callable[[], dict[str, Any]]] = {
+    "bit_rock": friction_laws,
+    "controller": drive_laws,
+    "weight_on_bit": weight_laws,
+}
 
 _TYPES = {
     "tuple_type": "it must be a list",
@@ -73,7 +79,7 @@ def _told(problem: Any, tree: Tree, origin: str) -> InputError:
     if kind == "value_error":
         return InputError(str(problem["ctx"]["error"]), where)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        laws = sorted(_law_names(str(problem["loc"][0])))
+        laws = sorted(_LAWS[str(problem["loc"][0])]())
         if kind == "union_tag_not_found":
             return InputError(f"law is missing; allowed: {', '.join(laws)}", where)
         came = problem["input"]["law"]
@@ -87,11 +93,6 @@ def _told(problem: Any, tree: Tree, origin: str) -> InputError:
     if where.endswith("drillstring.sections") and kind == "tuple_type":
         due = "it must be a list of tables, each under [[drillstring.sections]]"
     return InputError(f"got {shown(problem['input'])}; {due}", where)
-
-
-def _law_names(table: str) -> list[str]:
-    union = get_args(_LAWS[table])[0]
-    return [get_args(c.model_fields["law"].annotation)[0] for c in get_args(union)]
 
 
 def _path(loc: tuple[str | int, ...], tree: Tree) -> str:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.errors import InputError, nearest
 from drillctl.linear.modal import Expansion
-from drillctl.linear.observer import Observer
+from drillctl.linear.observer import Observer, observer_of
 from drillctl.linear.transmission import Banded, EndMobility, Lines
 from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.drillstring import Drillstring, Parts
@@ -190,7 +190,7 @@ def weight_path(design: Design, speed: float) -> WeightPath | None:
     if isinstance(law, FollowingSpeed):
         return WeightPath(gain, 0.0, 0.0, 0.0, None)
     delay = law.delay + 0.5 * law.period
-    return WeightPath(gain, delay, law.sensor, law.hoist, design.observer)
+    return WeightPath(gain, delay, law.sensor, law.hoist, observer_of(design))
 
 
 @dataclass(frozen=True, eq=False)

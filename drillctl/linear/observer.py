@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from drillctl.design import Design
 from drillctl.rig.drillstring import Drillstring
 
 Array = NDArray[np.float64]
@@ -58,6 +60,13 @@ class Observer:
         return seen[..., 0], seen[..., 1]
 
 
+def observer_of(design: Design) -> Observer | None:
+    """Observer of the bit, where the weight law of a design has one."""
+    modes = getattr(design.tables.weight_on_bit, "observer_modes", None)
+    return None if modes is None else observer(design.string, modes)
+
+
+@lru_cache(maxsize=4)  # of a string and of no copy of it: thousands of draws of a rock share one
 def observer(string: Drillstring, modes: int = MODES) -> Observer:
     """A steady-state Kalman filter on the lowest modes of a string."""
     frequency, shapes = string.undamped_modes

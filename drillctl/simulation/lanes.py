@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.linear.observer import Observer
+from drillctl.linear.observer import Observer, observer_of
 from drillctl.rig.bit_rock import contact
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.program import Program
@@ -194,7 +194,7 @@ def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
             law("weight_program", design.program.weight),
             numbers["rock_until"],
         ),
-        observer=design.observer,
+        observer=observer_of(design),
         start=design.tables.start.kind,
     )
 

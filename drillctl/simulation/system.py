@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from drillctl.design import Design
 from drillctl.errors import SimulationError
+from drillctl.linear.observer import observer_of
 from drillctl.rig.bit_rock import contact
 from drillctl.simulation.lanes import start
 from drillctl.simulation.laws_in_time import Moment, Top, drive_in_time, weight_in_time
@@ -52,7 +53,9 @@ class System:
         self.string = design.string
         self.program = design.program
         self.drive = drive_in_time(design.top_drive, design.speed, design.program.speed)
-        self.weight = weight_in_time(design.weight_on_bit, design.program.weight, design.observer)
+        self.weight = weight_in_time(
+            design.weight_on_bit, design.program.weight, observer_of(design)
+        )
         self.rocks = (design.bit_rock_before, design.bit_rock)
         self.slip = slip_phase(design.string, design.speed)
         self.stick, self.reaction = stick_phase(design.string, design.speed)

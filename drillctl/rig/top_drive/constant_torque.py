@@ -62,5 +62,8 @@ LAWS = (
         tuned=("torque",),
         ranges=_ranges,
         tuned_to_string=False,
+        forms=(
+            (ConstantTorque, '`law = "constant-torque"` (torque)', "A drive at its torque limit."),
+        ),
     ),
 )

@@ -69,5 +69,6 @@ LAWS = (
         tuned=("kp", "ki"),
         ranges=lambda table, string: {"kp": (0.0, 1000.0), "ki": (0.0, 500.0)},
         tuned_to_string=False,
+        forms=((PI, '`law = "pi"` (kp, ki)', "Speed control as in the paper."),),
     ),
 )

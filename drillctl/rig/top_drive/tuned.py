@@ -190,6 +190,9 @@ LAWS = (
         ideal=_pi,
         tuned=("stiffness", "rate"),
         ranges=lambda table, string: {"stiffness": (0.5, 50.0), "rate": (0.01, 5.0)},
+        forms=(
+            (stiff_speed, '`law = "stiff-speed"` (stiffness, rate)', "A PI; reflects all waves."),
+        ),
     ),
     DriveLaw(
         SoftTorqueTable,
@@ -197,6 +200,13 @@ LAWS = (
         ideal=_pi,
         tuned=("share",),
         ranges=lambda table, string: {"share": (0.05, 1.0)},
+        forms=(
+            (
+                soft_torque,
+                '`law = "soft-torque"` (share)',
+                "A PI; takes waves at the stick-slip frequency.",
+            ),
+        ),
     ),
     DriveLaw(
         ZTorqueTable,
@@ -204,6 +214,13 @@ LAWS = (
         ideal=_pi,
         tuned=("absorption", "high_pass", "stiffness", "rate"),
         ranges=lambda table, string: {"absorption": (0.0, 1.0)},
+        forms=(
+            (
+                z_torque,
+                '`law = "z-torque"` (absorption, high_pass, stiffness, rate)',
+                "Impedance matching; takes waves of all frequencies above the high-pass.",
+            ),
+        ),
     ),
     DriveLaw(
         TorsionalRectificationTable,
@@ -211,6 +228,13 @@ LAWS = (
         ideal=_pi,
         tuned=("high_pass", "stiffness", "rate"),
         ranges=lambda table, string: {"high_pass": (5.0, 60.0)},
+        forms=(
+            (
+                torsional_rectification,
+                '`law = "torsional-rectification"` (high_pass, stiffness, rate)',
+                "The ideal limit of impedance matching.",
+            ),
+        ),
     ),
     DriveLaw(
         ActiveDampingTable,
@@ -218,5 +242,12 @@ LAWS = (
         ideal=_pi,
         tuned=("spring", "damper", "stiffness", "rate"),
         ranges=_damping_ranges,
+        forms=(
+            (
+                active_damping,
+                '`law = "active-damping"` (spring, damper, stiffness, rate)',
+                "Damping of the lowest modes through the motor torque.",
+            ),
+        ),
     ),
 )

@@ -2,16 +2,22 @@
 
 A law is a `NamedTuple` of numbers. One that acts at once has two pure functions of the bit speed
 in its own direction (rad/s, not negative): `weight(speed)` (N) and its `slope(speed)` (N s/rad);
-`moves` tells whether the weight changes at all. The laws of `real_weight` have a memory instead
-and give the `command` that a hoist follows; the engines keep the memory.
+`moves` tells whether the weight changes at all. Others (`PATHS`) have a memory instead and give
+the `command` that a hoist follows; the engines keep the memory.
+
+Each law has a file, which `drillctl.registry` names: its equation, its keys in a design, how it is
+made from them, and its `LAWS` entry.
 """
 
 from __future__ import annotations
 
 from drillctl.rig.weight_on_bit.constant import ConstantWeight
-from drillctl.rig.weight_on_bit.following_speed import FollowingSpeed
-from drillctl.rig.weight_on_bit.protocol import WeightLaw
-from drillctl.rig.weight_on_bit.real_weight import PATHS, AlarmWeight, ObservedWeight, RealWeight
+from drillctl.rig.weight_on_bit.following_speed import FollowingSpeed, ObservedWeight, RealWeight
+from drillctl.rig.weight_on_bit.law import WeightLaw
+from drillctl.rig.weight_on_bit.stick_slip_alarm import AlarmWeight
+
+PATHS = (RealWeight, ObservedWeight, AlarmWeight)
+"""Laws with a memory: the weight does not follow from the bit speed of the moment."""
 
 __all__ = [
     "PATHS",

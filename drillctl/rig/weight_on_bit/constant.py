@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
+
+from drillctl.rig.table import Table
+from drillctl.rig.weight_on_bit.law import PathTable, WeightOnBitLaw
 
 
 class ConstantWeight(NamedTuple):
@@ -28,3 +31,20 @@ class ConstantWeight(NamedTuple):
     def slope(self, speed: Any) -> Any:
         """Weight per bit speed (N s/rad): none."""
         return 0.0 * speed
+
+
+class ConstantWeightTable(Table):
+    """Weight on bit held at the operating point's value; its path waits for another law."""
+
+    law: Literal["constant"] = "constant"
+    path: PathTable = PathTable()
+
+
+LAWS = (
+    WeightOnBitLaw(
+        ConstantWeightTable,
+        lambda table, nominal, speed: ConstantWeight(nominal),
+        moves=False,
+        forms=((ConstantWeight, '`law = "constant"`', "The default."),),
+    ),
+)
