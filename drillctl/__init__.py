@@ -26,9 +26,10 @@ brakes. Start with `load`.
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 if TYPE_CHECKING:
     from drillctl.design import Design as Design
@@ -45,7 +46,9 @@ if TYPE_CHECKING:
     from drillctl.studies import sweep as sweep
     from drillctl.studies.advantage import advantage as advantage
     from drillctl.studies.compare.compute import compare as compare
+    from drillctl.studies.regularisation.compute import regularisation as regularisation
     from drillctl.studies.robust import tune as tune
+    from drillctl.studies.three_regions.compute import three_regions as three_regions
     from drillctl.studies.uncertainty import uncertainty as uncertainty
 
 _HOME = {
@@ -68,17 +71,32 @@ _HOME = {
     "plots": "drillctl",
 }
 
-__all__ = [*_HOME, "__version__"]
+
+def _studies() -> dict[str, str]:
+    """Names of the studies in Python, and what they stand for."""
+    studies = import_module("drillctl.studies.base").studies()
+    return {study.python: study.call for study in studies.values() if study.python}
+
+
+def _is_module(name: str) -> bool:
+    """Whether a name is that of a module, which the import system looks for itself."""
+    here = Path(__file__).parent
+    return (here / name).is_dir() or (here / f"{name}.py").is_file()
 
 
 def __getattr__(name: str) -> Any:
     # Scientific imports cost a second: each comes with the first use of what needs it.
+    if name == "__all__":
+        return [*_HOME, *_studies(), "__version__"]
     if name == "plots":
         return import_module("drillctl.plots")
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
+    if not (name.startswith("_") or _is_module(name)) and (place := _studies().get(name)):
+        module, _, function = place.partition(":")
+        return getattr(import_module(module), function)
     raise AttributeError(f"module 'drillctl' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted(__getattr__("__all__"))

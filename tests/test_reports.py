@@ -74,7 +74,7 @@ def test_the_loop_of_the_report_is_what_the_code_gives():
 
 def test_the_three_regions_of_the_report_are_what_the_code_gives():
     held = committed("monteiro-trindade-140kn")["regions"]
-    found = drillctl.studies.three_regions(drillctl.load("monteiro-trindade-140kn")).summary()
+    found = drillctl.three_regions(drillctl.load("monteiro-trindade-140kn")).summary()
     assert found["counts"] == held["counts"]
 
 

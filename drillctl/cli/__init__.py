@@ -19,6 +19,8 @@ from drillctl.cli import (
     uncertain,
 )
 from drillctl.cli.app import app, run
+from drillctl.cli.verb import command
+from drillctl.studies.base import studies
 
 VERBS: dict[str, Callable[..., None]] = {
     "models": files.models,
@@ -31,8 +33,6 @@ VERBS: dict[str, Callable[..., None]] = {
     "cycle": linear.cycle,
     "simulate": runs.simulate,
     "map": maps.stability_map,
-    "regions": maps.regions,
-    "regularisation": maps.regularisation,
     "doctor": maps.doctor,
     "compare": comparisons.compare,
     "delay": comparisons.delay,
@@ -45,5 +45,8 @@ VERBS: dict[str, Callable[..., None]] = {
 
 for name, verb in VERBS.items():
     app.command(name=name)(verb)
+for name, study in studies().items():
+    if study.command:
+        app.command(name=name)(command(study))
 
 __all__ = ["VERBS", "app", "run"]

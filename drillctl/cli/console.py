@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout, suppress
 from typing import TYPE_CHECKING, Any
 
 from drillctl.progress import SILENT, Progress
@@ -105,3 +106,21 @@ def progress() -> Iterator[Progress]:
 def sized(value: float | None, digits: int = 5) -> str:
     """A number for a table; a dash where there is none."""
     return "-" if value is None or value != value else f"{value:.{digits}g}"
+
+
+@contextmanager
+def library_output_on_stderr() -> Iterator[None]:
+    """What a library prints by itself goes to stderr, be it by C or by Python: stdout is JSON's."""
+    import ctypes
+
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        with suppress(OSError, TypeError):  # not every system names its C library so
+            ctypes.CDLL(None).fflush(None)  # what C holds back goes where it was meant to
+        os.dup2(kept, 1)
+        os.close(kept)

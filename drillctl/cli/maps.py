@@ -76,49 +76,6 @@ def _full_map(design: Design, measures: list[str] | None, options: Options) -> N
 
 
 @computing
-def regions(design: Design, options: Options, axis: Axes = None) -> None:
-    """Locally stable, J1 under a level, attracted: three regions over two parameters."""
-    from drillctl import plots, printing, store, studies
-
-    design = with_axes(design, axis)
-    folder = store.claim("regions", design, options.out)
-    if running.shown_again(folder, options, lambda: printing.regions(store.open(folder.path))):
-        return
-    with running.guarded(folder), console.progress() as bar:
-        if len(design.tables.map.axes) != 2:
-            count = len(design.tables.map.axes)
-            raise InputError(f"regions are shown over 2 parameters, got {count}", "map.axes")
-        result = studies.three_regions(design, progress=bar)
-    store.write_data(result, folder.path)
-    running.draw(
-        plots.three_regions(result, system=options.units), folder.path / "three-regions.png"
-    )
-    if not options.json:
-        printing.regions(result)
-    running.conclude(folder, result.summary(), options)
-
-
-@computing
-def regularisation(design: Design, options: Options, axis: Axes = None) -> None:
-    """The same map with friction smoothed by tanh: what regularising costs."""
-    from drillctl import plots, printing, store, studies
-
-    design = with_axes(design, axis)
-    folder = store.claim("regularisation", design, options.out)
-    if running.shown_again(
-        folder, options, lambda: printing.regularisation(store.open(folder.path))
-    ):
-        return
-    with running.guarded(folder), console.progress() as bar:
-        result = studies.regularisation(design, progress=bar)
-    store.write_data(result, folder.path)
-    running.draw(plots.regularisation(result), folder.path / "regularisation.png")
-    if not options.json:
-        printing.regularisation(result)
-    running.conclude(folder, result.summary(), options)
-
-
-@computing
 def doctor(
     design: Design,
     options: Options,

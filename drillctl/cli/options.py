@@ -30,15 +30,15 @@ Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results.
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, nothing else.")]
 Threads = Annotated[int | None, typer.Option("--threads", min=1, help="Threads to use.")]
 Units = Annotated[
-    Literal["si", "field"], typer.Option("--units", help="kN, kN m, m or klbf, klbf ft, ft.")
+    Literal["si", "field"], typer.Option("--units", help="Units of tables and figures.")
 ]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more on stderr.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
 
 @dataclass(frozen=True)
-class Options:
-    """How a verb that computes is to do it and to tell of it."""
+class Common:
+    """Options that every command has which computes."""
 
     out: Path | None
     json: bool
@@ -46,18 +46,22 @@ class Options:
     verbose: bool
 
 
-def _asked_of_all(
+def common_options(
     out: Out = None,
     json: Json = False,
     threads: Threads = None,
     units: Units = "si",
     verbose: Verbose = False,
     debug: Debug = False,
-) -> Options:
+) -> Common:
     """The options of every verb that computes; `debug` is read where errors are told."""
     if threads is not None:
         _use(threads)
-    return Options(out, json, units, verbose)
+    return Common(out, json, units, verbose)
+
+
+Options = Common
+_asked_of_all = common_options
 
 
 def computing(

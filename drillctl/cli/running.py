@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout, suppress
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from drillctl.cli import console
@@ -67,19 +65,4 @@ def conclude(folder: RunFolder, summary: dict[str, Any], options: Options) -> No
         console.line(f"results: {folder.path}")
 
 
-@contextmanager
-def library_output_on_stderr() -> Iterator[None]:
-    """What a library prints by itself goes to stderr, be it by C or by Python: stdout is JSON's."""
-    import ctypes
-
-    sys.stdout.flush()
-    kept = os.dup(1)
-    os.dup2(2, 1)
-    try:
-        with redirect_stdout(sys.stderr):
-            yield
-    finally:
-        with suppress(OSError, TypeError):  # not every system names its C library so
-            ctypes.CDLL(None).fflush(None)  # what C holds back goes where it was meant to
-        os.dup2(kept, 1)
-        os.close(kept)
+library_output_on_stderr = console.library_output_on_stderr

@@ -13,10 +13,11 @@ from __future__ import annotations
 import itertools
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ from drillctl.errors import InputError
 from drillctl.rig.top_drive.law import tracking
 from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
+from drillctl.store.result import label
 
 Array = NDArray[np.float64]
 
@@ -54,7 +56,7 @@ class Axis:
 
     path: str
     unit: str
-    values: Array
+    values: Array = label("{path}", unit="{unit}", name="{path}")
 
     @property
     def shared(self) -> bool:
@@ -63,6 +65,14 @@ class Axis:
 
     def __len__(self) -> int:
         return len(self.values)
+
+
+def span(axes: tuple[Axis, ...]) -> dict[str, dict[str, float]]:
+    """Ends and number of points of each axis by path (SI), for a summary."""
+    return {
+        a.path: {"min": float(a.values[0]), "max": float(a.values[-1]), "points": len(a)}
+        for a in axes
+    }
 
 
 OF_THE_ROCK = ("friction.", "before.", "weight.", "weight_program.", "set_speed")
@@ -409,3 +419,15 @@ def _free_memory() -> float:
         return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (ValueError, OSError, AttributeError):
         return float("inf")
+
+
+def other_axes(
+    result: Any, own: Callable[[Design], tuple[Axis, ...]] | None = None
+) -> dict[str, Any]:
+    """Axes of a result where they are not those that its design gives (`own`)."""
+    axes = [[axis.path, axis.values.tolist()] for axis in result.axes]
+    try:
+        found = own(result.design) if own else axes_of(result.design, result.design.tables.map.axes)
+    except InputError:  # the default ones do not fit every law
+        return {"axes": axes}
+    return {} if axes == [[axis.path, axis.values.tolist()] for axis in found] else {"axes": axes}

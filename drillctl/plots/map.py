@@ -34,10 +34,10 @@ from drillctl.plots.style import (
 )
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.diagnosis.error_estimate import PROMISES, ROUNDING, SMALLEST
-from drillctl.studies.regularisation import Regularisation
 
 if TYPE_CHECKING:
     from drillctl.studies import Doctor, Sweep
+    from drillctl.studies.regularisation.compute import Regularisation
 
 MOST_COLOURED = 2000
 """Cells along an axis that are coloured: more than a picture has points along it."""
@@ -218,7 +218,7 @@ def regularisation(result: Regularisation, ax: Sequence[Axes] | None = None) -> 
     Parameters
     ----------
     result : Regularisation
-        From `drillctl.studies.regularisation`.
+        From `drillctl.regularisation`.
     ax : sequence of Axes, optional
         Two panels.
 

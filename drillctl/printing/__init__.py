@@ -4,7 +4,7 @@ from drillctl.printing.advantage import advantage
 from drillctl.printing.comparison import comparison
 from drillctl.printing.doctor import doctor
 from drillctl.printing.linear import loop, modes
-from drillctl.printing.maps import regions, regularisation, sweep
+from drillctl.printing.maps import sweep
 from drillctl.printing.runs import cycle, simulation
 from drillctl.printing.tuning import tune
 from drillctl.printing.uncertainty import uncertainty
@@ -17,8 +17,6 @@ __all__ = [
     "doctor",
     "loop",
     "modes",
-    "regions",
-    "regularisation",
     "simulation",
     "sweep",
     "tune",

@@ -15,9 +15,11 @@ from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.reporting.profiles import Profile
-from drillctl.reporting.studies import ALL, RECIPES, Asked, Recipe
+from drillctl.reporting.studies import RECIPES, Recipe
 from drillctl.reporting.words import Words
 from drillctl.store.json_files import read_json
+from drillctl.store.result import Result
+from drillctl.studies.base import Requested
 
 State = Literal["done", "failed", "interrupted", "left_out", "not_asked"]
 
@@ -114,7 +116,7 @@ def gather(
     names = _with_needs(wanted)
     found: dict[str, Study] = {}
     interrupted = False
-    for recipe in ALL:
+    for recipe in RECIPES.values():
         place = folder / recipe.name
         if recipe.name not in names:
             why = "it was not asked for"
@@ -122,7 +124,7 @@ def gather(
         elif interrupted and not _finished(place):
             found[recipe.name] = Study(recipe.name, recipe.title, "interrupted", INTERRUPTED, place)
         else:
-            asked = Asked(cut, profile, found)
+            asked = Requested(cut, profile, found)
             found[recipe.name] = _study(recipe, asked, place, progress)
             interrupted |= found[recipe.name].state == "interrupted"
     return Gathered(cut, design, profile, words, found)
@@ -146,13 +148,13 @@ def _finished(place: Path) -> bool:
         return False
 
 
-def _study(recipe: Recipe, asked: Asked, place: Path, progress: Progress) -> Study:
+def _study(recipe: Recipe, asked: Requested, place: Path, progress: Progress) -> Study:
     """One study, whatever becomes of it."""
 
     def ended(state: State, why: str = "") -> Study:
         return Study(recipe.name, recipe.title, state, why, place)
 
-    lacking = [asked.found[name] for name in recipe.needs if asked.found[name].state != "done"]
+    lacking = [asked.done[name] for name in recipe.needs if asked.done[name].state != "done"]
     if lacking:
         state = lacking[0].state
         why = f"{lacking[0].title} is missing: {lacking[0].why}"
@@ -164,12 +166,16 @@ def _study(recipe: Recipe, asked: Asked, place: Path, progress: Progress) -> Stu
     except InputError as error:
         return ended("failed", str(error))
     growing = store.growing_realizations(design) if recipe.growing else None
+    if recipe.grows is not None:
+        growing = recipe.grows(design)
     run = store.claim(recipe.verb, design, place, growing, **recipe.settings)
     if run.finished:
         return ended("done")
     try:
         result = recipe.compute(design, run, progress)
-        if recipe.write:
+        if isinstance(result, Result):
+            result.write(run.path)
+        elif recipe.write:
             store.write_data(result, run.path)
         run.finish(recipe.told(result))
     except KeyboardInterrupt:

@@ -20,7 +20,7 @@ from drillctl.reporting.blocks import Document, Section
 from drillctl.reporting.gather import INTERRUPTED, Gathered, NotThereError, gather
 from drillctl.reporting.pictures import Album
 from drillctl.reporting.profiles import PROFILES, Profile
-from drillctl.reporting.sections import KINDS, SECTIONS
+from drillctl.reporting.sections import SECTIONS
 from drillctl.reporting.verdict import summary as told_verdict
 from drillctl.reporting.verdict import verdict
 from drillctl.reporting.words import Words
@@ -52,7 +52,7 @@ def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> D
     """The document of a design."""
     names = set(sections)
     made, left_out = [], []
-    for kind in KINDS:
+    for kind in SECTIONS.values():
         if kind.name not in names:
             continue
         try:

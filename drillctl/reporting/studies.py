@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,35 +10,25 @@ import drillctl
 from drillctl import units
 from drillctl.design import Design
 from drillctl.reporting import cells
-from drillctl.reporting.profiles import Profile
+from drillctl.studies import base
+from drillctl.studies.applies import fitting_map, in_batch, over_two_axes
+from drillctl.studies.base import Requested, Run, Study, studies
 
 if TYPE_CHECKING:
     from drillctl.progress import Progress
-    from drillctl.reporting.gather import Study
     from drillctl.store import RunFolder
 
-Found = Mapping[str, "Study"]
-"""Studies that are done already, by name."""
 FREE = 20.0
 """Samples of a run that is kept for its numbers alone are so far apart (s)."""
 FINE = 0.05
 """And of one that is drawn (s)."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What a study is asked."""
-
-    design: Design  # to be studied
-    profile: Profile  # what may be spent
-    found: Found  # the studies before it
-
-
-def _applies(asked: Asked) -> str:
+def _applies(asked: Requested) -> str:
     return ""
 
 
-def _as_asked(asked: Asked) -> Design:
+def _as_asked(asked: Requested) -> Design:
     return asked.design
 
 
@@ -55,12 +44,13 @@ class Recipe(NamedTuple):
     verb: str  # command that would make the same folder
     # the result, from its design, its folder and the progress
     compute: Callable[[Design, RunFolder, Progress], Any]
-    missing: Callable[[Asked], str] = _applies  # why it does not apply; empty where it does
-    variant: Callable[[Asked], Design] = _as_asked  # the design that is studied
+    missing: Callable[[Requested], str] = _applies  # why it does not apply; empty where it does
+    variant: Callable[[Requested], Design] = _as_asked  # the design that is studied
     needs: tuple[str, ...] = ()  # studies that must be done before
     # what the result depends on beside its design
     settings: Mapping[str, Any] = MappingProxyType({})
     growing: bool = False  # whether more draws may be added later
+    grows: Callable[[Design], Any] | None = None
     write: bool = True  # whether the result is one that the store writes
     told: Callable[[Any], dict[str, Any]] = _summary  # the summary of a result
 
@@ -70,33 +60,7 @@ def level_of(design: Design) -> float:
     return design.tables.tune.level
 
 
-def _two_axes(asked: Asked) -> str:
-    reason = _fitting_map(asked)
-    count = len(asked.design.tables.map.axes)
-    if not reason and count != 2:
-        return f"it is shown over two parameters, the map of this design has {count}"
-    return reason
-
-
-def _fitting_map(asked: Asked) -> str:
-    """Why the default map does not fit a design that names no axes of its own."""
-    from drillctl.ensemble.grid import axes_of
-    from drillctl.errors import InputError
-
-    try:
-        axes_of(asked.design, asked.design.tables.map.axes)
-    except InputError as error:
-        return f"its map does not fit this design ({error.problem}); name other axes in [map]"
-    return ""
-
-
-def _in_batch(asked: Asked) -> str:
-    if asked.design.tables.bit_rock.law == "printed-three-branch":
-        return "the batch engine does not take the friction law printed-three-branch"
-    return ""
-
-
-def _both(*reasons: Callable[[Asked], str]) -> Callable[[Asked], str]:
+def _both(*reasons: Callable[[Requested], str]) -> Callable[[Requested], str]:
     return lambda asked: next((why for reason in reasons if (why := reason(asked))), "")
 
 
@@ -126,7 +90,7 @@ def _uncertain(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return studies.uncertainty(design, progress=progress, shelf=folder.shelf())
 
 
-def _under_uncertainty(asked: Asked) -> Design:
+def _under_uncertainty(asked: Requested) -> Design:
     """The design with as many audited lanes as the profile spends."""
     if asked.profile.drawn_audit is None:
         return asked.design
@@ -154,7 +118,7 @@ def _told_of_setting(result: Any) -> dict[str, Any]:
     }
 
 
-def _at_setting(asked: Asked) -> Design:
+def _at_setting(asked: Requested) -> Design:
     """The design with more draws at its own gains, and its level among those that are counted."""
     design, level = asked.design, level_of(asked.design)
     levels = sorted({*design.tables.map.levels, level})
@@ -168,31 +132,31 @@ def _at_setting(asked: Asked) -> Design:
     return design.replace(values)
 
 
-def _cell(which: str) -> Callable[[Asked], Design]:
+def _cell(which: str) -> Callable[[Requested], Design]:
     """The design of the best or of a bad cell of the map."""
 
-    def variant(asked: Asked) -> Design:
-        at = asked.found["cells"].summary[which]
+    def variant(asked: Requested) -> Design:
+        at = asked.done["cells"].summary[which]
         values = {path: units.SI(value) for path, value in at.items()}
         return asked.design.replace({**values, "simulation.engine": "batch"})
 
     return variant
 
 
-def _no_such_cell(which: str) -> Callable[[Asked], str]:
-    def missing(asked: Asked) -> str:
-        return "" if asked.found["cells"].summary[which] else f"the map has no {which} cell"
+def _no_such_cell(which: str) -> Callable[[Requested], str]:
+    def missing(asked: Requested) -> str:
+        return "" if asked.done["cells"].summary[which] else f"the map has no {which} cell"
 
     return missing
 
 
-def _finer(parts: int, of: str) -> Callable[[Asked], Design]:
+def _finer(parts: int, of: str) -> Callable[[Requested], Design]:
     """The design with elements, or the step of the batch engine, divided."""
 
-    def variant(asked: Asked) -> Design:
+    def variant(asked: Requested) -> Design:
         design = asked.design.replace({"simulation.engine": "batch"})
         if of == "step":
-            held = asked.found["mesh-1"].summary["step"] / parts
+            held = asked.done["mesh-1"].summary["step"] / parts
             return design.replace({"simulation.step": units.SI(held)})
         sections = design.tables.drillstring.sections
         counts = {part.name: part.elements for part in design.string.parts.sections}
@@ -205,7 +169,7 @@ def _finer(parts: int, of: str) -> Callable[[Asked], Design]:
     return variant
 
 
-def _lumped(asked: Asked) -> str:
+def _lumped(asked: Requested) -> str:
     if all(table.stiffness is not None for table in asked.design.tables.drillstring.sections):
         return "a lumped string has no mesh"
     return ""
@@ -220,7 +184,7 @@ def _looped(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return drillctl.loop(design)
 
 
-def _no_cases(asked: Asked) -> str:
+def _no_cases(asked: Requested) -> str:
     if not asked.design.tables.compare.cases:
         return "the design names no cases to compare ([compare])"
     if not asked.profile.compared:
@@ -228,7 +192,7 @@ def _no_cases(asked: Asked) -> str:
     return ""
 
 
-def _not_tuned(asked: Asked) -> str:
+def _not_tuned(asked: Requested) -> str:
     if not asked.profile.tuned:
         return "gains are tuned with --profile full"
     if not hasattr(drillctl, "tune"):
@@ -236,7 +200,7 @@ def _not_tuned(asked: Asked) -> str:
     return ""
 
 
-def _not_weighed(asked: Asked) -> str:
+def _not_weighed(asked: Requested) -> str:
     if not asked.profile.compared or not hasattr(drillctl, "advantage"):
         return "the benefit of a moving weight on bit was not studied"
     if "advantage" not in asked.design.tree:
@@ -255,12 +219,6 @@ def _compared(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return drillctl.compare(design, progress=progress)
 
 
-def _regions(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    from drillctl import studies
-
-    return studies.three_regions(design, progress=progress)
-
-
 def _loop_map(design: Design, folder: RunFolder, progress: Progress) -> Any:
     from drillctl import studies
 
@@ -275,36 +233,59 @@ ALL = (
     Recipe("modes", "the modes", "modes", _moded, settings={"count": 10}),
     Recipe("loop", "the loop", "loop", _looped),
     Recipe("simulate", "the run at the current setting", "simulate", _simulated),
-    Recipe("setting", "the draws at the current setting", "uncertainty", _setting, _in_batch,
+    Recipe("setting", "the draws at the current setting", "uncertainty", _setting, in_batch,
            _at_setting, settings={"axes": []}, told=_told_of_setting),
-    Recipe("map", "the J1 map", "map", _swept, _both(_in_batch, _fitting_map)),
-    Recipe("cells", "the responses over the map", "report-cells", _cells, _fitting_map,
+    Recipe("map", "the J1 map", "map", _swept, _both(in_batch, fitting_map)),
+    Recipe("cells", "the responses over the map", "report-cells", _cells, fitting_map,
            needs=("map",), write=False, told=dict),
     Recipe("best", "the run at the best cell", "simulate", _simulated, _no_such_cell("best"),
            _cell("best"), needs=("cells",)),
     Recipe("bad", "the run at a bad cell", "simulate", _simulated, _no_such_cell("bad"),
            _cell("bad"), needs=("cells",)),
-    Recipe("slope-margin", "the slope margin over the map", "loop-map", _loop_map, _two_axes),
-    Recipe("regions", "the three regions", "regions", _regions, _both(_in_batch, _two_axes)),
+    Recipe("slope-margin", "the slope margin over the map", "loop-map", _loop_map, over_two_axes),
     Recipe("uncertainty", "the map under uncertainty", "uncertainty", _uncertain,
-           _both(_in_batch, _fitting_map), _under_uncertainty, growing=True),
-    Recipe("compare", "the comparison", "compare", _compared, _both(_no_cases, _in_batch)),
+           _both(in_batch, fitting_map), _under_uncertainty, growing=True),
+    Recipe("compare", "the comparison", "compare", _compared, _both(_no_cases, in_batch)),
     Recipe("tune", "the tuning of the gains", "tune", _by_name("tune"),
-           _both(_not_tuned, _in_batch)),
+           _both(_not_tuned, in_batch)),
     Recipe("advantage", "the benefit of a moving weight", "advantage", _by_name("advantage"),
-           _both(_not_weighed, _in_batch)),
+           _both(_not_weighed, in_batch)),
     Recipe("doctor", "the errors of the batch engine", "doctor", _examined,
            settings={"audited": 0}),
-    Recipe("mesh-1", "the run by the batch engine", "simulate", _numbers, _in_batch,
+    Recipe("mesh-1", "the run by the batch engine", "simulate", _numbers, in_batch,
            _finer(1, "elements")),
     Recipe("mesh-2", "the run with twice the elements", "simulate", _numbers,
-           _both(_in_batch, _lumped), _finer(2, "elements")),
+           _both(in_batch, _lumped), _finer(2, "elements")),
     Recipe("mesh-4", "the run with four times the elements", "simulate", _numbers,
-           _both(_in_batch, _lumped), _finer(4, "elements")),
-    Recipe("step-2", "the run with half the step", "simulate", _numbers, _in_batch,
+           _both(in_batch, _lumped), _finer(4, "elements")),
+    Recipe("step-2", "the run with half the step", "simulate", _numbers, in_batch,
            _finer(2, "step"), needs=("mesh-1",)),
-    Recipe("step-4", "the run with a quarter of the step", "simulate", _numbers, _in_batch,
+    Recipe("step-4", "the run with a quarter of the step", "simulate", _numbers, in_batch,
            _finer(4, "step"), needs=("mesh-1",)),
 )  # fmt: skip
 """Every study, in the order in which they are done."""
-RECIPES = {recipe.name: recipe for recipe in ALL}
+
+
+def _of(study: Study, recipe: base.Recipe) -> Recipe:
+    options = study.defaults() | dict(recipe.options)
+
+    def compute(design: Design, folder: RunFolder, progress: Progress) -> Any:
+        return study.compute(design, Run(options, progress, folder.path))
+
+    return Recipe(
+        recipe.name, recipe.title, study.name, compute, recipe.missing, recipe.variant,
+        recipe.needs, study.settings(options), told=recipe.summary, grows=study.growing,
+    )  # fmt: skip
+
+
+def _recipes() -> dict[str, Recipe]:
+    """Every study of a report by name, in the order in which they are done."""
+    # Those that stand here come in tens, so that others find a place between them.
+    placed = [(10 * number, recipe) for number, recipe in enumerate(ALL)]
+    placed += [
+        (one.order, _of(study, one)) for study in studies().values() for one in study.recipes
+    ]
+    return {recipe.name: recipe for _, recipe in sorted(placed, key=lambda pair: pair[0])}
+
+
+RECIPES = _recipes()

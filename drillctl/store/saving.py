@@ -8,10 +8,12 @@ from typing import Any
 
 from drillctl.design import load
 from drillctl.errors import InputError
+from drillctl.store.codec import TREE, read
 from drillctl.store.folder import about_run, claim
 from drillctl.store.json_files import read_json
 from drillctl.store.kind import Kind
 from drillctl.store.kinds import KINDS
+from drillctl.store.result import Result
 
 BY_CLASS = {kind.of: kind for kind in KINDS}
 BY_VERB = {kind.verb: kind for kind in KINDS}
@@ -47,6 +49,12 @@ def save(result: Any, folder: str | Path) -> Path:
         The folder holds something else, or cannot be written; or the result is of a bare
         string and has no design to go with it.
     """
+    if isinstance(result, Result):
+        design, settings = result.requested()
+        run = claim(result.kind, design, folder, result.growing(), **settings)
+        result.write(run.path)
+        run.finish(result.summary())
+        return run.path
     kind = _kind(result)
     design, settings = kind.asked(result)
     run = claim(kind.verb, design, folder, kind.growing(design), **settings)
@@ -81,6 +89,8 @@ def open(folder: str | Path) -> Any:
     about = about_run(path)
     if not about.get("finished"):
         raise InputError("holds a run that is not finished; run the command again", str(path))
+    if (path / TREE).is_file():
+        return read(path)
     kind = BY_VERB.get(about.get("verb", ""))
     if kind is None:
         raise InputError(f"results of {about.get('verb')!r} are not read back", str(path))

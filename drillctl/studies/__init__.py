@@ -1,72 +1,73 @@
-"""Studies over many lanes, a package a subject.
+"""Studies, a package each: settings, computation, tables, figures and section in one place.
 
-- `grid.py`: axes over a design's parameters, and the lanes they stand for; `lane_grid.py`: lane
-  numbers, held along the axes they vary over.
-- `sweeps.py`: measures over a grid, the J1 map being one case; `regions.py`: cells and outlines at
-  or under a level; `responses.py`, `tables.py`: time responses at cells, maps as CSV.
-- `loop_maps.py`: figures of the linear loop over a grid.
-- `three_regions/`: locally stable, J1 under a level, attracted: three regions of one map.
-- `regularisation.py`: the same map with friction smoothed by tanh, beside the set-valued one.
-- `draws/`: what is uncertain, and draws from it.
-- `compare/`: cases at the same draws.
-- `delay/`: a weight on bit that follows the bit speed, against the delay of its path.
-- `uncertainty/`: a map at thousands of draws.
-- `robust/`: gains searched for many realizations at once, and certified at fresh ones.
-- `advantage/`: PI against PI with dynamic weight on bit, each at its robust optimum.
-- `diagnosis/`: what the batch engine does with a design; `audit.py`: cells of a map simulated again
-  with the reference solver.
-- `blocks.py`: finished blocks of a long run; `memory.py`: grids too large for the memory;
-  `checking.py`: what a design asks of the studies, without running any.
+`base.py` says what a study is; `drillctl.registry` names those that there are.
 """
 
-from drillctl.ensemble.grid import Axis
-from drillctl.ensemble.parameters import Draws, draw, uncertain_parameters
-from drillctl.ensemble.regions import Region, region
-from drillctl.ensemble.sweeps import Sweep, stability_map, sweep
-from drillctl.studies.compare.compute import Comparison
-from drillctl.studies.delay.compute import WeightDelay, weight_delay
-from drillctl.studies.diagnosis.examination import doctor
-from drillctl.studies.diagnosis.result import Doctor
-from drillctl.studies.loop_maps import LoopMap, loop_map
-from drillctl.studies.regularisation import Regularisation, regularisation
-from drillctl.studies.responses import responses
-from drillctl.studies.tables import (
-    write_comparison,
-    write_loop_table,
-    write_tables,
-    write_weight_delay,
-)
-from drillctl.studies.three_regions.compute import ThreeRegions, three_regions
-from drillctl.studies.uncertainty import Uncertainty, uncertainty
-from drillctl.studies.uncertainty.tables import write_uncertainty_tables
+from __future__ import annotations
 
-__all__ = [
-    "Axis",
-    "Comparison",
-    "Doctor",
-    "Draws",
-    "LoopMap",
-    "Region",
-    "Regularisation",
-    "Sweep",
-    "ThreeRegions",
-    "Uncertainty",
-    "WeightDelay",
-    "doctor",
-    "draw",
-    "loop_map",
-    "region",
-    "regularisation",
-    "responses",
-    "stability_map",
-    "sweep",
-    "three_regions",
-    "uncertain_parameters",
-    "uncertainty",
-    "weight_delay",
-    "write_comparison",
-    "write_loop_table",
-    "write_tables",
-    "write_uncertainty_tables",
-    "write_weight_delay",
-]
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from drillctl.ensemble.grid import Axis as Axis
+    from drillctl.ensemble.parameters import Draws as Draws
+    from drillctl.ensemble.parameters import draw as draw
+    from drillctl.ensemble.parameters import uncertain_parameters as uncertain_parameters
+    from drillctl.ensemble.regions import Region as Region
+    from drillctl.ensemble.regions import region as region
+    from drillctl.ensemble.sweeps import Sweep as Sweep
+    from drillctl.ensemble.sweeps import stability_map as stability_map
+    from drillctl.ensemble.sweeps import sweep as sweep
+    from drillctl.studies.compare.compute import Comparison as Comparison
+    from drillctl.studies.diagnosis.examination import doctor as doctor
+    from drillctl.studies.diagnosis.result import Doctor as Doctor
+    from drillctl.studies.loop_maps import LoopMap as LoopMap
+    from drillctl.studies.loop_maps import loop_map as loop_map
+    from drillctl.studies.responses import responses as responses
+    from drillctl.studies.tables import write_comparison as write_comparison
+    from drillctl.studies.tables import write_loop_table as write_loop_table
+    from drillctl.studies.tables import write_tables as write_tables
+    from drillctl.studies.tables import write_weight_delay as write_weight_delay
+    from drillctl.studies.uncertainty import Uncertainty as Uncertainty
+    from drillctl.studies.uncertainty import uncertainty as uncertainty
+    from drillctl.studies.uncertainty.tables import (
+        write_uncertainty_tables as write_uncertainty_tables,
+    )
+    from drillctl.studies.delay.compute import WeightDelay as WeightDelay
+    from drillctl.studies.delay.compute import weight_delay as weight_delay
+
+_HOME = {
+    "Axis": "drillctl.ensemble.grid",
+    "Comparison": "drillctl.studies.compare.compute",
+    "Doctor": "drillctl.studies.diagnosis.result",
+    "Draws": "drillctl.ensemble.parameters",
+    "LoopMap": "drillctl.studies.loop_maps",
+    "Region": "drillctl.ensemble.regions",
+    "Sweep": "drillctl.ensemble.sweeps",
+    "Uncertainty": "drillctl.studies.uncertainty",
+    "WeightDelay": "drillctl.studies.delay.compute",
+    "doctor": "drillctl.studies.diagnosis.examination",
+    "draw": "drillctl.ensemble.parameters",
+    "loop_map": "drillctl.studies.loop_maps",
+    "region": "drillctl.ensemble.regions",
+    "responses": "drillctl.studies.responses",
+    "stability_map": "drillctl.ensemble.sweeps",
+    "sweep": "drillctl.ensemble.sweeps",
+    "uncertain_parameters": "drillctl.ensemble.parameters",
+    "uncertainty": "drillctl.studies.uncertainty",
+    "weight_delay": "drillctl.studies.delay.compute",
+    "write_comparison": "drillctl.studies.tables",
+    "write_loop_table": "drillctl.studies.tables",
+    "write_tables": "drillctl.studies.tables",
+    "write_uncertainty_tables": "drillctl.studies.uncertainty.tables",
+    "write_weight_delay": "drillctl.studies.tables",
+}
+
+__all__ = [*_HOME]
+
+
+def __getattr__(name: str) -> Any:
+    # Commands import the package to list the studies: what computes comes with its first use.
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'drillctl.studies' has no attribute {name!r}")

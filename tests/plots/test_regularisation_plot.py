@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import drillctl
-from drillctl import plots
-from drillctl.studies import Axis, regularisation
+from drillctl import plots, regularisation
+from drillctl.ensemble.grid import Axis
 
 
 def test_panels_show_the_shift_and_the_regions():

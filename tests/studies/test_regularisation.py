@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl import regularisation
+from drillctl.ensemble.grid import Axis
 from drillctl.errors import InputError
-from drillctl.studies import Axis, regularisation
 
 DESIGN = "monteiro-trindade-140kn"
 

@@ -7,9 +7,9 @@ reason where it does not apply.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from drillctl.reporting.blocks import Block
+from drillctl.reporting.blocks import Block, Figure, Table, Text
 from drillctl.reporting.gather import Gathered
 from drillctl.reporting.sections import (
     advantage,
@@ -19,7 +19,6 @@ from drillctl.reporting.sections import (
     loop,
     modes,
     operating_point,
-    regions,
     responses,
     rig,
     sensitivity,
@@ -28,6 +27,11 @@ from drillctl.reporting.sections import (
     tuning,
     uncertainty,
 )
+from drillctl.store.tables import Table as Results
+from drillctl.studies.base import Picture, Study, studies
+
+if TYPE_CHECKING:
+    from drillctl import units
 
 
 class Kind(NamedTuple):
@@ -48,7 +52,6 @@ KINDS = (
     Kind("loop", "The linear loop", ("loop", "slope-margin"), loop.build),
     Kind("map", "J1 over the map", ("map", "cells"), stability.build),
     Kind("responses", "Time responses", ("simulate", "cells", "best", "bad"), responses.build),
-    Kind("regions", "Three regions", ("regions",), regions.build),
     Kind("uncertainty", "Uncertainty", ("uncertainty", "setting"), uncertainty.build),
     Kind("sensitivity", "Sensitivity", ("uncertainty",), sensitivity.build),
     Kind("tuning", "Tuned gains and their certificate", ("tune",), tuning.build),
@@ -61,5 +64,48 @@ KINDS = (
 )  # fmt: skip
 """Every section, in the order in which they are read."""
 
-SECTIONS = {kind.name: kind for kind in KINDS}
+
+def _generic(name: str, study: Study) -> Callable[[Gathered], tuple[Block, ...]]:
+    """Remarks, pictures and tables of a study, for a section that says no more."""
+
+    def build(gathered: Gathered) -> tuple[Block, ...]:
+        result, system = gathered.need(name).result, gathered.words.system
+        blocks: list[Block] = [Text(remark) for remark in study.remarks(result, system)]
+        blocks += [figure(picture, name, system) for picture in study.pictures(result)]
+        blocks += [block(table, system) for table in study.tables(result) if table.shown]
+        return tuple(blocks)
+
+    return build
+
+
+def figure(picture: Picture, name: str, system: units.System) -> Figure:
+    """A picture of a study as a block of a report."""
+    return Figure(
+        picture.name, picture.caption, picture.alt, lambda: picture.draw(system), (name,),
+        picture.paper,
+    )  # fmt: skip
+
+
+def block(table: Results, system: units.System) -> Table:
+    """A table of a study as a block of a report."""
+    heads = tuple(column.head(system) for column in table.columns)
+    rows = tuple(
+        tuple(column.text(cell, system) for column, cell in zip(table.columns, row, strict=True))
+        for row in table.rows
+    )
+    caption = table.title[0].upper() + table.title[1:]
+    return Table(table.name, caption, heads, rows)
+
+
+def _sections() -> dict[str, Kind]:
+    """Every section by name, in the order in which they are read."""
+    placed = [(10 * number, kind) for number, kind in enumerate(KINDS)]
+    for study in studies().values():
+        for one in study.sections:
+            build = one.build or _generic(one.reads[0], study)
+            placed.append((one.order, Kind(one.name, one.title, one.reads, build)))
+    return {kind.name: kind for _, kind in sorted(placed, key=lambda pair: pair[0])}
+
+
+SECTIONS = _sections()
 """Sections by name."""

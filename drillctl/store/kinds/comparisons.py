@@ -19,7 +19,8 @@ from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.measures import Measures
 from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.store.kind import Kind
-from drillctl.store.names import axis_of, stored_name
+from drillctl.store.kinds.axes import axis_of
+from drillctl.store.names import stored_name
 from drillctl.studies.compare.cases import Nominal, case_designs, map_dimension, shifted_design
 from drillctl.studies.compare.compute import MEASURES, ComparedCase, Comparison
 from drillctl.studies.delay.compute import WeightDelay

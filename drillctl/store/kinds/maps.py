@@ -11,10 +11,8 @@ from drillctl.ensemble.audit import Audit, choose_cells
 from drillctl.ensemble.sweeps import Sweep
 from drillctl.simulation.batch import FLOATS
 from drillctl.store.kind import Kind
-from drillctl.store.names import asked_axes, axis_of
+from drillctl.store.kinds.axes import asked_axes, axis_of
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
-from drillctl.studies.regularisation import WIDTHS, Regularisation
-from drillctl.studies.three_regions.compute import FIELDS, MASKS, PAPER_LEVEL, ThreeRegions
 
 if TYPE_CHECKING:
     import xarray
@@ -47,33 +45,6 @@ def read_loop_map(design: Design, data: xarray.Dataset, summary: dict[str, Any])
     return LoopMap(design, axes, values, summary["total_seconds"])
 
 
-def read_three_regions(
-    design: Design, data: xarray.Dataset, summary: dict[str, Any]
-) -> ThreeRegions:
-    """`ThreeRegions` as they were saved."""
-    told = ("level", "horizon", "band", "window", "total_seconds")
-    values: dict[str, Any] = {name: summary[name] for name in told}
-    values |= {name: data[name].values for name in FIELDS}
-    values |= {name: data[name].values.astype(bool) for name in MASKS}
-    axes = tuple(axis_of(path, data) for path in summary["axes"])
-    return ThreeRegions(design=design, axes=axes, **values)
-
-
-def read_regularisation(
-    design: Design, data: xarray.Dataset, summary: dict[str, Any]
-) -> Regularisation:
-    """A `Regularisation` as it was saved."""
-    return Regularisation(
-        design=design,
-        axes=tuple(axis_of(path, data) for path in summary["axes"]),
-        levels=design.tables.map.levels,
-        widths=data["width"].values,
-        j1=data["j1"].values,
-        smoothed=data["smoothed_j1"].values,
-        total_seconds=summary["total_seconds"],
-    )
-
-
 def asked_measures(kept: tuple[str, ...]) -> dict[str, Any]:
     """What a map that keeps some measures alone was asked for, for `claim`."""
     return {} if kept == FLOATS else {"measures": list(kept)}
@@ -91,19 +62,7 @@ def _asked_of_loop_map(result: LoopMap) -> tuple[Design, dict[str, Any]]:
     return result.design, {"quantities": list(result.values)} | asked_axes(result)
 
 
-def _asked_of_three_regions(result: ThreeRegions) -> tuple[Design, dict[str, Any]]:
-    level = {} if result.level == PAPER_LEVEL else {"level": result.level}
-    return result.design, asked_axes(result) | level
-
-
-def _asked_of_regularisation(result: Regularisation) -> tuple[Design, dict[str, Any]]:
-    widths = {} if tuple(result.widths) == WIDTHS else {"widths": result.widths.tolist()}
-    return result.design, asked_axes(result) | widths
-
-
 KINDS = (
     Kind("map", Sweep, read_sweep, _asked_of_sweep),
     Kind("loop-map", LoopMap, read_loop_map, _asked_of_loop_map),
-    Kind("regions", ThreeRegions, read_three_regions, _asked_of_three_regions),
-    Kind("regularisation", Regularisation, read_regularisation, _asked_of_regularisation),
 )

@@ -11,7 +11,8 @@ from drillctl.design import Design
 from drillctl.ensemble.audit import Audit
 from drillctl.ensemble.draws import Failures
 from drillctl.store.kind import Kind
-from drillctl.store.names import axis_of, stored_name
+from drillctl.store.kinds.axes import axis_of
+from drillctl.store.names import stored_name
 from drillctl.studies.robust.baselines import Baseline
 from drillctl.studies.robust.certificate import Certificate
 from drillctl.studies.robust.fresh import FreshRuns

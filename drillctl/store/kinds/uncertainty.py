@@ -11,7 +11,8 @@ from drillctl.ensemble.audit import Audit
 from drillctl.ensemble.draws import Failures
 from drillctl.store.differences import growing_realizations
 from drillctl.store.kind import Kind
-from drillctl.store.names import asked_axes, axis_of, stored_name
+from drillctl.store.kinds.axes import asked_axes, axis_of
+from drillctl.store.names import stored_name
 from drillctl.store.realizations import write_uncertainty
 from drillctl.studies.uncertainty import Uncertainty
 from drillctl.studies.uncertainty.sensitivity import read_sensitivity

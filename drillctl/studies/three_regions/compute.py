@@ -14,13 +14,22 @@ from __future__ import annotations
 import itertools
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.ensemble.grid import Axis, Group, axes_of, cell_design, groups, shape_of
+from drillctl.ensemble.grid import (
+    Axis,
+    Group,
+    axes_of,
+    cell_design,
+    groups,
+    other_axes,
+    shape_of,
+    span,
+)
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
@@ -31,11 +40,7 @@ from drillctl.progress import SILENT, Progress
 from drillctl.simulation.batch import Prepared, prepare, run_batch, trace
 from drillctl.simulation.lanes import Kind, Lanes
 from drillctl.simulation.measures import NARROW_BAND, STATUSES, WINDOW
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
+from drillctl.store.result import Result, label
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -145,87 +150,51 @@ def gains_of(lanes: Lanes) -> tuple[Array, Array]:
 PAPER_LEVEL = 33.0
 """J1 above which Monteiro & Trindade (2012) call operation undesirable (s); of runs of 100 s."""
 
-FIELDS = {
-    "slope": ("N*m*s/rad", "falling slope of the rock at the operating speed"),
-    "slope_margin": ("N*m*s/rad", "friction-slope margin"),
-    "deciding_frequency": ("Hz", "frequency of the poles that decide the margin"),
-    "reference_speed": ("rad/s", "operating speed; NaN where there is none"),
-    "j1": ("s", "J1; NaN where the run failed"),
-}
-"""Unit and meaning of what is computed of each cell."""
-MASKS = {
-    "locally_stable": "slope under its margin",
-    "inside_level": "J1 at or under the level",
-    "from_rest": "drills steadily after a start from rest",
-    "from_wound_up": "drills steadily after a start wound up",
-    "sticking_from_rest": "still sticks long after a start from rest",
-    "sticking_from_wound_up": "still sticks long after a start wound up",
-    "failed": "one of the runs gave no finite answer",
-}
-"""Meaning of the masks."""
+FIELDS = ("slope", "slope_margin", "deciding_frequency", "reference_speed", "j1")
+"""What is computed of each cell."""
+MASKS = (
+    "locally_stable", "inside_level", "from_rest", "from_wound_up", "sticking_from_rest",
+    "sticking_from_wound_up", "failed",
+)  # fmt: skip
+"""What is decided of each cell."""
 
 
 @dataclass(frozen=True, eq=False)
-class ThreeRegions:
+class ThreeRegions(Result):
     """Local stability, J1 and attraction over one grid.
 
-    Attributes
-    ----------
-    design : Design
-        What was varied.
-    axes : tuple of Axis
-        Parameters and their values.
-    level : float
-        Level of J1 (s).
-    slope, slope_margin : ndarray, shape of the grid
-        Falling slope of the rock at the operating speed and the slope that the loop tolerates
-        there (N m s/rad); the slope is NaN where there is no operating speed.
-    deciding_frequency : ndarray, shape of the grid
-        Of the poles that decide the margin (Hz); 0 for a real pole.
-    locally_stable : ndarray of bool, shape of the grid
-        Cells whose slope is under the margin.
-    j1 : ndarray, shape of the grid
-        Over the design's own run (s), as a sweep gives it; NaN where it failed.
-    inside_level : ndarray of bool, shape of the grid
-        Cells with J1 at or under the level.
-    from_rest, from_wound_up : ndarray of bool, shape of the grid
-        Cells whose bit stays within `band` of the operating speed throughout the last `window`
-        of a run over `horizon` from that start.
-    sticking_from_rest, sticking_from_wound_up : ndarray of bool, shape of the grid
-        Cells whose bit stands still at some time in that window.
-    failed : ndarray of bool, shape of the grid
-        Cells of which a run gave no finite answer; in no region that this run decides.
-    reference_speed : ndarray, shape of the grid
-        Operating speed (rad/s): with integral action the set speed, else the cell's own
-        equilibrium nearest to the set speed, be it stable or not; NaN where there is none. A
-        drive at constant torque starts wound up with its top at this speed: it has no other.
-    horizon, window : float
-        Length of the runs from either start, and of their end that counts (s).
-    band : float
-        As a share of the operating speed.
-    total_seconds : float
-        From call to return (s).
+    With integral action the operating speed is the set speed; a drive without it has the
+    equilibrium nearest to the set speed, be it stable or not, and starts wound up with its top
+    at this speed.
     """
 
-    design: Design
-    axes: tuple[Axis, ...]
-    level: float
-    slope: Array
-    slope_margin: Array
-    deciding_frequency: Array
-    locally_stable: Mask
-    j1: Array
-    inside_level: Mask
-    from_rest: Mask
-    from_wound_up: Mask
-    sticking_from_rest: Mask
-    sticking_from_wound_up: Mask
-    failed: Mask
-    reference_speed: Array
-    horizon: float
-    window: float
-    band: float
-    total_seconds: float
+    kind: ClassVar[str] = "regions"
+
+    design: Design = label(means="what was varied")
+    axes: tuple[Axis, ...] = label(means="parameters and their values")
+    level: float = label(unit="s", means="level of J1")
+    slope: Array = label(
+        "axes", unit="N*m*s/rad", means="falling slope of the rock at the operating speed"
+    )
+    slope_margin: Array = label("axes", unit="N*m*s/rad", means="friction-slope margin")
+    deciding_frequency: Array = label(
+        "axes", unit="Hz", means="frequency of the poles that decide the margin"
+    )
+    locally_stable: Mask = label("axes", means="slope under its margin")
+    j1: Array = label("axes", unit="s", means="J1; NaN where the run failed")
+    inside_level: Mask = label("axes", means="J1 at or under the level")
+    from_rest: Mask = label("axes", means="drills steadily after a start from rest")
+    from_wound_up: Mask = label("axes", means="drills steadily after a start wound up")
+    sticking_from_rest: Mask = label("axes", means="still sticks long after a start from rest")
+    sticking_from_wound_up: Mask = label("axes", means="still sticks long after a wound-up start")
+    failed: Mask = label("axes", means="one of the runs gave no finite answer")
+    reference_speed: Array = label(
+        "axes", unit="rad/s", means="operating speed; NaN where there is none"
+    )
+    horizon: float = label(unit="s", means="length of the runs from either start")
+    window: float = label(unit="s", means="their end that counts")
+    band: float = label(means="steady drilling, as a share of the operating speed")
+    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def attracted(self) -> Mask:
@@ -280,28 +249,10 @@ class ThreeRegions:
             found[" + ".join(held) or "none"] = int(cells.sum())
         return found | {"failed": int(self.failed.sum())}
 
-    @property
-    def data(self) -> xarray.Dataset:
-        """Fields and masks, labelled by parameter path, with units."""
-        import xarray
-
-        paths = [a.path for a in self.axes]
-        coordinates = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
-        variables: dict[str, Any] = {
-            name: (paths, getattr(self, name), {"units": unit, "long_name": meaning})
-            for name, (unit, meaning) in FIELDS.items()
-        }
-        for name, meaning in MASKS.items():
-            variables[name] = (paths, getattr(self, name), {"units": "1", "long_name": meaning})
-        return xarray.Dataset(variables, coordinates)
-
     def summary(self) -> dict[str, Any]:
         """Axes, level, counts, what attraction means here, time; strict JSON values, SI."""
         return {
-            "axes": {
-                a.path: {"min": float(a.values[0]), "max": float(a.values[-1]), "points": len(a)}
-                for a in self.axes
-            },
+            "axes": span(self.axes),
             "level": self.level,
             "cells": int(self.j1.size),
             "counts": self.counts,
@@ -312,11 +263,10 @@ class ThreeRegions:
             "total_seconds": self.total_seconds,
         }
 
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """Axes and level that the design does not give."""
+        level = {} if self.level == PAPER_LEVEL else {"level": self.level}
+        return self.design, other_axes(self) | level
 
 
 def three_regions(

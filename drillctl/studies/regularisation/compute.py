@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +12,11 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.design.parts import weight_moves
-from drillctl.ensemble.grid import Axis, axes_of
+from drillctl.ensemble.grid import Axis, axes_of, other_axes, span
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
+from drillctl.store.result import Result, label
 
 Array = NDArray[np.float64]
 
@@ -30,34 +26,23 @@ WIDTH_PATH = "bit_rock.regularised_over"
 
 
 @dataclass(frozen=True, eq=False)
-class Regularisation:
-    """A map with set-valued friction beside the same map with smoothed friction.
+class Regularisation(Result):
+    """A map with set-valued friction beside the same map with smoothed friction."""
 
-    Attributes
-    ----------
-    design : Design
-        The rig, its friction set-valued.
-    axes : tuple of Axis
-        Of the map.
-    levels : tuple of float
-        Levels of J1 (s).
-    widths : ndarray, shape (widths,)
-        Speeds over which tanh changes the sign of the friction (rad/s), widest first.
-    j1 : ndarray, shape of the map
-        J1 of the set-valued law (s).
-    smoothed : ndarray, shape (widths, axes of the map)
-        J1 of the regularised law (s).
-    total_seconds : float
-        From call to return (s).
-    """
+    kind: ClassVar[str] = "regularisation"
 
-    design: Design
-    axes: tuple[Axis, ...]
-    levels: tuple[float, ...]
-    widths: Array
-    j1: Array
-    smoothed: Array
-    total_seconds: float
+    design: Design = label(means="the rig, its friction set-valued")
+    axes: tuple[Axis, ...] = label(means="of the map")
+    levels: tuple[float, ...] = label(unit="s", means="levels of J1")
+    widths: Array = label(
+        "width", unit="rad/s", name="width",
+        means="speeds over which tanh changes the sign of the friction, widest first",
+    )  # fmt: skip
+    j1: Array = label("axes", unit="s", means="J1 of the set-valued law")
+    smoothed: Array = label(
+        "width", "axes", unit="s", name="smoothed_j1", means="J1 of the regularised law"
+    )
+    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def shifts(self) -> Array:
@@ -72,20 +57,6 @@ class Regularisation:
     def changed(self, level: float) -> list[int]:
         """Cells on the other side of a level than in the set-valued map, of each width."""
         return [int(((x <= level) != (self.j1 <= level)).sum()) for x in self.smoothed]
-
-    @property
-    def data(self) -> xarray.Dataset:
-        """Both maps, labelled by parameter path and width."""
-        import xarray
-
-        paths = [a.path for a in self.axes]
-        coords = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
-        coords["width"] = ("width", self.widths, {"units": "rad/s"})
-        variables = {
-            "j1": (paths, self.j1, {"units": "s"}),
-            "smoothed_j1": (["width", *paths], self.smoothed, {"units": "s"}),
-        }
-        return xarray.Dataset(variables, coords)
 
     def summary(self) -> dict[str, Any]:
         """Per width: median and worst shift of J1, cells per level and cells that change side."""
@@ -105,20 +76,16 @@ class Regularisation:
                 }
             )
         return {
-            "axes": {
-                a.path: {"min": float(a.values[0]), "max": float(a.values[-1]), "points": len(a)}
-                for a in self.axes
-            },
+            "axes": span(self.axes),
             "set_valued_cells": {f"{level:g}": counts[level][0] for level in self.levels},
             "widths": rows,
             "total_seconds": self.total_seconds,
         }
 
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """Axes and widths that the design does not give."""
+        widths = {} if tuple(self.widths) == WIDTHS else {"widths": self.widths.tolist()}
+        return self.design, other_axes(self) | widths
 
 
 def regularisation(

@@ -1,0 +1,162 @@
+"""One command for every study: claim a folder, show again or compute, write, draw, print."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from drillctl.cli import console
+from drillctl.cli.options import Axes, Common, DesignName, Sets, common_options, loaded, with_axes
+from drillctl.errors import InputError
+from drillctl.studies.base import Option, Run, Study, studies
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from drillctl.design import Design
+    from drillctl.store import RunFolder
+
+DPI = 150
+
+
+def command(study: Study) -> Callable[..., None]:
+    """The function that typer reads: a study's options, then those of every command."""
+    shared = dict(inspect.signature(common_options, eval_str=True).parameters)
+    shared["units"] = shared["units"].replace(default=study.system)
+    own = [_parameter(option) for option in study.options]
+    if study.axes or study.instead:
+        own.insert(0, inspect.Parameter("axis", _KEYWORD, default=None, annotation=Axes))
+
+    def verb(**given: Any) -> None:
+        common = common_options(**{name: given.pop(name) for name in shared})
+        design = with_axes(loaded(given.pop("design"), given.pop("sets")), given.get("axis"))
+        chosen = study
+        if given.pop("axis", None) and study.instead:
+            chosen = studies()[study.instead]
+        perform(chosen, design, given, common)
+
+    parameters = [
+        inspect.Parameter("design", _KEYWORD, annotation=DesignName),
+        inspect.Parameter("sets", _KEYWORD, default=None, annotation=Sets),
+        *own,
+        *(parameter.replace(kind=_KEYWORD) for parameter in shared.values()),
+    ]
+    verb.__name__, verb.__doc__ = study.name, study.help
+    verb.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    verb.__annotations__ = {one.name: one.annotation for one in parameters}
+    return verb
+
+
+_KEYWORD = inspect.Parameter.KEYWORD_ONLY
+
+
+def _parameter(option: Option) -> inspect.Parameter:
+    more = {} if option.metavar is None else {"metavar": option.metavar}
+    if option.least is not None:
+        more["min"] = option.least  # type: ignore[assignment]
+    note = typer.Option(option.flag, help=option.help, **more)  # type: ignore[arg-type]
+    kind = option.type if option.default is not None else option.type | None
+    return inspect.Parameter(
+        option.name, _KEYWORD, default=option.default, annotation=Annotated[kind, note]
+    )
+
+
+def perform(study: Study, design: Design, options: dict[str, Any], common: Common) -> None:
+    """Run a study in its folder, or show the finished run again."""
+    from drillctl import store
+
+    values = study.values(options)
+    design = design.replace(values) if values else design
+    _refuse_nothing_to_resume(options, common.out)
+    folder = store.claim(
+        study.name, design, common.out, study.growing(design),
+        bool(options.get("allow_mixed")), **study.settings(options),
+    )  # fmt: skip
+    if folder.finished:
+        result = store.open(folder.path)
+        _show(study, result, folder.summary(), common)
+        console.note(f"already done: {folder.path}")
+    else:
+        with guarded(folder, study), console.progress() as bar, console.library_output_on_stderr():
+            run = Run(options, bar, folder.path, common.units, common.verbose)
+            result = study.compute(design, run)
+        _write(study, result, folder, common)
+        for note in study.notes(result):
+            console.note(note)
+        summary = study.summary(result)
+        folder.finish(summary)
+        _show(study, result, summary, common)
+        (console.note if common.json else console.line)(f"results: {folder.path}")
+    failure = study.failure(result)
+    if failure is not None:
+        console.note(f"drillctl: {failure}")
+        raise typer.Exit(1)
+
+
+def _refuse_nothing_to_resume(options: dict[str, Any], out: Path | None) -> None:
+    if not options.get("resume"):
+        return
+    if out is None:
+        raise InputError("requires --out, the folder of the run to resume", "--resume")
+    if not (out / "run.json").is_file():
+        raise InputError(f"{out} holds no run to resume", "--resume")
+
+
+def _write(study: Study, result: Any, folder: RunFolder, common: Common) -> None:
+    """Data, tables, pictures and further files of a result."""
+    from drillctl.store.tables import write_csv
+
+    result.write(folder.path)
+    for table in study.tables(result):
+        write_csv(table, folder.path)
+    for picture in study.pictures(result):
+        draw(picture.draw(common.units), folder.path / f"{picture.name}.png")
+    study.files(result, folder.path)
+
+
+def draw(figure: Figure, path: Path) -> None:
+    """Write a picture, whole or not at all."""
+    part = path.with_suffix(".part")
+    figure.savefig(part, dpi=DPI, format="png")
+    part.replace(path)
+
+
+def _show(study: Study, result: Any, summary: dict[str, Any], common: Common) -> None:
+    """The summary as JSON, or tables and remarks for people."""
+    if common.json:
+        console.emit(summary)
+        return
+    title = result.design.tables.title or result.design.name
+    for number, table in enumerate(one for one in study.tables(result) if one.shown):
+        head = f"{title}: {table.title}" if number == 0 else table.title
+        rows = [
+            [
+                column.text(cell, common.units)
+                for column, cell in zip(table.columns, row, strict=True)
+            ]
+            for row in table.rows
+        ]
+        console.table(head, [column.head(common.units) for column in table.columns], rows)
+    for remark in study.remarks(result, common.units):
+        console.line(remark)
+
+
+@contextmanager
+def guarded(folder: RunFolder, study: Study) -> Iterator[None]:
+    """A run in its folder: an impossible one leaves none, an interrupted one may be resumed."""
+    try:
+        yield
+    except InputError:
+        folder.discard()
+        raise
+    except KeyboardInterrupt:
+        if study.resumes:
+            console.note(f"finished blocks are kept: repeat with --out {folder.path} to resume")
+        else:
+            folder.discard()
+        raise

@@ -1,0 +1,318 @@
+"""Results on disk: arrays as variables of a zarr store, everything else as JSON.
+
+One codec for every result: a tree of frozen dataclasses, named tuples, tuples, lists,
+dictionaries, numbers, text, designs and arrays. `result.json` names the class of each object and,
+in place of an array, the variable that holds it. Classes are looked up in this package only, and
+only dataclasses and named tuples are made: reading a folder runs no code of its own.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import shutil
+import tomllib
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.design import Design, to_toml
+from drillctl.design.validation import validated
+from drillctl.errors import StoreError
+from drillctl.provenance import provenance
+from drillctl.store.json_files import read_json, write_json
+from drillctl.store.names import stored_name
+from drillctl.store.result import Label
+
+if TYPE_CHECKING:
+    import xarray
+
+TREE = "result.json"
+DATA = "data.zarr"
+MARK = "$"
+"""Key of a JSON object that stands for something that JSON has not."""
+_PLAIN = Label()
+
+
+@dataclass(frozen=True)
+class _Variable:
+    dims: tuple[str, ...]
+    values: NDArray[Any]
+    attributes: dict[str, Any]
+
+
+@dataclass
+class _Encoder:
+    """Takes arrays out of a result as it goes through it."""
+
+    variables: dict[str, _Variable] = field(default_factory=dict)
+
+    def tree(self, value: Any, name: str, label: Label = _PLAIN, owner: Any = None) -> Any:
+        """A value as JSON; its arrays become variables named after `name`."""
+        if value is None or isinstance(value, (bool, str, int)):
+            return value
+        if isinstance(value, (float, np.floating)):
+            number = float(value)
+            return number if math.isfinite(number) else {MARK: "float", "is": repr(number)}
+        if isinstance(value, (np.integer, np.bool_)):
+            return value.item()
+        if isinstance(value, np.ndarray):
+            return {MARK: "array", "is": self._array(value, name, label, owner)}
+        if isinstance(value, Design):
+            about = {"name": value.name, "origin": value.origin}
+            return {MARK: "design", "is": to_toml(value), **about}
+        if isinstance(value, dict):
+            pairs = [
+                [key, self.tree(v, _joined(name, key, label), _of_key(label, key), owner)]
+                for key, v in value.items()
+            ]
+            return {MARK: "dict", "is": pairs}
+        if dataclasses.is_dataclass(value) or hasattr(value, "_fields"):
+            return self._object(value, "" if label.flat else name, owner)
+        if isinstance(value, (tuple, list)):
+            parts = self._parts(value, name, label, owner)
+            return parts if isinstance(value, list) else {MARK: "tuple", "is": parts}
+        raise TypeError(f"{type(value).__name__} ({name}) is nothing that a result holds")
+
+    def _object(self, value: Any, prefix: str, owner: Any) -> Any:
+        cls = type(value)
+        inside = {}
+        for one, label in labels(cls).items():
+            own = label.name.format_map(_Attributes(value)) or one
+            # What names itself by an attribute, such as an axis by its path, stands apart.
+            name = own if "{" in label.name or not prefix else f"{prefix}.{own}"
+            inner = getattr(value, one)
+            inside[one] = self.tree(inner, name, label, _Owner(value, owner))
+        return {MARK: "object", "of": f"{cls.__module__}:{cls.__qualname__}", "is": inside}
+
+    def _parts(self, value: Any, name: str, label: Label, owner: Any) -> list[Any]:
+        if not label.over:
+            inner = dataclasses.replace(label, flat=False)
+            return [self.tree(v, f"{name}.{k}", inner, owner) for k, v in enumerate(value)]
+        found = []
+        for one in value:
+            apart = _Encoder()
+            found.append((apart, apart.tree(one, name, label, owner)))
+        return self._stacked(found, label.over, [getattr(one, "name", None) for one in value])
+
+    def _stacked(self, found: list[tuple[_Encoder, Any]], over: str, names: list[Any]) -> list[Any]:
+        """Like arrays of like objects in one variable along a new dimension; others apart."""
+        for key in dict.fromkeys(key for apart, _ in found for key in apart.variables):
+            held = [apart.variables.get(key) for apart, _ in found]
+            first = next(one for one in held if one is not None)
+            if key in first.dims:  # a coordinate, which the objects share or have of their own
+                continue
+            alike = all(
+                one is not None
+                and one.dims == first.dims
+                and one.values.shape == first.values.shape
+                for one in held
+            )
+            if alike:
+                values = np.stack([one.values for one in held if one is not None])
+                self.variables[key] = _Variable((over, *first.dims), values, first.attributes)
+                continue
+            for k, one in enumerate(held):
+                if one is not None:
+                    dims = tuple(f"{d}.{k}" for d in one.dims)
+                    self.variables[f"{key}.{k}"] = _Variable(dims, one.values, one.attributes)
+        if names and all(isinstance(name, str) for name in names):
+            self.variables[over] = _Variable((over,), np.array(names, dtype=object), {})
+        return [self._placed(tree, apart, k) for k, (apart, tree) in enumerate(found)]
+
+    def _placed(self, tree: Any, apart: _Encoder, k: int) -> Any:
+        """The tree of one of the stacked objects, its arrays where they are now."""
+        if isinstance(tree, list):
+            return [self._placed(one, apart, k) for one in tree]
+        if not isinstance(tree, dict):
+            return tree
+        if tree.get(MARK) == "array":
+            name = tree["is"]
+            if name not in self.variables and f"{name}.{k}" not in self.variables:
+                self.variables[name] = apart.variables[name]  # a coordinate
+            if f"{name}.{k}" in self.variables:
+                return tree | {"is": f"{name}.{k}"}
+            shared = name in self.variables[name].dims
+            return tree if shared else tree | {"at": k}
+        return {key: self._placed(one, apart, k) for key, one in tree.items()}
+
+    def _array(self, value: NDArray[Any], name: str, label: Label, owner: Any) -> str:
+        dims = _dimensions(label, owner) if label.dims else ()
+        if len(dims) != value.ndim:
+            dims = tuple(f"{name}_{k}" for k in range(value.ndim))
+        if np.iscomplexobj(value):
+            value, dims = np.stack([value.real, value.imag], axis=-1), (*dims, "complex")
+        attributes = _attributes(label, owner)
+        held = self.variables.get(name)
+        if held is not None and not _same(held.values, value):
+            name = next(n for k in range(2, 10_000) if (n := f"{name}.{k}") not in self.variables)
+            dims = tuple(f"{d}.{name.rpartition('.')[2]}" if d in dims else d for d in dims)
+        self.variables[name] = _Variable(dims, value, attributes)
+        return name
+
+
+def _same(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    return bool(np.array_equal(one, other, equal_nan=one.dtype.kind == "f"))
+
+
+def _joined(name: str, key: Any, label: Label) -> str:
+    return str(key) if label.flat else f"{name}.{key}"
+
+
+@dataclass(frozen=True)
+class _Owner:
+    """The objects that hold an array, the nearest first."""
+
+    value: Any
+    above: Any
+
+    def get(self, name: str) -> Any:
+        found = getattr(self.value, name, None)
+        return found if found is not None or self.above is None else self.above.get(name)
+
+
+class _Attributes(dict[str, Any]):
+    """Attributes of an object for the names of its variables."""
+
+    def __init__(self, value: Any) -> None:
+        super().__init__()
+        self._value = value
+
+    def __missing__(self, key: str) -> Any:
+        return getattr(self._value, key)
+
+
+def labels(cls: type) -> dict[str, Label]:
+    """Fields of a dataclass or named tuple with their labels."""
+    if dataclasses.is_dataclass(cls):
+        return {f.name: f.metadata.get("label", _PLAIN) for f in dataclasses.fields(cls)}
+    names: tuple[str, ...] = cls._fields  # type: ignore[attr-defined]
+    return dict.fromkeys(names, _PLAIN)
+
+
+def _dimensions(label: Label, owner: Any) -> tuple[str, ...]:
+    dims: list[str] = []
+    for one in label.dims:
+        if one == "axes":
+            dims += [axis.path for axis in owner.get("axes")]
+        else:
+            dims.append(one.format_map(_Attributes(owner.value)))
+    return tuple(dims)
+
+
+def _of_key(label: Label, key: Any) -> Label:
+    """The label of one entry of a dictionary."""
+    unit = label.unit(key) if callable(label.unit) else label.unit
+    means = label.means(key) if callable(label.means) else label.means
+    return dataclasses.replace(label, unit=unit, means=means)
+
+
+def _attributes(label: Label, owner: Any) -> dict[str, Any]:
+    unit = str(label.unit)
+    if owner is not None:
+        unit = unit.format_map(_Attributes(owner.value))
+    flags = {"flag_values": list(range(len(label.flags))), "flag_meanings": " ".join(label.flags)}
+    about = flags if label.flags else {"units": unit}
+    return about | ({"long_name": label.means} if label.means else {})
+
+
+def encoded(result: Any) -> tuple[Any, dict[str, _Variable]]:
+    """A result as a JSON tree and variables."""
+    encoder = _Encoder()
+    return encoder.tree(result, ""), encoder.variables
+
+
+def dataset(result: Any) -> xarray.Dataset:
+    """Every array of a result, labelled, and what is derived from them."""
+    import xarray
+
+    _, variables = encoded(result)
+    made: dict[str, Any] = {n: (v.dims, v.values, v.attributes) for n, v in variables.items()}
+    attributes = dict(getattr(result, "provenance", None) or {})
+    return xarray.Dataset(made | result.derived(), attrs=attributes)
+
+
+def write(result: Any, folder: Path, data: xarray.Dataset | None = None) -> None:
+    """Write a result into the folder of its run, each file whole or not at all.
+
+    `data`: instead of the result's own dataset, which must hold every variable of the tree.
+    """
+    tree, _ = encoded(result)
+    write_dataset(result.data if data is None else data, folder)
+    write_json(folder / TREE, tree)
+
+
+def write_dataset(data: xarray.Dataset, folder: Path) -> None:
+    """Write a dataset as `data.zarr`, with its provenance, whole or not at all."""
+    part, target = folder / "data.part", folder / DATA
+    shutil.rmtree(part, ignore_errors=True)
+    data = data.rename({name: stored_name(str(name)) for name in (*data.variables, *data.dims)})
+    data.attrs = provenance() | data.attrs
+    data.to_zarr(part, mode="w", consolidated=False)
+    shutil.rmtree(target, ignore_errors=True)
+    part.rename(target)
+
+
+def read(folder: Path) -> Any:
+    """The result that was written into a folder.
+
+    Raises
+    ------
+    StoreError
+        A file is missing or damaged.
+    """
+    import xarray
+
+    tree = read_json(folder / TREE)
+    try:
+        with xarray.open_zarr(folder / DATA, consolidated=False) as data:
+            return decoded(tree, data.load())
+    except (OSError, KeyError, TypeError, ValueError, AttributeError, ImportError) as error:
+        raise StoreError(f"{folder}: cannot be read back: {error}") from None
+
+
+def decoded(tree: Any, data: xarray.Dataset) -> Any:
+    """A result from its JSON tree and dataset."""
+    if isinstance(tree, list):
+        return [decoded(one, data) for one in tree]
+    if not isinstance(tree, dict):
+        return tree
+    kind, inside = tree[MARK], tree["is"]
+    if kind == "float":
+        return float(inside)
+    if kind == "array":
+        return _values(data[stored_name(inside)], tree.get("at"))
+    if kind == "design":
+        return _design(tree)
+    if kind == "dict":
+        return {key: decoded(one, data) for key, one in inside}
+    if kind == "tuple":
+        return tuple(decoded(one, data) for one in inside)
+    cls = _class(tree["of"])
+    return cls(**{name: decoded(one, data) for name, one in inside.items()})
+
+
+def _values(variable: xarray.DataArray, at: int | None) -> NDArray[Any]:
+    values: NDArray[Any] = variable.values if at is None else variable.values[at]
+    if variable.dims and variable.dims[-1] == "complex":
+        return np.asarray(values[..., 0] + 1j * values[..., 1])
+    return values
+
+
+def _design(tree: dict[str, Any]) -> Design:
+    held = tomllib.loads(tree["is"])
+    return Design(tree["name"], validated(held, tree["origin"]), held, tree["origin"])
+
+
+def _class(path: str) -> Any:
+    module, _, name = path.partition(":")
+    if not module.startswith("drillctl."):
+        raise ValueError(f"{path} is no class of this package")
+    found = getattr(import_module(module), name)
+    if not (dataclasses.is_dataclass(found) or issubclass(found, tuple)):
+        raise ValueError(f"{path} is not data")
+    return found

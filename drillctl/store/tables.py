@@ -1,0 +1,180 @@
+"""Tables of results: one content for the terminal, CSV files and reports.
+
+Cells hold SI numbers, text or nothing. People read them in their own units; a CSV file keeps SI,
+and has two further columns for the ends of an interval.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from drillctl import units
+from drillctl.store.json_files import write_text
+
+NOTHING = "–"
+"""Where there is no number."""
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+class Estimate(NamedTuple):
+    """A number with the ends of its 95 % interval."""
+
+    value: float | None
+    interval: tuple[float | None, float | None] | None
+
+
+Cell = Any
+"""Text, a number (SI), an `Estimate`, or None."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table."""
+
+    name: str  # head in a CSV file
+    label: str = ""  # head for people, if not the name
+    unit: str = ""  # SI
+    digits: int = 4  # significant ones, for people
+    percent: bool = False  # whether a share is shown in percent
+    signed: bool = False  # whether a plus is shown, as of differences
+    interval: bool = False  # whether cells are estimates
+
+    def head(self, system: units.System) -> str:
+        """The head for people, with its unit."""
+        unit = "%" if self.percent else displayed_unit(self.unit, system)
+        text = self.label or self.name
+        return f"{text} ({unit})" if unit else text
+
+    def text(self, cell: Cell, system: units.System) -> str:
+        """A cell as people read it."""
+        if isinstance(cell, Estimate):
+            return self._estimate(cell, system)
+        if isinstance(cell, str):
+            return cell
+        if isinstance(cell, bool):
+            return "yes" if cell else "no"
+        if isinstance(cell, int) and not self.percent and not self.unit:
+            return str(cell)
+        return self._number(cell, system)
+
+    def _number(self, value: float | None, system: units.System) -> str:
+        if value is None or math.isnan(value):
+            return NOTHING
+        shown = 100.0 * value if self.percent else scaled(value, self.unit, system)
+        text = number(shown, self.digits)
+        return f"+{text}" if self.signed and shown > 0.0 else text
+
+    def _estimate(self, cell: Estimate, system: units.System) -> str:
+        text = self._number(cell.value, system)
+        if cell.interval is None or cell.value is None:
+            return text
+        low, high = (self._number(end, system) for end in cell.interval)
+        return f"{text} ({low} to {high})"
+
+    def heads(self) -> list[str]:
+        """Heads in a CSV file."""
+        if not self.interval:
+            return [self.name]
+        return [self.name, f"{self.name}_low", f"{self.name}_high"]
+
+    def fields(self, cell: Cell) -> list[Any]:
+        """Fields of a cell in a CSV file; empty where there is no finite number."""
+        if not self.interval:
+            return [_field(cell)]
+        if not isinstance(cell, Estimate):
+            return [_field(cell), "", ""]
+        return [_field(one) for one in (cell.value, *(cell.interval or (None, None)))]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells under columns."""
+
+    name: str  # of its CSV file
+    title: str  # what it shows
+    columns: tuple[Column, ...]
+    rows: Iterable[Sequence[Cell]]
+    shown: bool = True  # to people; else in its file alone
+
+
+def write_csv(table: Table, folder: Path) -> None:
+    """Write a table as `NAME.csv`, in SI, whole or not at all."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([head for column in table.columns for head in column.heads()])
+    for row in table.rows:
+        cells = zip(table.columns, row, strict=True)
+        writer.writerow([field for column, cell in cells for field in column.fields(cell)])
+    write_text(folder / f"{table.name}.csv", text.getvalue())
+
+
+def _field(value: Cell) -> Any:
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return ""
+    return float(value) if isinstance(value, float) else value
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number with so many significant digits, without needless zeros."""
+    if value is None or math.isnan(value):
+        return NOTHING
+    if math.isinf(value):
+        return "∞" if value > 0.0 else "−∞"
+    if value == 0.0:
+        return "0"
+    power = math.floor(math.log10(abs(value)))
+    if not -4 <= power < 6:
+        mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+        text = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+        return f"{text} × 10{str(int(exponent)).translate(_RAISED)}".replace("-", "−")
+    text = f"{value:.{max(0, digits - 1 - power)}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return text.replace("-", "−")
+
+
+def percent(share: float | None, digits: int = 3) -> str:
+    """A share in percent."""
+    return NOTHING if share is None else f"{number(100.0 * share, digits)} %"
+
+
+def between(low: float | None, high: float | None, digits: int = 4) -> str:
+    """From the least to the largest value."""
+    return f"{number(low, digits)} to {number(high, digits)}"
+
+
+def chance(share: float, interval: Iterable[float | None]) -> str:
+    """A probability with its 95 % interval, in percent."""
+    low, high = interval
+    if low is None or high is None:
+        return percent(share)
+    return f"{percent(share)} ({between(100.0 * low, 100.0 * high, 3)} %)"
+
+
+def displayed_unit(si_unit: str, system: units.System) -> str:
+    """The unit that people read for one of SI; empty for a pure number."""
+    if si_unit in ("", "1"):
+        return ""
+    name = "kJ" if si_unit == "J" else units.displayed(1.0, si_unit, system)[1]
+    return str(name).replace("^2", "²").replace("*", " ")
+
+
+def scaled(value: float, si_unit: str, system: units.System) -> float:
+    """A value in the unit that people read."""
+    if si_unit in ("", "1"):
+        return value
+    return value / 1e3 if si_unit == "J" else float(units.displayed(value, si_unit, system)[0])
+
+
+def quantity(value: float | None, si_unit: str, system: units.System, digits: int = 4) -> str:
+    """A value in SI as people read it, with its unit."""
+    if value is None:
+        return NOTHING
+    unit = displayed_unit(si_unit, system)
+    return f"{number(scaled(value, si_unit, system), digits)} {unit}".rstrip()

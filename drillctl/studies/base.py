@@ -1,0 +1,200 @@
+"""What a study is: one object that commands, folders, reports and Python are driven by.
+
+A study is a package below `drillctl.studies`, named in `drillctl.registry.STUDIES`. Its
+`__init__.py` holds `STUDY = Study(...)` and imports nothing heavy: what computes or draws is
+imported inside the functions that it names. From this object follow the command with its options
+and help, the folder of a run and its resumption, tables on the terminal and as CSV, pictures,
+the JSON summary, `drillctl.open`, `drillctl.NAME` and the section of the report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from drillctl import registry
+from drillctl.progress import SILENT, Progress
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from drillctl import units
+    from drillctl.design import Design
+    from drillctl.store.folder import Growing
+    from drillctl.store.tables import Table
+
+Group = Literal["Describe a rig", "Analyse the loop", "Simulate", "Decide", "Hand over"]
+"""What a person wants to do; commands are listed under it."""
+
+
+class Option(NamedTuple):
+    """An option of a command.
+
+    An option with `sets` changes the design. Any other goes to `compute` in `Run.options`, and
+    makes another run of the same design unless it is its default or `how`.
+    """
+
+    name: str  # in Python: `allow_mixed` is --allow-mixed
+    type: Any
+    help: str  # verb or noun first, at most 60 characters
+    default: Any = None
+    sets: str = ""  # dotted path of the design
+    how: bool = False  # whether it only says how to compute: the result is the same
+    metavar: str | None = None
+    least: float | None = None
+
+    @property
+    def flag(self) -> str:
+        """As it is written on the command line."""
+        return f"--{self.name.replace('_', '-')}"
+
+
+@dataclass(frozen=True)
+class Run:
+    """How to compute a study once."""
+
+    options: Mapping[str, Any] = field(default_factory=dict)  # by `Option.name`, defaults included
+    progress: Progress = SILENT
+    folder: Path | None = None  # where finished blocks may be kept
+    system: units.System = "si"  # of interim pictures
+    verbose: bool = False
+
+
+class Picture(NamedTuple):
+    """A picture of a result."""
+
+    name: str  # of its file
+    caption: str  # what it shows
+    alt: str  # the same in words, with what it says
+    draw: Callable[[units.System], Figure]
+    paper: bool = False  # whether it needs light paper, as maps with dark contours do
+
+
+@dataclass(frozen=True)
+class Requested:
+    """A study that a report needs."""
+
+    design: Design
+    profile: Any  # `reporting.profiles.Profile`
+    done: Mapping[str, Any]  # studies before it, by name
+
+    def summary(self, name: str) -> dict[str, Any]:
+        """Summary of a study before it."""
+        found: dict[str, Any] = self.done[name].summary
+        return found
+
+
+def _applies(request: Requested) -> str:
+    return ""
+
+
+def _as_it_is(request: Requested) -> Design:
+    return request.design
+
+
+def _summary(result: Any) -> dict[str, Any]:
+    return dict(result.summary())
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A run of a study for a report."""
+
+    name: str  # of its folder
+    title: str  # what messages call it
+    missing: Callable[[Requested], str] = _applies  # why it does not apply; empty where it does
+    variant: Callable[[Requested], Design] = _as_it_is  # the design that is studied
+    needs: tuple[str, ...] = ()  # recipes that must be done before
+    options: Mapping[str, Any] = field(default_factory=dict)
+    summary: Callable[[Any], dict[str, Any]] = _summary
+    order: int = 50  # those with less are done first
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of a report."""
+
+    name: str  # by which it is requested
+    title: str
+    reads: tuple[str, ...]  # recipes
+    order: int  # place among the sections
+    # blocks from what was gathered; by default remarks, pictures and tables of the first recipe
+    build: Callable[[Any], tuple[Any, ...]] | None = None
+
+
+def _none(result: Any, *others: Any) -> Iterable[Any]:
+    return ()
+
+
+def _nothing(*values: Any) -> None:
+    return None
+
+
+@dataclass(frozen=True)
+class Study:
+    """One study.
+
+    `compute` takes a design and a `Run` and returns a `store.result.Result`, whose class names
+    the study in `kind`. The other functions take that result; `tables`, `pictures` and
+    `remarks` give what people see, `notes` what deserves attention on stderr.
+    """
+
+    name: str
+    help: str
+    group: Group
+    compute: Callable[[Design, Run], Any]
+    options: tuple[Option, ...] = ()
+    axes: bool = False  # whether `--axis` sets the axes of the map
+    instead: str = ""  # study that takes over where `--axis` is given
+    command: bool = True  # whether it is a command of its own
+    python: str = ""  # name in `drillctl`, if any
+    call: str = ""  # "module:function" that it stands for
+    resumes: bool = False  # whether finished blocks are kept
+    tables: Callable[[Any], Iterable[Table]] = _none
+    pictures: Callable[[Any], Iterable[Picture]] = _none
+    remarks: Callable[[Any, units.System], Iterable[str]] = _none
+    notes: Callable[[Any], Iterable[str]] = _none
+    summary: Callable[[Any], dict[str, Any]] = _summary
+    files: Callable[[Any, Path], None] = _nothing  # further files of a folder
+    failure: Callable[[Any], str | None] = _nothing  # why the command ends with exit code 1
+    growing: Callable[[Design], Growing | None] = _nothing
+    check: Callable[[Design], None] = _nothing  # what `validate` refuses of its settings
+    recipes: tuple[Recipe, ...] = ()
+    sections: tuple[Section, ...] = ()
+    system: Literal["si", "field"] = "si"  # units that people read unless they ask for others
+
+    def settings(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """What a result depends on beside its design."""
+        return {
+            one.name: options[one.name]
+            for one in self.options
+            if not (one.sets or one.how) and options.get(one.name, one.default) != one.default
+        }
+
+    def values(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """What options change in a design, by dotted path."""
+        return {
+            one.sets: options[one.name]
+            for one in self.options
+            if one.sets and options.get(one.name) is not None
+        }
+
+    def defaults(self) -> dict[str, Any]:
+        """Every option at its default."""
+        return {one.name: one.default for one in self.options}
+
+    def run(self, design: Design, **options: Any) -> Any:
+        """Compute without a folder, as Python does; `progress` goes to the `Run`."""
+        progress = options.pop("progress", SILENT)
+        return self.compute(design, Run(self.defaults() | options, progress))
+
+
+@cache
+def studies() -> dict[str, Study]:
+    """Every registered study by name, in the order of the registry."""
+    found = [import_module(module).STUDY for module in registry.STUDIES]
+    return {study.name: study for study in found}
