@@ -44,12 +44,13 @@ def _full_map(design: Design, measures: list[str] | None, options: Options) -> N
     """A sweep with its map, regions, audit and responses."""
     from drillctl import plots, printing, store, studies
     from drillctl.ensemble.sweeps import kept_measures
+    from drillctl.store.kinds.maps import asked_measures
 
     try:
         kept = kept_measures(measures)
     except InputError as error:
         raise InputError(error.problem, "--measure") from None
-    folder = store.claim("map", design, options.out, **store.asked_measures(kept))
+    folder = store.claim("map", design, options.out, **asked_measures(kept))
     if running.shown_again(
         folder, options, lambda: printing.sweep(store.open(folder.path), options.units)
     ):

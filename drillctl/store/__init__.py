@@ -22,14 +22,12 @@ if TYPE_CHECKING:
     from drillctl.store.folder import RunFolder as RunFolder
     from drillctl.store.folder import claim as claim
     from drillctl.store.folder import identity as identity
-    from drillctl.store.kinds.maps import asked_measures as asked_measures
     from drillctl.store.saving import open as open
     from drillctl.store.saving import save as save
     from drillctl.store.saving import write_data as write_data
 
 _HOME = {
     "RunFolder": "folder",
-    "asked_measures": "kinds.maps",
     "claim": "folder",
     "growing_realizations": "differences",
     "identity": "folder",

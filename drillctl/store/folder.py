@@ -15,10 +15,8 @@ import drillctl
 from drillctl.design import Design, to_toml
 from drillctl.errors import InputError
 from drillctl.provenance import provenance
-from drillctl.store.blocks import FolderBlocks
 from drillctl.store.differences import Growing, difference, refuse_other_machine
 from drillctl.store.json_files import read_json, write_json, write_text
-from drillctl.store.realizations import FolderShelf
 
 RUNS = Path("runs")
 """Where runs go that were given no folder."""
@@ -74,14 +72,18 @@ class RunFolder:
             with suppress(OSError):  # something else was put in meanwhile
                 self.path.rmdir()
 
-    def blocks(self) -> FolderBlocks:
+    def blocks(self) -> Any:
         """Blocks kept in this folder."""
+        from drillctl.store.blocks import FolderBlocks
+
         folder = self.path / "blocks"
         folder.mkdir(exist_ok=True)
         return FolderBlocks(folder)
 
-    def shelf(self) -> FolderShelf:
+    def shelf(self) -> Any:
         """Realizations kept in this folder."""
+        from drillctl.store.realizations import FolderShelf
+
         return FolderShelf(self.path)
 
 

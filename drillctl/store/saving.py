@@ -12,11 +12,13 @@ from drillctl.store.codec import TREE, read
 from drillctl.store.folder import about_run, claim
 from drillctl.store.json_files import read_json
 from drillctl.store.kind import Kind
-from drillctl.store.kinds import KINDS
 from drillctl.store.result import Result
 
-BY_CLASS = {kind.of: kind for kind in KINDS}
-BY_VERB = {kind.verb: kind for kind in KINDS}
+
+def _kinds() -> tuple[Kind, ...]:
+    from drillctl.store.kinds import KINDS
+
+    return KINDS
 
 
 def write_data(result: Any, folder: Path) -> None:
@@ -25,7 +27,7 @@ def write_data(result: Any, folder: Path) -> None:
 
 
 def _kind(result: Any) -> Kind:
-    return BY_CLASS[type(result)]
+    return next(kind for kind in _kinds() if kind.of is type(result))
 
 
 def save(result: Any, folder: str | Path) -> Path:
@@ -91,7 +93,7 @@ def open(folder: str | Path) -> Any:
         raise InputError("holds a run that is not finished; run the command again", str(path))
     if (path / TREE).is_file():
         return read(path)
-    kind = BY_VERB.get(about.get("verb", ""))
+    kind = next((one for one in _kinds() if one.verb == about.get("verb")), None)
     if kind is None:
         raise InputError(f"results of {about.get('verb')!r} are not read back", str(path))
     design = replace(load(path / "design.toml"), name=str(about.get("design")))

@@ -5,6 +5,15 @@ A study is a package below `drillctl.studies`, named in `drillctl.registry.STUDI
 imported inside the functions that it names. From this object follow the command with its options
 and help, the folder of a run and its resumption, tables on the terminal and as CSV, pictures,
 the JSON summary, `drillctl.open`, `drillctl.NAME` and the section of the report.
+
+Usual files of a package: `__init__.py` with `STUDY` and the functions that it names (the one for
+`compute` is called `computed`, since `compute.py` lies beside it), `compute.py` with the result
+class and the computation, `settings.py` with the keys of the design file. Orders of recipes and
+sections in a report come in tens, see `reporting`: recipes modes 0, loop 10, simulate 20, setting
+30, map 40, cells 50, best 60, bad 70, slope-margin 80, regions 85, uncertainty 90, compare 100,
+tune 110, advantage 120, doctor 130, meshes and steps from 140 on; sections summary 0, rig 10,
+operating point 20, modes 30, loop 40, map 50, responses 60, regions 65, uncertainty 70,
+sensitivity 80, tuning 90, comparison 100, advantage 110, audit 120, glossary 130.
 """
 
 from __future__ import annotations

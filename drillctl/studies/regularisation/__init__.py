@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from drillctl.studies.regularisation.compute import Regularisation
 
 
-def compute(design: Design, run: Run) -> Regularisation:
+def computed(design: Design, run: Run) -> Regularisation:
     """The study with its default widths."""
     from drillctl.studies.regularisation.compute import regularisation
 
@@ -59,7 +59,7 @@ STUDY = Study(
     name="regularisation",
     help="Compare the map with the map under smoothed friction",
     group="Simulate",
-    compute=compute,
+    compute=computed,
     axes=True,
     python="regularisation",
     call="drillctl.studies.regularisation.compute:regularisation",

@@ -31,7 +31,7 @@ MEANINGS = {
 """Regions by name, in the order in which they are reported."""
 
 
-def compute(design: Design, run: Run) -> ThreeRegions:
+def computed(design: Design, run: Run) -> ThreeRegions:
     """The regions over the two axes of the map."""
     from drillctl.studies.three_regions.compute import three_regions
 
@@ -89,7 +89,7 @@ STUDY = Study(
     name="regions",
     help="Map local stability, J1 under a level and attraction",
     group="Analyse the loop",
-    compute=compute,
+    compute=computed,
     axes=True,
     python="three_regions",
     call="drillctl.studies.three_regions.compute:three_regions",
