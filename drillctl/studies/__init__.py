@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from drillctl.ensemble.sweeps import stability_map as stability_map
     from drillctl.ensemble.sweeps import sweep as sweep
     from drillctl.studies.compare.compute import Comparison as Comparison
+    from drillctl.studies.delay.compute import WeightDelay as WeightDelay
+    from drillctl.studies.delay.compute import weight_delay as weight_delay
     from drillctl.studies.diagnosis.examination import doctor as doctor
     from drillctl.studies.diagnosis.result import Doctor as Doctor
     from drillctl.studies.loop_maps import LoopMap as LoopMap
@@ -33,8 +35,6 @@ if TYPE_CHECKING:
     from drillctl.studies.uncertainty.tables import (
         write_uncertainty_tables as write_uncertainty_tables,
     )
-    from drillctl.studies.delay.compute import WeightDelay as WeightDelay
-    from drillctl.studies.delay.compute import weight_delay as weight_delay
 
 _HOME = {
     "Axis": "drillctl.ensemble.grid",
