@@ -10,14 +10,14 @@
 - `root_locus.py`: `root_locus`, poles of the loop against a parameter.
 - `friction.py`: `friction_curves`, bit torque against bit speed at each weight on bit.
 - `map.py`: `stability_map` with regions and audit; `sweep_line` for a single parameter.
-- `comparison.py`: `j1_distributions`, `paired_differences`, `j1_against_weight` of cases.
-- `nominal_cases.py`: `compared_regions` and `compared_responses` of cases at their own values.
-- `advantage.py`: `advantage_cases`, `advantage_front`, `advantage_map` and `advantage_delay` of a
-  weight that follows the bit speed against a constant one.
+- `comparison.py`: `j1_distributions`, `paired_differences`, `j1_against_weight` of cases;
+  `compared_regions` and `compared_responses` of cases at their own values.
+- `following_weight.py`: `weight_delay`, a weight that follows the bit speed against its delay;
+  `advantage_cases`, `advantage_front`, `advantage_map` and `advantage_delay`, the same against a
+  constant weight.
 - `limit_cycle.py`: `limit_cycle`, one period by each method.
 - `three_regions.py`: `three_regions` over the same two parameters.
 - `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
-- `weight_delay.py`: `weight_delay`, a weight that follows the bit speed against its delay.
 - `tune_baselines.py`: `tune_baselines`, tuned gains beside others; `tune_neighbourhood.py`:
   `tune_neighbourhood`, how far they may drift.
 - `uncertain_regions.py`: `uncertain_regions`, `probability_map` and `region_error` of draws.
@@ -30,13 +30,20 @@ figure and never shows it. Nothing here touches the state of pyplot. Axes are in
 the rig floor: rpm, kN, kN m, m.
 """
 
-from drillctl.plots.advantage import (
+from drillctl.plots.comparison import (
+    compared_regions,
+    compared_responses,
+    j1_against_weight,
+    j1_distributions,
+    paired_differences,
+)
+from drillctl.plots.following_weight import (
     advantage_cases,
     advantage_delay,
     advantage_front,
     advantage_map,
+    weight_delay,
 )
-from drillctl.plots.comparison import j1_against_weight, j1_distributions, paired_differences
 from drillctl.plots.friction import friction_curves
 from drillctl.plots.impedance import drive_impedance
 from drillctl.plots.loop_gains import gain_boundary, root_locus
@@ -44,7 +51,6 @@ from drillctl.plots.loop_map import loop_map
 from drillctl.plots.loop_shape import nichols, nyquist, sensitivity
 from drillctl.plots.map import error_estimate, regularisation, stability_map, sweep_line
 from drillctl.plots.modes import bode, mobility, mode_shapes
-from drillctl.plots.nominal_cases import compared_regions, compared_responses
 from drillctl.plots.three_regions import three_regions
 from drillctl.plots.time_response import limit_cycle, time_response
 from drillctl.plots.tune import tune_baselines, tune_neighbourhood
@@ -56,7 +62,6 @@ from drillctl.plots.uncertainty import (
     sensitivity_bars,
     uncertain_regions,
 )
-from drillctl.plots.weight_delay import weight_delay
 
 __all__ = [
     "advantage_cases",

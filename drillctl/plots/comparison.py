@@ -1,17 +1,24 @@
-"""Cases at the same draws: distributions of J1, paired differences, J1 against weight on bit."""
+"""Compared cases: J1 over the draws, paired differences, weight, regions and responses."""
 
 from __future__ import annotations
 
+import math
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.design import parameter
 from drillctl.ensemble.cases import mean_interval
-from drillctl.errors import InputError
+from drillctl.errors import InputError, shown
 from drillctl.plots.style import (
     BLACK,
     COLOURS,
@@ -20,14 +27,21 @@ from drillctl.plots.style import (
     SMALL,
     TITLE,
     axes_or_new,
+    axis_label,
     dress,
-    title_of,
+    grid_or_new,
+    heading,
+    legend_under,
+    origin_of,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    import shapely
 
+    from drillctl.ensemble.grid import Axis
     from drillctl.studies.compare.compute import ComparedCase, Comparison
+
+Array = NDArray[np.float64]
 
 _WORDS = {
     "j1": "J1", "stuck_time": "stuck time", "stick_slip_index": "stick-slip index",
@@ -40,10 +54,17 @@ _WORDS = {
 """Measures as they are spoken of."""
 UNBEATEN = "unbeaten in both"
 """Legend of the cases that no other beats."""
+NO_DRAWS = "Each case at its own values, without draws."
 WIDEST = 110
 """Longest line of a caption (characters)."""
 LEVEL_COLOUR = "#888888"
 """Of the levels of J1: in the background, yet legible."""
+OUTLINES = (3.2, 1.7)
+"""Outline of the first and the last case (points): under a later one an equal one is seen."""
+TRACES = (2.0, 1.1)
+"""Line of the first and the last case, likewise."""
+FILL = 0.10
+"""How much of its colour fills a region: enough to tell inside from outside."""
 
 
 def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
@@ -71,7 +92,7 @@ def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
         ax.step(
             np.concatenate([values[:1], values]), np.concatenate([share[:1] * 0.0, share]),
             where="post",
-            linewidth=LINE, label=label, color=case_colour(number),
+            linewidth=LINE, label=label, color=_colour(number),
             linestyle=DASHES[number % len(DASHES)],
         )  # fmt: skip
     for level in result.levels:
@@ -83,9 +104,10 @@ def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
     ax.set_ylim(0.0, 1.0)
     ax.set_xlim(left=0.0)
     dress(ax, "J1 (s)", "share of draws at or under")
-    ax.set_title(title_of(result), fontsize=TITLE, loc="left", pad=18.0)
-    legend_below(ax, len(result.cases))
-    figure.supxlabel(_caption(result, "Grey: levels of J1 (s)."), fontsize=SMALL)
+    title = heading(result, "Distribution of J1 over the draws")
+    ax.set_title(title, fontsize=TITLE, loc="left", pad=18.0)
+    _legend_below(ax, len(result.cases))
+    figure.supxlabel(_caption(result, _draws(result), "Grey: levels of J1 (s)."), fontsize=SMALL)
     return figure
 
 
@@ -123,16 +145,17 @@ def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
         ax.errorbar(
             points[:, 0], place[known],
             xerr=np.abs(points[:, 1:].T - points[:, 0]), fmt="o", markersize=4.5, capsize=3.0,
-            linewidth=LINE, color=case_colour(number + 1), label=case.name,
+            linewidth=LINE, color=_colour(number + 1), label=case.name,
         )  # fmt: skip
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
     ax.set_yticks(range(len(drawn)), [_WORDS[name] for name in drawn])
     ax.set_ylim(max(len(drawn), 1) - 0.5, -0.5)
-    dress(ax, f"difference from {result.baseline.name!r} (% of its mean)", "", title_of(result))
-    legend_below(ax, len(others))
+    title = heading(result, f"Mean difference from {result.baseline.name!r} at the same draws")
+    dress(ax, "difference (% of its mean)", "", title)
+    _legend_below(ax, len(others))
     lost = f"Zero or undefined in a case: {', '.join(left_out)}." if left_out else ""
     text = "Mean of the differences draw by draw; bars: 95 % bootstrap intervals of that mean."
-    figure.supxlabel(_caption(result, text, lost), fontsize=SMALL)
+    figure.supxlabel(_caption(result, _draws(result), text, lost), fontsize=SMALL)
     return figure
 
 
@@ -165,7 +188,7 @@ def j1_against_weight(
         weight, _ = units.displayed(case.measures["mean_weight_after_start"], "N", system)
         if np.isnan(j1).all():
             continue
-        colour = case_colour(number)
+        colour = _colour(number)
         ax.plot(weight, j1, ".", color=colour, markersize=3.0, alpha=0.35)
         if not shared.any():
             continue
@@ -186,13 +209,115 @@ def j1_against_weight(
         )  # fmt: skip
     _, unit = units.displayed(1.0, "N", system)
     ax.set_ylim(bottom=0.0)
-    dress(ax, f"mean WOB after {result.weight_from:g} s ({unit})", "J1 (s)", title_of(result))
-    legend_below(ax, len(result.cases) + 1)
+    title = heading(result, "J1 against mean weight on bit")
+    dress(ax, f"mean WOB after {result.weight_from:g} s ({unit})", "J1 (s)", title)
+    _legend_below(ax, len(result.cases) + 1)
     count = int(shared.sum())
     which = "the draws" if count == result.realizations else f"the {count} draws defined in all"
     text = f"Large: means over {which} with their 95 % intervals; small: the draws."
     best = "Ringed: no other case has less J1 and more weight on the mean." if rings else ""
-    figure.supxlabel(_caption(result, text, best), fontsize=SMALL)
+    figure.supxlabel(_caption(result, _draws(result), text, best), fontsize=SMALL)
+    return figure
+
+
+def compared_regions(
+    result: Comparison,
+    level: float | None = None,
+    ax: Axes | None = None,
+    system: units.System = "si",
+) -> Figure:
+    """Outlines of {J1 <= level} of every case, over the same two parameters.
+
+    Parameters
+    ----------
+    result : Comparison
+        With at least one case that has a map.
+    level : float, optional
+        Level of J1 (s); by default the lowest of the comparison. Any will do, the maps are kept.
+    ax : Axes, optional
+        Axes to draw on.
+    system : {'si', 'field'}
+        Units of the axes.
+
+    Returns
+    -------
+    Figure
+        With the share of the cells in the legend; a cross where a case is in the map.
+
+    Raises
+    ------
+    InputError
+        No case has a map, or the level is not a positive number.
+    """
+    level = result.levels[0] if level is None else level
+    if not (math.isfinite(level) and level > 0.0):
+        raise InputError(f"a level of J1 is a positive number of seconds, got {shown(level)}")
+    axes = _axes(result)
+    figure, ax = axes_or_new(ax, 8.0, 6.5)
+    x, x_label = axis_label(axes[0], system)
+    y, y_label = axis_label(axes[1], system)
+    scales = np.array([units.displayed(1.0, axis.unit, system)[0] for axis in axes])
+    widths = np.linspace(*OUTLINES, len(result.cases))
+    for number, (case, width) in enumerate(zip(result.cases, widths, strict=True)):
+        _outline(ax, case, level, number, float(width), scales)
+    ax.plot(
+        *zip(*_places(result, axes, scales), strict=True), "X", color=BLACK, markersize=9.0,
+        markeredgewidth=2.0, linestyle="", label="where the cases are", zorder=5,
+    )  # fmt: skip
+    ax.set_xlim(x[0], x[-1])
+    ax.set_ylim(y[0], y[-1])
+    dress(ax, x_label, y_label, heading(result, f"Region of J1 at or under {level:g} s, by case"))
+    _legend_below(ax, 2)
+    figure.supxlabel(_caption(result, NO_DRAWS), fontsize=SMALL)
+    return figure
+
+
+def compared_responses(
+    result: Comparison, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
+    """Bit speed, weight on bit and top torque of every case against time.
+
+    Parameters
+    ----------
+    result : Comparison
+        Any number of cases.
+    ax : sequence of Axes, optional
+        Three, from the top.
+    system : {'si', 'field'}
+        Units of weight and torque.
+
+    Returns
+    -------
+    Figure
+        A panel a signal, a line a case.
+
+    Raises
+    ------
+    InputError
+        Another number of axes than three.
+    """
+    figure, panels = grid_or_new(ax, 3, 1, 9.0, 8.0, share_x=True)
+    signals = (
+        ("bit_speed", "rad/s", "bit speed"), ("weight_on_bit", "N", "WOB"),
+        ("top_torque", "N*m", "top torque"),
+    )  # fmt: skip
+    widths = np.linspace(*TRACES, len(result.cases))
+    for panel, (name, si_unit, words) in zip(panels, signals, strict=True):
+        factor, unit = units.displayed(1.0, si_unit, system)
+        for number, case in enumerate(result.cases):
+            run = case.nominal.response
+            j1 = "J1 undefined" if run.measures.j1 is None else f"J1 {run.measures.j1:.1f} s"
+            panel.plot(
+                run.time, factor * run.signals[name], color=_colour(number),
+                linestyle=DASHES[number % len(DASHES)], linewidth=widths[number],
+                label=f"{case.name} ({j1})",
+            )  # fmt: skip
+        panel.set_xlim(0.0, float(result.baseline.nominal.response.time[-1]))
+        dress(panel, "time (s)" if panel is panels[-1] else "", f"{words} ({unit})")
+    title = heading(result, "Speed, weight on bit and top torque, by case")
+    panels[0].set_title(title, fontsize=TITLE, loc="left")
+    legend_under(panels[-1], 2, drop=0.22)
+    figure.supxlabel(_caption(result, NO_DRAWS), fontsize=SMALL)
     return figure
 
 
@@ -249,28 +374,76 @@ def _unbeaten(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]
     )  # fmt: skip
 
 
-def case_colour(number: int) -> str:
+def _axes(result: Comparison) -> tuple[Axis, ...]:
+    for case in result.cases:
+        if case.nominal.map is not None:
+            return case.nominal.map.axes
+    reasons = "; ".join(f"{case.name}: {case.nominal.no_map}" for case in result.cases)
+    raise InputError(f"no case has a map: {reasons}")
+
+
+def _outline(
+    ax: Axes, case: ComparedCase, level: float, number: int, width: float, scales: Array
+) -> None:
+    found = case.region(level)
+    share = "no map" if found is None else f"{found.area_fraction:.1%} of the cells"
+    colour = _colour(number)
+    parts = [] if found is None or found.polygons is None else found.polygons.geoms
+    rings = [ring * scales for polygon in parts for ring in _rings(polygon)]
+    # An empty region has its entry in the legend too.
+    path = Path.make_compound_path(*map(Path, rings)) if rings else Path(np.empty((0, 2)))
+    ax.add_patch(
+        PathPatch(
+            path, facecolor=to_rgba(colour, FILL), edgecolor=colour, linewidth=width,
+            linestyle=DASHES[number % len(DASHES)], label=f"{case.name} ({share})",
+        )
+    )  # fmt: skip
+
+
+def _rings(polygon: shapely.Polygon) -> list[Array]:
+    """Corners of the border and of the holes, each of shape (corners, 2).
+
+    Border and holes run in opposite senses: what fills a path leaves out a hole by that.
+    """
+    from shapely.geometry.polygon import orient
+
+    turned = orient(polygon)
+    return [np.asarray(ring.coords) for ring in (turned.exterior, *turned.interiors)]
+
+
+def _places(result: Comparison, axes: tuple[Axis, ...], scales: Array) -> list[tuple[float, float]]:
+    """Where the cases stand in the map, each place once; those outside are not seen."""
+    places = []
+    for case in result.cases:
+        if case.nominal.map is not None:
+            own = [parameter(case.nominal.map.design, axis.path).value for axis in axes]
+            x, y = (math.nan if value is None else value for value in own)
+            places.append((x * scales[0], y * scales[1]))
+    return list(dict.fromkeys(places))
+
+
+def _colour(number: int) -> str:
     """Colour of a case by its place; the same in every picture of a comparison."""
     return COLOURS[number % len(COLOURS)]
 
 
-def legend_below(ax: Axes, entries: int) -> None:
+def _legend_below(ax: Axes, entries: int) -> None:
     """Legend under the axes, four entries a row, that of the unbeaten after the cases."""
-    found = zip(*ax.get_legend_handles_labels(), strict=True)
-    handles = [handle for handle, _ in sorted(found, key=lambda pair: pair[1] == UNBEATEN)]
-    ax.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=min(entries, 4),
-        fontsize=SMALL, frameon=False,
-    )  # fmt: skip
+    handles, labels = ax.get_legend_handles_labels()
+    last = [h for h, label in zip(handles, labels, strict=True) if label == UNBEATEN]
+    legend_under(ax, min(entries, 4), [h for h in handles if h not in last] + last, drop=0.13)
+
+
+def _draws(result: Comparison) -> str:
+    return (
+        f"{result.realizations} draws of {', '.join(result.baseline.drawn)}, the same for all "
+        f"cases (seed {result.seed})."
+    )
 
 
 def _caption(result: Comparison, *lines: str) -> str:
-    table = result.design.tables
-    origin = f"String {table.status}. " if table.status == "reconstructed" else ""
+    origin = "String reconstructed. " if origin_of(result) else ""
     equal = "Nominal weights shifted for equal means." if result.equal_mean_weight else ""
-    first = (
-        f"{origin}{result.realizations} draws of {', '.join(result.baseline.drawn)}, the same for "
-        f"all cases (seed {result.seed})."
-    )
-    parts = [part for line in (first, equal, *lines) for part in textwrap.wrap(line, WIDEST)]
-    return "\n".join(parts)
+    first, *rest = lines
+    texts = (f"{origin}{first}", equal, *rest)
+    return "\n".join(part for text in texts for part in textwrap.wrap(text, WIDEST))

@@ -197,6 +197,11 @@ def title_of(result: Any) -> str:
     return title.replace("$", r"\$")
 
 
+def heading(result: Any, what: str) -> str:
+    """Title of a picture that says what it shows, and under that whose it is."""
+    return f"{what}\n{title_of(result)}"
+
+
 def origin_of(result: Any) -> str:
     """What a caption begins with where the string is not the authors' own."""
     return "string reconstructed; " if result.design.tables.status == "reconstructed" else ""

@@ -15,7 +15,7 @@ from matplotlib.patches import PathPatch
 import drillctl
 from drillctl.errors import InputError
 from drillctl.plots import compared_regions, compared_responses
-from drillctl.plots.nominal_cases import _rings
+from drillctl.plots.comparison import _rings
 from drillctl.plots.style import COLOURS
 from drillctl.studies.compare.compute import compare
 from drillctl.units import RPM
@@ -82,7 +82,7 @@ def test_outlines_are_those_of_the_regions(result):
     assert not len(patches[2].get_path().vertices)
     assert ax.get_xlabel() == "Kp (N m s)"
     assert ax.get_ylabel() == "weight on bit (kN)"
-    assert ax.get_title(loc="left") == "A title: J1 <= 15 s"
+    assert ax.get_title(loc="left") == "Region of J1 at or under 15 s, by case\nA title"
     assert ax.get_xlim() == (100.0, 900.0)
     assert ax.get_ylim() == pytest.approx((80.0, 140.0))
 
@@ -97,7 +97,7 @@ def test_outlines_are_told_apart_without_colour(result):
 
 def test_the_lowest_level_unless_told(result):
     ax, _, labels = regions(result)
-    assert "J1 <= 12 s" in ax.get_title(loc="left")
+    assert "under 12 s" in ax.get_title(loc="left")
     assert f"({result.cases[0].region(12.0).area_fraction:.1%} of" in labels[0]
 
 

@@ -166,6 +166,11 @@ class WeightDelay:
         """What the draws follow from."""
         return self.design.tables.uncertainty.seed
 
+    @property
+    def enough(self) -> float:
+        """Share of the draws in which stick-slip must have ended."""
+        return ENOUGH
+
     @cached_property
     def baseline(self) -> DelayedBenefit:
         """The constant weight over all draws; its difference from itself is none."""
