@@ -87,8 +87,8 @@ def weight_delay(
     right.axhline(constant.ended.value, color=BLACK, linewidth=LINE)
     right.axhline(result.enough, color=BLACK, linewidth=0.8, linestyle=":")
     right.annotate(
-        f"{result.enough:.0%}", (1.0, result.enough), xycoords=("axes fraction", "data"), fontsize=SMALL,
-        xytext=(3.0, 0.0), textcoords="offset points", va="center",
+        f"{result.enough:.0%}", (1.0, result.enough), xycoords=("axes fraction", "data"),
+        xytext=(3.0, 0.0), textcoords="offset points", va="center", fontsize=SMALL,
     )  # fmt: skip
     left.set_ylim(bottom=0.0)
     right.set_ylim(-0.03, 1.03)
