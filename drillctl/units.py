@@ -64,6 +64,38 @@ TORQUE_RATE = Kind("torque rate", "N*m/s", ("kN*m/s", "N*m/s"))
 FORCE_RATE = Kind("force rate", "N/s", ("kN/s", "N/s"))
 INTEGRAL_GAIN = Kind("gain", "N*m/rad", ("N*m/rad",))
 
+# What the common units are in SI, as pint has it to the bit: pint takes half a second to start, and
+# is asked for the others alone.
+_KNOWN: dict[str, dict[str, float]] = {
+    "rad/s": {
+        "rpm": 0.10471975511965977, "rev/min": 0.10471975511965977, "rad/s": 1.0,
+        "deg/s": 0.017453292519943295,
+    },
+    "N": {
+        "N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605005, "klbf": 4448.221615260501,
+        "tf": 9806.65,
+    },
+    "N*m": {
+        "N*m": 1.0, "kN*m": 1e3, "lbf*ft": 1.3558179483314006, "klbf*ft": 1355.8179483314004,
+    },
+    "m": {
+        "m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1e3, "in": 0.0254, "ft": 0.30479999999999996,
+    },
+    "s": {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0},
+    "1/s": {"1/s": 1.0},
+    "kg*m^2": {"kg*m^2": 1.0},
+    "kg/m^3": {"kg/m^3": 1.0},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": 6894.7572931683635},
+    "m^4": {"m^4": 1.0, "in^4": 4.1623142559999997e-07},
+    "N*m/rad": {"N*m/rad": 1.0},
+    "N*m*s/rad": {"N*m*s/rad": 1.0},
+    "N*s/rad": {"N*s/rad": 1.0, "kN*s/rad": 1e3},
+    "s/rad": {"s/rad": 1.0},
+    "W": {"W": 1.0, "kW": 1e3, "MW": 1e6, "hp": 745.6998715822701},
+    "N*m/s": {"N*m/s": 1.0, "kN*m/s": 1e3},
+    "N/s": {"N/s": 1.0, "kN/s": 1e3},
+}  # fmt: skip
+
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _TEXT = re.compile(
     r"^\s*(?:(?:(?P<whole>[-+]?\d+)[\s-]+)?(?P<over>\d+)\s*/\s*(?P<under>\d+)"
@@ -86,11 +118,16 @@ def registry() -> Any:
 
 @functools.lru_cache(maxsize=512)
 def _factor(unit: str, kind: Kind) -> float:
-    """SI value of one `unit`, refused with the reason if it does not measure `kind`."""
-    import pint
-
+    """SI value of one `unit`, refused (`InputError`) if it does not measure `kind`."""
     if kind is SPEED and unit not in SPEED.examples:
         raise InputError(f"a speed is given in {_join(SPEED.examples)}, not in {unit!r}")
+    known = _KNOWN[kind.si].get(unit)
+    return _by_pint(unit, kind) if known is None else known
+
+
+def _by_pint(unit: str, kind: Kind) -> float:
+    import pint
+
     units = registry()
     try:
         measure = units.Quantity(1.0, _POWER.sub(r"\1^\2", unit))
@@ -252,5 +289,4 @@ def displayed(value: Any, si_unit: str, system: System = "si") -> tuple[Any, str
     unit, name = _DISPLAY[system].get(si_unit, (si_unit, si_unit))
     if unit == si_unit:
         return value, name
-    factor = float(registry().Quantity(1.0, unit).to(si_unit).magnitude)
-    return value / factor, name
+    return value / _KNOWN[si_unit][unit], name

@@ -176,3 +176,8 @@ def test_the_parser_of_docstrings_sees_what_is_there():
     assert section(text, "Parameters") == ["a", "b", "rest"]
     assert section(text, "Returns") == ["c"]
     assert section(text, "Raises") is None
+
+
+def test_a_design_is_loaded_without_heavy_packages():
+    light = {"numpy", "pydantic"}
+    assert set(loaded_by("import drillctl; drillctl.load('monteiro-trindade-140kn')")) <= light

@@ -211,3 +211,11 @@ def test_numbers_are_shown_in_the_units_people_read(si_unit, system, per_unit, n
     shown, unit = units.displayed(values, si_unit, system)
     np.testing.assert_allclose(shown, values / per_unit, rtol=1e-12)
     assert unit == name
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.si)
+def test_common_units_are_known_without_pint_and_as_pint_has_them(kind):
+    known = units._KNOWN[kind.si]
+    assert {*kind.examples, kind.si} <= set(known)
+    for unit, factor in known.items():
+        assert math.isclose(factor, units._by_pint(unit, kind), rel_tol=2.3e-16)
