@@ -1,5 +1,6 @@
-"""How tests share workers; figures that they measure, noted for docs/make_verification.py."""
+"""How tests share workers and kernels; figures they measure, for docs/make_verification.py."""
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -8,17 +9,51 @@ import pytest
 NOTED = pytest.StashKey[list]()
 
 
+# Files that take longest, and rooms whose fixtures are made once: begun first, so that the workers
+# end together.
+LONG = ("tests/reporting",)
+
+
+def part(nodeid):
+    """What goes to one worker as a whole: a file, or all of the reports."""
+    file = nodeid.split("::", 1)[0]
+    return "tests/reporting" if file.startswith("tests/reporting/") else file
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """A file to one worker, and all of the reports to one: fixtures are made once."""
     from xdist.scheduler import LoadFileScheduling
 
-    class ByFixture(LoadFileScheduling):
-        def _split_scope(self, nodeid):
-            file = super()._split_scope(nodeid)
-            return "tests/reporting" if file.startswith("tests/reporting/") else file
+    class ByPart(LoadFileScheduling):
+        _split_scope = staticmethod(part)
 
-    return ByFixture(config, log)
+    config.option.loadscopereorder = False  # by number of tests
+    return ByPart(config, log)
+
+
+def pytest_collection_modifyitems(items):
+    rank = {name: place for place, name in enumerate(LONG)}
+    items.sort(key=lambda item: rank.get(part(item.nodeid), len(LONG)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _kernels_are_compiled_once(tmp_path_factory, worker_id):
+    """The second of two workers that need a kernel waits for the first, and reads it from disk."""
+    if worker_id == "master":
+        return
+    from fcntl import LOCK_EX, flock
+
+    from drillctl.simulation.kernels.advance import run
+
+    shared, compiled = tmp_path_factory.getbasetemp().parent, run.compile
+
+    def compile_alone(signature):
+        laws = hashlib.sha256(str(signature).encode()).hexdigest()
+        with (shared / f"kernel-{laws[:16]}").open("w") as lock:
+            flock(lock, LOCK_EX)
+            return compiled(signature)
+
+    run.compile = compile_alone
 
 
 def pytest_addoption(parser):
