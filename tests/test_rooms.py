@@ -27,7 +27,7 @@ UPWARD = {
     ("store", "simulation"),
     ("store", "studies"),
 }
-CIRCLES = {"linear"}  # rooms that hold one
+CIRCLES = {"linear", "store"}  # rooms that hold one
 LEAVING = ("printing",)  # folders that are no room
 STRAY = {"machine"}  # modules beside the rooms that are not of the ground
 
