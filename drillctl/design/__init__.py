@@ -1,15 +1,13 @@
 """Design files: TOML text in, a validated frozen `Design` out, and back.
 
-- `tables.py`: every key a design may hold, with its unit and range; the larger tables have files
-  of their own: `bit_rock_tables.py`, `controller_tables.py`, `weight_tables.py`,
-  `scenario_tables.py`, `uncertain_tables.py`, `compare_tables.py`, `delay_tables.py`;
-  `base.py`: what every table is.
-- `quantities.py`: the field types those tables use.
+- `tables.py`: every key a design may hold, with its unit and range; uncertain parameters and draws
+  in `uncertain_tables.py`; those of a law stand beside the law, those of a study beside the study.
 - `merging.py`: a design laid over its model; single values set by path.
 - `validation.py`: errors in the user's words.
-- `parts.py`, `drive.py`, `weight.py`: the physical parts that the tables describe.
+- `parts.py`: the physical parts and laws that the tables describe.
 - `design.py`: the `Design` itself.
-- `reading.py`, `writing.py`, `paths.py`: files in, files out, values by dotted path.
+- `reading.py`, `paths.py`: files in, files out, values by dotted path; `starter.py`: a file to
+  begin with.
 """
 
 from drillctl.design.design import Design

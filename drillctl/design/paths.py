@@ -10,14 +10,14 @@ from pydantic import BeforeValidator
 
 from drillctl import units
 from drillctl.design.design import Design
-from drillctl.design.tables import Table
+from drillctl.design.tables import Table, settings_of_studies
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig.table import number
 from drillctl.units import Kind
 
 _HIDDEN = (
     "title", "source", "status", "notes", "schema_version", "map", "uncertain", "uncertainty",
-    "compare", "weight_delay", "tune", "advantage",
+    *settings_of_studies(),
 )  # fmt: skip
 
 

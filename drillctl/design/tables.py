@@ -6,18 +6,20 @@ the class that holds both.
 
 from __future__ import annotations
 
+from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, create_model, field_validator, model_validator
 
-from drillctl import units
-from drillctl.design.advantage_tables import AdvantageTable
-from drillctl.design.axis_table import AxisTable as AxisTable
-from drillctl.design.compare_tables import CompareTable
-from drillctl.design.delay_tables import WeightDelayTable
-from drillctl.design.scenario_tables import ScenarioTable
-from drillctl.design.tune_tables import TuneTable
-from drillctl.design.uncertain_tables import DistributionTable, UncertaintyTable, flattened
+from drillctl import registry, units
+from drillctl.design.study_tables import AdvantageTable, CompareTable, TuneTable, WeightDelayTable
+from drillctl.design.uncertain_tables import (
+    AxisTable,
+    DistributionTable,
+    UncertaintyTable,
+    flattened,
+)
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig import table as q
 from drillctl.rig.bit_rock.law import friction_laws
@@ -192,6 +194,54 @@ class StartTable(Table):
         return self
 
 
+def _refuse_backwards(begin: float, end: float) -> None:
+    if end < begin:
+        raise InputError(f"end {end:g} s must not come before begin {begin:g} s")
+
+
+class SpeedProgramTable(Table):
+    """Set speed: `start` up to `begin`, the operating speed from `end` on, straight between."""
+
+    start: q.Speed | None = None
+    begin: q.TimeOrZero = 0.0
+    end: q.TimeOrZero = 0.0
+
+    @model_validator(mode="after")
+    def _in_order(self) -> SpeedProgramTable:
+        _refuse_backwards(self.begin, self.end)
+        return self
+
+
+class WeightProgramTable(Table):
+    """Nominal weight: `start` up to `begin`, that of the operating point from `end` on."""
+
+    start: q.Weight | None = None
+    begin: q.TimeOrZero = 0.0
+    end: q.TimeOrZero = 0.0
+
+    @model_validator(mode="after")
+    def _in_order(self) -> WeightProgramTable:
+        _refuse_backwards(self.begin, self.end)
+        return self
+
+
+class RockProgramTable(Table):
+    """Rock: torques and decay times these factors before the time `until`."""
+
+    until: q.TimeOrZero = 0.0
+    static_factor: q.PositiveNumber = 1.0
+    sliding_factor: q.PositiveNumber = 1.0
+    decay_factor: q.PositiveNumber = 1.0
+
+
+class ScenarioTable(Table):
+    """What was before: the design's own values are those that a run ends with."""
+
+    speed: SpeedProgramTable = SpeedProgramTable()
+    weight_on_bit: WeightProgramTable = WeightProgramTable()
+    bit_rock: RockProgramTable = RockProgramTable()
+
+
 class SimulationTable(Table):
     """How long and how finely to simulate."""
 
@@ -245,8 +295,8 @@ class MapTable(Table):
         return axes
 
 
-class DesignTables(Table):
-    """A whole design file after it was merged over its model."""
+class OwnTables(Table):
+    """A whole design file, but for the tables of studies."""
 
     schema_version: Literal[1] = Field(default=1, alias="schema")
     title: str = ""
@@ -266,10 +316,6 @@ class DesignTables(Table):
     map: MapTable = MapTable()
     uncertain: dict[str, DistributionTable] = Field(default_factory=dict)
     uncertainty: UncertaintyTable = UncertaintyTable()
-    compare: CompareTable = CompareTable()
-    weight_delay: WeightDelayTable = WeightDelayTable()
-    tune: TuneTable = TuneTable()
-    advantage: AdvantageTable = AdvantageTable()
 
     @field_validator("uncertain", mode="before")
     @classmethod
@@ -286,3 +332,35 @@ class DesignTables(Table):
                     f"schema = {shown(came)} is not known; this version reads schema = 1"
                 )
         return data
+
+
+def settings_of_studies() -> dict[str, type[Table]]:
+    """Tables of the studies by key: `KEY` and `Settings` of the `settings.py` beside each."""
+    found: dict[str, type[Table]] = {
+        "compare": CompareTable,
+        "weight_delay": WeightDelayTable,
+        "tune": TuneTable,
+        "advantage": AdvantageTable,
+    }
+    for study in registry.STUDIES:
+        if find_spec(f"{study}.settings") is not None:
+            settings = import_module(f"{study}.settings")
+            found[settings.KEY] = settings.Settings
+    return found
+
+
+if TYPE_CHECKING:
+
+    class DesignTables(OwnTables):
+        """A whole design file after it was merged over its model."""
+
+        def __getattr__(self, name: str) -> Any: ...
+
+else:
+    DesignTables = create_model(
+        "DesignTables",
+        __base__=OwnTables,
+        __module__=__name__,
+        __doc__="A whole design file after it was merged over its model.",
+        **{key: (table, table()) for key, table in settings_of_studies().items()},
+    )

@@ -15,7 +15,6 @@ from typing import Any, Literal
 
 from pydantic import field_validator, model_validator
 
-from drillctl.design.axis_table import AxisTable
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig import table as q
 from drillctl.rig.table import Table, number_or_quantity
@@ -40,6 +39,27 @@ _NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
 """Those of them that have no default: one of these ways."""
 FEWEST_REPLICATES = 8
 """Of randomised quasi-Monte Carlo: fewer make intervals from their scatter mean little."""
+
+
+class AxisTable(Table):
+    """One axis of a map; `min` and `max` as they would be written at `path`."""
+
+    path: str
+    min: float | str
+    max: float | str
+    points: q.Count
+
+    @field_validator("min", "max", mode="before")
+    @classmethod
+    def _number_or_quantity(cls, value: object) -> object:
+        return number_or_quantity(value)
+
+    @field_validator("points")
+    @classmethod
+    def _two_or_more(cls, value: int) -> int:
+        if value < 2:
+            raise InputError(f"an axis needs 2 points or more, got {value}")
+        return value
 
 
 class DistributionTable(Table):

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design, parameter
-from drillctl.design.advantage_tables import GAIN, REAL_PATH
-from drillctl.design.delay_tables import LAW
+from drillctl.design.study_tables import GAIN, LAW, REAL_PATH
 from drillctl.design.validation import validated
 from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.errors import InputError

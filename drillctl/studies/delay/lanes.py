@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
-from drillctl.design.delay_tables import VARIED
+from drillctl.design.study_tables import VARIED
 from drillctl.ensemble.cases import Runs, joined
 from drillctl.ensemble.draws import DrawnGroup, DrawnLanes, drawn_lanes, run_draws
 from drillctl.ensemble.parameters import Draws, uncertain_parameters

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.design.tune_tables import TuneConstraintsTable
+from drillctl.design.study_tables import TuneConstraintsTable
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import tolerated_slope

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.design.tune_tables import TuneTable
+from drillctl.design.study_tables import TuneTable
 from drillctl.linear.operating_point import at_speed
 
 Array = NDArray[np.float64]

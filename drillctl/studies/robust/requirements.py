@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.design.tune_tables import TuneConstraintsTable
+from drillctl.design.study_tables import TuneConstraintsTable
 from drillctl.linear.ends import BitSide
 from drillctl.linear.loop_analysis import ROUNDING
 from drillctl.linear.loop_margins import pole_grid

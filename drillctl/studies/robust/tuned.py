@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design, parameter
-from drillctl.design.tune_tables import RangeTable
+from drillctl.design.study_tables import RangeTable
 from drillctl.errors import InputError, nearest
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive.law import StringNumbers, drive_laws, tracking

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import drillctl
-from drillctl.design.tune_tables import TuneConstraintsTable
+from drillctl.design.study_tables import TuneConstraintsTable
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
 from drillctl.linear.slope_margin import slope_margins

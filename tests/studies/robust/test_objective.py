@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import drillctl
-from drillctl.design.tune_tables import TuneTable
+from drillctl.design.study_tables import TuneTable
 from drillctl.studies.robust.objective import (
     PRICE,
     Objective,
