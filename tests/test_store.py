@@ -11,6 +11,7 @@ import pytest
 import xarray
 
 import drillctl
+from drillctl.ensemble.storing import Folder
 from drillctl.errors import InputError
 from drillctl.store import claim, identity, save
 from drillctl.studies import Axis, sweep
@@ -184,7 +185,7 @@ def test_nothing_is_pickled_and_nothing_is_left_half_written(result, tmp_path):
 
 def test_blocks_hold_no_pickle(design, tmp_path):
     folder = claim("map", design, tmp_path / "run")
-    sweep(design, blocks=folder.blocks())
+    sweep(design, store=Folder(folder.path))
     held = sorted(path.name for path in (tmp_path / "run/blocks").iterdir())
     assert held == ["000000.npz", "string-000000.npz"]
     for name in held:
@@ -194,12 +195,12 @@ def test_blocks_hold_no_pickle(design, tmp_path):
 
 def test_kept_strings_and_blocks_give_the_same_bits(design, result, tmp_path, monkeypatch):
     folder = claim("map", design, tmp_path / "run")
-    same_sweep(sweep(design, blocks=folder.blocks()), result)
+    same_sweep(sweep(design, store=Folder(folder.path)), result)
     (tmp_path / "run/blocks/000000.npz").unlink()
     monkeypatch.setattr("drillctl.ensemble.sweeps.prepare", pytest.fail)  # the string is kept
-    same_sweep(sweep(design, blocks=folder.blocks()), result)
-    monkeypatch.setattr("drillctl.ensemble.sweeps.run_batch", pytest.fail)  # and so is the block
-    same_sweep(sweep(design, blocks=folder.blocks()), result)
+    same_sweep(sweep(design, store=Folder(folder.path)), result)
+    monkeypatch.setattr("drillctl.ensemble.running.run_batch", pytest.fail)  # and so is the block
+    same_sweep(sweep(design, store=Folder(folder.path)), result)
 
 
 def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
@@ -302,7 +303,7 @@ def test_discard_takes_back_only_its_own(design, tmp_path):
     folder.discard()
     assert [path.name for path in (tmp_path / "old").iterdir()] == ["notes.txt"]
     folder = claim("map", design, tmp_path / "worked")
-    sweep(design, blocks=folder.blocks())
+    sweep(design, store=Folder(folder.path))
     folder.discard()
     assert (tmp_path / "worked/blocks/000000.npz").is_file()
 

@@ -43,6 +43,7 @@ def stability_map(
 def _full_map(design: Design, measures: list[str] | None, options: Options) -> None:
     """A sweep with its map, regions, audit and responses."""
     from drillctl import plots, printing, store, studies
+    from drillctl.ensemble.storing import Folder
     from drillctl.ensemble.sweeps import kept_measures
     from drillctl.store.kinds.maps import asked_measures
 
@@ -56,7 +57,7 @@ def _full_map(design: Design, measures: list[str] | None, options: Options) -> N
     ):
         return
     with running.guarded(folder), console.progress() as bar:
-        result = studies.sweep(design, progress=bar, blocks=folder.blocks(), measures=kept)
+        result = studies.sweep(design, progress=bar, store=Folder(folder.path), measures=kept)
     if result.minimum is None:
         console.note("warning: no cell gives a finite answer; see the statuses")
     store.write_data(result, folder.path)

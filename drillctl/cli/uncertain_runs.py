@@ -44,11 +44,11 @@ def computed(
 ) -> Uncertainty:
     """The result of a run in its folder."""
     from drillctl import studies
-    from drillctl.studies.uncertainty.cluster import Cluster, connect
+    from drillctl.ensemble.cluster import Cluster, connect
+    from drillctl.ensemble.storing import Folder
 
-    shelf = folder.shelf()
     interim = None if how.interim is None else _Interim(how.interim, folder.path, system)
-    given: dict[str, Any] = {"progress": bar, "shelf": shelf, "interim": interim}
+    given: dict[str, Any] = {"progress": bar, "store": Folder(folder.path), "interim": interim}
     if how.scheduler is None:
         result = studies.uncertainty(design, **given)
     else:

@@ -19,11 +19,12 @@ from drillctl.design import Design
 from drillctl.ensemble.cases import Runs, resampled_draws
 from drillctl.ensemble.grid import SHARED
 from drillctl.ensemble.parameters import Draws, draw
+from drillctl.ensemble.running import measured
 from drillctl.errors import InputError
 from drillctl.rig.weight_on_bit import AlarmWeight, ConstantWeight
-from drillctl.simulation.batch import FLOATS, Prepared, prepare, run_batch
+from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
-from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,15 +132,17 @@ def start_up(duration: float) -> float:
 
 def run_draws(drawn: DrawnLanes, count: int, shift: float = 0.0) -> Runs:
     """Simulate a design at every draw with the batch engine."""
-    measures = {name: np.full(count, np.nan) for name in (*FLOATS, "mean_weight_after_start")}
+    measures = {
+        name: np.full(count, np.nan) for name in (*BATCH_MEASURES, "mean_weight_after_start")
+    }
     status = np.full(count, STATUSES.index("failed"), dtype=np.int8)
     schemes = set()
     for group in drawn.groups:
         lanes = shifted(group.lanes, shift)
         prepared = prepare(lanes, group.design.tables.simulation)
-        batch = run_batch(lanes, prepared)
+        batch = measured(lanes, prepared)
         schemes.add((prepared.scheme.step, prepared.scheme.modes))
-        for name in FLOATS:
+        for name in BATCH_MEASURES:
             measures[name][group.numbers] = batch.measures[name]
         whole = batch.measures["mean_weight_on_bit"]
         measures["mean_weight_after_start"][group.numbers] = _after_start(lanes, prepared, whole)
@@ -160,7 +163,7 @@ def _after_start(lanes: Lanes, prepared: Prepared, whole: Array) -> Array:
         return whole
     time = steps * scheme.step
     beginning = Prepared(prepared.stepper, replace(scheme, steps=steps), time, 0.0)
-    before = run_batch(lanes, beginning).measures["mean_weight_on_bit"]
+    before = measured(lanes, beginning, ("mean_weight_on_bit",)).measures["mean_weight_on_bit"]
     late: Array = (whole * prepared.duration - before * time) / (prepared.duration - time)
     return late
 

@@ -27,8 +27,8 @@ from drillctl.design import Design, parameter
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
 from drillctl.rig.top_drive.law import tracking
-from drillctl.simulation.batch import FLOATS
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
+from drillctl.simulation.measures import BATCH_MEASURES
 from drillctl.store.result import label
 
 Array = NDArray[np.float64]
@@ -86,39 +86,30 @@ SEARCHED = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """The cells of a grid that share a string and the types of their laws."""
-
-    design: Design  # with the values of the axes that all of the cells share
-    axes: tuple[Axis, ...]  # the other axes, over which the cells run
-    # where the part begins along each axis of the whole grid, and how far it goes
-    begins: tuple[int, ...]
-    shape: tuple[int, ...]
-    whole: tuple[int, ...]  # shape of the whole grid
-
-    def at(self, corner: int) -> Design:
-        """The design of the first cell (0) or of the last (-1)."""
-        values = {a.path: a.values[corner] for a in self.axes}
-        return replaced(self.design, values) if values else self.design
-
-    @cached_property
-    def cells(self) -> Index:
-        """Index of each cell in the flattened grid, shape (cells,)."""
-        every = np.arange(np.prod(self.whole, dtype=int)).reshape(self.whole)
-        ends = zip(self.begins, self.shape, strict=True)
-        return every[tuple(slice(begin, begin + n) for begin, n in ends)].ravel()
-
-
-@dataclass(frozen=True, eq=False)
 class Group:
     """The cells of a grid that share a string and the types of their laws."""
 
-    design: Design  # of the first cell
-    numbers: NumberGrid  # lane numbers over the axes that the lanes do not share
+    base: Design  # with the values of the axes that all of the cells share
+    axes: tuple[Axis, ...]  # the other axes, over which the cells run
     # where the group begins along each axis of the whole grid, and how far it goes
     begins: tuple[int, ...]
     shape: tuple[int, ...]
     whole: tuple[int, ...]  # shape of the whole grid
+
+    @cached_property
+    def design(self) -> Design:
+        """The design of the first cell."""
+        return self.at(0)
+
+    @cached_property
+    def numbers(self) -> NumberGrid:
+        """Lane numbers over the axes that the lanes do not share."""
+        return _numbers(self.base, self.axes)
+
+    def at(self, corner: int) -> Design:
+        """The design of the first cell (0) or of the last (-1)."""
+        values = {a.path: a.values[corner] for a in self.axes}
+        return replaced(self.base, values) if values else self.base
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -191,7 +182,7 @@ def axis(design: Design, table: AxisTable) -> Axis:
 
 
 def axes_of(
-    design: Design, tables: tuple[AxisTable, ...], kept: int = len(FLOATS)
+    design: Design, tables: tuple[AxisTable, ...], kept: int = len(BATCH_MEASURES)
 ) -> tuple[Axis, ...]:
     """All axes of a grid; see `axis`. `kept`: how many measures are kept of each cell."""
     refuse_too_large([table.points for table in tables], kept=kept)
@@ -203,23 +194,28 @@ def shape_of(axes: tuple[Axis, ...]) -> tuple[int, ...]:
     return tuple(len(a) for a in axes)
 
 
-def parts(design: Design, axes: tuple[Axis, ...]) -> Iterator[Part]:
-    """The cells of a grid, string by string and kind by kind."""
+def divisions(design: Design, axes: tuple[Axis, ...]) -> list[tuple[slice, ...]]:
+    """How a grid falls into groups: the piece of each axis that every group takes."""
     slices = [_singly(a) if a.shared else _by_kind(design, axes, a) for a in axes]
-    for chosen in itertools.product(*slices):
-        pairs = list(zip(axes, chosen, strict=True))
-        variant = replaced(design, {a.path: a.values[p.start] for a, p in pairs if a.shared})
-        own = tuple(Axis(a.path, a.unit, a.values[p]) for a, p in pairs if not a.shared)
-        begins = tuple(part.start for part in chosen)
-        shape = tuple(part.stop - part.start for part in chosen)
-        yield Part(variant, own, begins, shape, shape_of(axes))
+    return list(itertools.product(*slices))
+
+
+def group_of(design: Design, axes: tuple[Axis, ...], pieces: tuple[slice, ...]) -> Group:
+    """One of the groups of a grid; its string is assembled when it is first asked for."""
+    pairs = list(zip(axes, pieces, strict=True))
+    base = replaced(design, {a.path: a.values[p.start] for a, p in pairs if a.shared})
+    own = tuple(Axis(a.path, a.unit, a.values[p]) for a, p in pairs if not a.shared)
+    begins = tuple(piece.start for piece in pieces)
+    shape = tuple(piece.stop - piece.start for piece in pieces)
+    found = Group(base, own, begins, shape, shape_of(axes))
+    _ = found.numbers  # impossible cells are refused here, not when lanes are made
+    return found
 
 
 def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
-    """The cells of a grid, group by group; the string is assembled once a group."""
-    for part in parts(design, axes):
-        numbers = _numbers(part.design, part.axes)
-        yield Group(part.at(0), numbers, part.begins, part.shape, part.whole)
+    """The cells of a grid, group by group."""
+    for pieces in divisions(design, axes):
+        yield group_of(design, axes, pieces)
 
 
 def _singly(a: Axis) -> list[slice]:
@@ -385,7 +381,7 @@ MEMORY_SHARE = 0.5
 
 
 def refuse_too_large(
-    points: Sequence[int], where: str = "map.axes", kept: int = len(FLOATS)
+    points: Sequence[int], where: str = "map.axes", kept: int = len(BATCH_MEASURES)
 ) -> None:
     """Refuse (`InputError`) a grid of so many points along its axes, if memory falls short."""
     cells = math.prod(points)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,14 +15,32 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.ensemble import audit as auditing
-from drillctl.ensemble.blocks import Blocks, KeepNothing
-from drillctl.ensemble.grid import Axis, axes_of, groups, refuse_too_large, shape_of
+from drillctl.ensemble.grid import (
+    Axis,
+    Group,
+    axes_of,
+    divisions,
+    group_of,
+    refuse_too_large,
+    shape_of,
+)
 from drillctl.ensemble.regions import Region, region
+from drillctl.ensemble.running import (
+    Block,
+    Pieces,
+    Strings,
+    Workers,
+    load_kernel,
+    measured,
+    pieces,
+    run,
+)
+from drillctl.ensemble.storing import Memory, Store
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
-from drillctl.simulation.batch import CHUNK, FLOATS, Batch, prepare, run_batch, warm_up
-from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.batch import CHUNK, Prepared, prepare
+from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,15 +48,6 @@ if TYPE_CHECKING:
     import xarray
 
 Array = NDArray[np.float64]
-
-UNITS = {
-    "j1": "s", "j1_rate": "1", "stuck_time": "s", "sticks": "1", "stick_slip_index": "1",
-    "mean_bit_speed": "rad/s", "min_bit_speed": "rad/s", "peak_bit_speed": "rad/s",
-    "peak_pipe_torque": "N*m", "peak_top_torque": "N*m", "settling_time": "s",
-    "settling_time_wide": "s", "mean_weight_on_bit": "N", "rop_proxy": "1",
-    "work_at_bit": "J", "work_per_turn": "J", "time_outside_table": "s",
-}  # fmt: skip
-"""SI unit of each measure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +63,7 @@ class Sweep:
     levels : tuple of float
         Levels of J1 (s).
     measures : dict of ndarray, shape of the grid
-        By the names of `simulation.batch.FLOATS`, those that were kept; NaN where undefined.
+        Those that were kept, by the names of `simulation.measures.MEASURES`; NaN where undefined.
     status : ndarray of int8, shape of the grid
         Index into `simulation.measures.STATUSES`.
     audit : Audit
@@ -104,7 +115,8 @@ class Sweep:
         paths = [a.path for a in self.axes]
         coordinates = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
         variables: dict[str, Any] = {
-            name: (paths, values, {"units": UNITS[name]}) for name, values in self.measures.items()
+            name: (paths, values, {"units": MEASURES[name].unit})
+            for name, values in self.measures.items()
         }
         flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
         variables["status"] = (paths, self.status, flags)
@@ -150,8 +162,9 @@ def sweep(
     axes: tuple[Axis, ...] | None = None,
     audit_cells: int | None = None,
     progress: Progress = SILENT,
-    blocks: Blocks | None = None,
+    store: Store | None = None,
     measures: Sequence[str] | None = None,
+    workers: Workers | None = None,
 ) -> Sweep:
     """Simulate a design over a grid of its parameters with the batch engine.
 
@@ -167,11 +180,13 @@ def sweep(
         Instead of the design's own; 0 for no audit.
     progress : Progress
         Told of blocks and audited cells.
-    blocks : Blocks, optional
-        Where finished blocks are kept and found again.
+    store : Store, optional
+        Where finished blocks are stored, for a run that resumes; in memory by default.
     measures : sequence of str, optional
-        Measures to keep of each cell, by the names of `simulation.batch.FLOATS`; J1 and the
-        status always are. All by default.
+        Measures to keep of each cell, by the names of `simulation.measures.MEASURES`; J1 and
+        the status always are. All by default.
+    workers : Workers, optional
+        Who computes blocks; the threads of this process by default.
 
     Returns
     -------
@@ -188,34 +203,37 @@ def sweep(
     table, kept = design.tables.map, kept_measures(measures)
     axes = axes_of(design, table.axes, len(kept)) if axes is None else axes
     refuse_too_large(shape_of(axes), kept=len(kept))
-    collected = _Collected(axes, kept)
-    collected.run(design, progress, blocks or KeepNothing())
+    job = Cells(design, axes, kept)
+    blocks = (store or Memory()).blocks("map", job)
+    progress.begin("loading kernels", 1)
+    cells = math.prod(shape_of(axes))
+    times = run(job.prepared(blocks.prepared), cells, blocks, workers, progress)
+    found, status = blocks.read(cells)
+    found, status = {name: job.over_grid(v) for name, v in found.items()}, job.over_grid(status)
     count = table.audit_cells if audit_cells is None else audit_cells
-    audited = auditing.audit(design, axes, collected.measures["j1"], table.levels, count, progress)
-    shape = shape_of(axes)
-    step, modes = collected.scheme
+    step, modes = next(iter(blocks.schemes)) if len(blocks.schemes) == 1 else (None, None)
     return Sweep(
         design=design,
         axes=axes,
         levels=table.levels,
-        measures={name: values.reshape(shape) for name, values in collected.measures.items()},
-        status=collected.status.reshape(shape),
-        audit=audited,
+        measures=found,
+        status=status,
+        audit=auditing.audit(design, axes, found["j1"], table.levels, count, progress),
         step=step,
         modes=modes,
-        seconds=collected.seconds,
+        seconds=times.lanes,
         total_seconds=time.perf_counter() - begin,
     )
 
 
 def kept_measures(asked: Sequence[str] | None) -> tuple[str, ...]:
-    """Names of the measures to keep, in the order of `FLOATS`; all if none are asked for."""
+    """Names of the measures to keep, in the order of the table; all if none are requested."""
     if asked is None:
-        return FLOATS
+        return BATCH_MEASURES
     for name in asked:
-        if name not in FLOATS:
-            raise InputError(f"no measure {name!r}; {nearest(name, FLOATS)}", "measures")
-    return tuple(name for name in FLOATS if name == "j1" or name in asked)
+        if name not in BATCH_MEASURES:
+            raise InputError(f"no measure {name!r}; {nearest(name, BATCH_MEASURES)}", "measures")
+    return tuple(name for name in BATCH_MEASURES if name == "j1" or name in asked)
 
 
 def stability_map(design: Design, **options: Any) -> Sweep:
@@ -240,51 +258,74 @@ def stability_map(design: Design, **options: Any) -> Sweep:
     return sweep(design, axes, **options)
 
 
-class _Collected:
-    """Measures of the cells as blocks of them are finished."""
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of a grid, one a row, group by group: lanes are made, run and forgotten by blocks."""
 
-    def __init__(self, axes: tuple[Axis, ...], kept: tuple[str, ...]) -> None:
-        self.axes = axes
-        cells = int(np.prod(shape_of(axes), dtype=int))
-        self.measures = {name: np.full(cells, np.nan) for name in kept}
-        self.status = np.full(cells, STATUSES.index("failed"), dtype=np.int8)
-        self.schemes: set[tuple[float, int]] = set()
-        self.seconds = 0.0
+    design: Design
+    axes: tuple[Axis, ...]
+    measures: tuple[str, ...]  # what is kept of a cell, J1 first
+    strings: Strings | None = None  # gives strings in this process; workers prepare their own
 
-    def run(self, design: Design, progress: Progress, blocks: Blocks) -> None:
-        number = done = 0
-        warm: set[type] = set()
-        for index, group in enumerate(groups(design, self.axes)):
-            table, lanes = group.design.tables.simulation, group.telling
-            prepared = blocks.prepared(index, partial(prepare, lanes, table))
-            self.schemes.add((prepared.scheme.step, prepared.scheme.modes))
-            kind = type(prepared.stepper.string)
-            if kind not in warm:  # a string of another kind takes another kernel
-                warm.add(kind)
-                progress.begin("loading kernels", 1)
-                warm_up(lanes, prepared)
-                progress.begin("simulating lanes", len(self.status))
-                progress.advance(done)
-            for first in range(0, len(group), CHUNK):
-                part = np.arange(first, min(first + CHUNK, len(group)))
-                batch = blocks.find(number)
-                if batch is None:
-                    lanes = group.some(part)
-                    begin = time.perf_counter()
-                    batch = run_batch(lanes, prepared)
-                    self.seconds += time.perf_counter() - begin
-                    blocks.keep(number, batch)
-                self._put(group.cells_of(part), batch)
-                progress.advance(len(batch.status))
-                done += len(batch.status)
-                number += 1
+    width = 1
 
-    @property
-    def scheme(self) -> tuple[float, int] | tuple[None, None]:
-        """Step and modes, if they were the same throughout."""
-        return next(iter(self.schemes)) if len(self.schemes) == 1 else (None, None)
+    def __getstate__(self) -> dict[str, Any]:
+        # What is derived is derived again by whoever takes the job.
+        return {"design": self.design, "axes": self.axes, "measures": self.measures}
 
-    def _put(self, cells: NDArray[np.int64], batch: Batch) -> None:
-        for name, values in self.measures.items():
-            values[cells] = batch.measures[name]
-        self.status[cells] = batch.status
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, strings=None)
+
+    def pieces(self, done: NDArray[np.bool_]) -> Pieces:
+        """Blocks of the cells that are not done; none reaches over two groups."""
+        found = []
+        for begin, end in itertools.pairwise([*self._begins.tolist(), len(done)]):
+            found += [(begin + at, n) for at, n in pieces(done[begin:end], CHUNK)]
+        return found
+
+    def prepared(self, strings: Strings) -> Cells:
+        """The job that takes its strings from elsewhere, with the kernel of the first loaded."""
+        job = replace(self, strings=strings)
+        group, ready = job._group(0)
+        load_kernel(group.telling, ready)
+        return job
+
+    def run(self, first: int, count: int) -> Block:
+        """Simulate some cells of one group."""
+        number = int(np.searchsorted(self._begins, first, side="right")) - 1
+        group, ready = self._group(number)
+        begin = first - int(self._begins[number])
+        return Block.of(first, 1, measured(group.some(np.arange(begin, begin + count)), ready,
+                                           self.measures))  # fmt: skip
+
+    def over_grid(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Values of all rows, shape (rows, 1), over the grid."""
+        shape = shape_of(self.axes)
+        if len(self._divisions) == 1:  # of millions of cells, no copy
+            return rows.reshape(shape)
+        over = np.empty(shape, dtype=rows.dtype)
+        for number, where in enumerate(self._divisions):
+            part = over[where]
+            begin = self._begins[number]
+            part[...] = rows[begin : begin + part.size].reshape(part.shape)
+        return over
+
+    @cached_property
+    def _divisions(self) -> list[tuple[slice, ...]]:
+        return divisions(self.design, self.axes)
+
+    @cached_property
+    def _begins(self) -> NDArray[np.int64]:
+        """First row of each group."""
+        sizes = [math.prod(p.stop - p.start for p in where) for where in self._divisions]
+        return np.concatenate([[0], np.cumsum(sizes[:-1])]).astype(np.int64)
+
+    def _group(self, number: int) -> tuple[Group, Prepared]:
+        """A group and its string; the last one stays, of thousands there would not be room."""
+        held = self.__dict__.get("_held")
+        if held is None or held[0] != number:
+            group = group_of(self.design, self.axes, self._divisions[number])
+            make = partial(prepare, group.telling, group.design.tables.simulation)
+            ready = make() if self.strings is None else self.strings(number, make)
+            held = self.__dict__["_held"] = (number, group, ready)
+        return held[1], held[2]

@@ -34,6 +34,7 @@ from drillctl.plots.style import (
     legend_under,
     origin_of,
 )
+from drillctl.simulation.measures import MEASURES
 
 if TYPE_CHECKING:
     import shapely
@@ -43,15 +44,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_WORDS = {
-    "j1": "J1", "stuck_time": "stuck time", "stick_slip_index": "stick-slip index",
-    "peak_bit_speed": "peak bit speed", "peak_pipe_torque": "peak pipe torque",
-    "peak_top_torque": "peak top torque", "settling_time": "settling time",
-    "mean_weight_on_bit": "mean WOB", "mean_weight_after_start": "mean WOB after start",
-    "rop_proxy": "ROP proxy", "work_per_turn": "work per turn",
-    "time_outside_table": "time outside table",
-}  # fmt: skip
-"""Measures as they are spoken of."""
 UNBEATEN = "unbeaten in both"
 """Legend of the cases that no other beats."""
 NO_DRAWS = "Each case at its own values, without draws."
@@ -148,7 +140,7 @@ def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
             linewidth=LINE, color=_colour(number + 1), label=case.name,
         )  # fmt: skip
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
-    ax.set_yticks(range(len(drawn)), [_WORDS[name] for name in drawn])
+    ax.set_yticks(range(len(drawn)), [MEASURES[name].label for name in drawn])
     ax.set_ylim(max(len(drawn), 1) - 0.5, -0.5)
     title = heading(result, f"Mean difference from {result.baseline.name!r} at the same draws")
     dress(ax, "difference (% of its mean)", "", title)
@@ -327,12 +319,12 @@ def _relative(
     """Differences and interval ends (%) by measure and case; and the measures without any."""
     drawn: dict[str, dict[str, tuple[float, float, float] | None]] = {}
     left_out = []
-    for name, words in _WORDS.items():
+    for name in result.baseline.measures:
         row = {case.name: _percent(result, case, name) for case in result.cases[1:]}
         if any(row.values()):
             drawn[name] = row
         if not all(row.values()):
-            left_out.append(words)
+            left_out.append(MEASURES[name].label)
     return drawn, left_out
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from drillctl import units
 from drillctl.cli.console import line, sized, table
 from drillctl.printing.words import title_of
+from drillctl.simulation.measures import BATCH_MEASURES, MEASURES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -15,20 +16,13 @@ if TYPE_CHECKING:
     from drillctl.simulation.limit_cycle import LimitCycle
 
 
-_MEASURES = {
-    "j1": "s", "stuck_time": "s", "sticks": "", "stick_slip_index": "",
-    "mean_bit_speed": "rad/s", "min_bit_speed": "rad/s", "peak_bit_speed": "rad/s",
-    "peak_pipe_torque": "N*m", "peak_top_torque": "N*m", "settling_time": "s",
-    "settling_time_wide": "s", "mean_weight_on_bit": "N", "rop_proxy": "",
-    "work_per_turn": "J",
-}  # fmt: skip
-
-
 def simulation(result: Simulation, system: units.System) -> None:
     """Measures of one run."""
     rows = []
-    for name, unit in _MEASURES.items():
-        value = getattr(result.measures, name)
+    for name in BATCH_MEASURES:
+        if name in ("j1_rate", "work_at_bit", "time_outside_table"):  # seldom wanted; in --json
+            continue
+        value, unit = getattr(result.measures, name), MEASURES[name].unit.removeprefix("1")
         if value is None:
             rows.append([name, sized(None), ""])
         else:

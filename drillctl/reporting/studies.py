@@ -76,8 +76,9 @@ def _numbers(design: Design, folder: RunFolder, progress: Progress) -> Any:
 
 def _swept(design: Design, folder: RunFolder, progress: Progress) -> Any:
     from drillctl import studies
+    from drillctl.ensemble.storing import Folder
 
-    return studies.sweep(design, progress=progress, blocks=folder.blocks())
+    return studies.sweep(design, progress=progress, store=Folder(folder.path))
 
 
 def _cells(design: Design, folder: RunFolder, progress: Progress) -> Any:
@@ -86,8 +87,9 @@ def _cells(design: Design, folder: RunFolder, progress: Progress) -> Any:
 
 def _uncertain(design: Design, folder: RunFolder, progress: Progress) -> Any:
     from drillctl import studies
+    from drillctl.ensemble.storing import Folder
 
-    return studies.uncertainty(design, progress=progress, shelf=folder.shelf())
+    return studies.uncertainty(design, progress=progress, store=Folder(folder.path))
 
 
 def _under_uncertainty(asked: Requested) -> Design:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.plots.style import NAMES
+from drillctl.simulation.measures import Measure
 from drillctl.store.tables import (
     NOTHING,
     between,
@@ -42,6 +43,10 @@ class Words:
     def scaled(self, value: float, si_unit: str) -> float:
         """A value in the unit that people read."""
         return scaled(value, si_unit, self.system)
+
+    def measure(self, one: Measure) -> str:
+        """Label of a measure with its unit in brackets."""
+        return one.label if one.unit == "1" else f"{one.label} ({self.unit(one.unit)})"
 
     def diameter(self, value: float | None) -> str:
         """A diameter (m) in mm, or in."""

@@ -38,20 +38,12 @@ CHUNK = 16384
 """Lanes given to the kernels at a time: a fraction of a second, so that progress and an
 interruption are felt."""
 
-FLOATS = (
-    "j1", "j1_rate", "stuck_time", "sticks", "stick_slip_index", "mean_bit_speed",
-    "min_bit_speed", "peak_bit_speed", "peak_pipe_torque", "peak_top_torque", "settling_time",
-    "settling_time_wide", "mean_weight_on_bit", "rop_proxy", "work_at_bit", "work_per_turn",
-    "time_outside_table",
-)  # fmt: skip
-"""Measures that a batch returns, those of `Measures`; NaN where that one has None."""
-
 
 @dataclass(frozen=True, eq=False)
 class Batch:
     """What was measured of a number of lanes."""
 
-    # shape (lanes,): By the names of `FLOATS`; NaN where a measure is undefined
+    # shape (lanes,): By the names of `BATCH_MEASURES`; NaN where a measure is undefined
     measures: dict[str, Array]
     status: NDArray[np.int8]  # shape (lanes,): Index into `measures.STATUSES`
 
@@ -269,11 +261,11 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
         }
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(raw).all(axis=0))
     status = _statuses(finite, row(r.LATE_STUCK), window, values["settling_time_wide"])
-    for name in FLOATS:  # a lane that failed has no measures at all
+    for name in m.BATCH_MEASURES:  # a lane that failed has no measures at all
         values[name] = _where(finite, values[name])
     given_up = row(r.BOUND) > 0.0
     status[given_up] = m.STATUSES.index("censored")
-    for name in FLOATS:
+    for name in m.BATCH_MEASURES:
         values[name] = _where(~given_up, values[name])
     values["j1"] = np.where(given_up, row(r.BOUND) / lanes.set_speed, values["j1"])
     return Batch(values, status)
@@ -301,7 +293,7 @@ def _statuses(
 def measures_of(batch: Batch, lane: int) -> m.Measures:
     """The measures of one lane; None where undefined."""
     values: dict[str, Any] = {}
-    for name in FLOATS:
+    for name in m.BATCH_MEASURES:
         value = float(batch.measures[name][lane])
         values[name] = None if np.isnan(value) else value
     if values["sticks"] is not None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, NamedTuple
 
 WINDOW = 20.0
 """Length of the window at the end of a run in which sticking and SSI are judged (s)."""
@@ -24,33 +24,54 @@ for the last 5 s; `censored`: stopped early on request; `failed`: no finite answ
 """
 
 
+class Measure(NamedTuple):
+    """What is known of a measure beside its values."""
+
+    name: str
+    label: str  # as axes of pictures, heads of tables and legends call it
+    unit: str  # SI; "1" for a number without
+    meaning: str
+
+
+def _row(label: str, unit: str, meaning: str) -> Any:
+    return field(metadata={"measure": (label, unit, meaning)})
+
+
 @dataclass(frozen=True)
 class Measures:
-    """Measures of one run; SI units; None where a measure is undefined."""
+    """Measures of one run; SI units; None where a measure is undefined. Rows of `MEASURES`."""
 
-    j1: float  # integral of abs(bit speed - set speed) / set speed over the J1 window (s)
-    j1_rate: float  # `j1` over the length of its window
-    stuck_time: float  # total time at rest (s)
-    sticks: int  # number of times the bit came to rest; a start at rest counts as one
-    # (max - min) / (2 mean) of the bit speed over the last 20 s; None if it never turned
-    stick_slip_index: float | None
-    # over the whole run (rad/s)
-    mean_bit_speed: float
-    min_bit_speed: float
-    peak_bit_speed: float
-    # largest magnitude in the uppermost element and at the drive (N m)
-    peak_pipe_torque: float
-    peak_top_torque: float
-    # time after which the bit speed stays within 2 % and 5 % of the set speed to the end of the
-    # run (s); None if that is not so for the last 5 s
-    settling_time: float | None
-    settling_time_wide: float | None
-    mean_weight_on_bit: float  # time mean (N)
-    rop_proxy: float  # time mean of weight x abs(bit speed), over nominal weight x set speed
-    work_at_bit: float  # work done on the rock (J)
-    # the same over the turns of the bit (J per revolution); None if it hardly turned
-    work_per_turn: float | None
-    time_outside_table: float  # time with the weight on bit outside the friction table (s)
+    j1: float = _row("J1", "s", "integral of |bit speed - set speed| over the set speed")
+    j1_rate: float = _row("J1 rate", "1", "J1 over the length of its window")
+    stuck_time: float = _row("stuck time", "s", "total time that the bit stands still")
+    sticks: int = _row("sticks", "1", "times the bit comes to rest; a start at rest is one")
+    stick_slip_index: float | None = _row(
+        "stick-slip index", "1",
+        "(max - min) / (2 mean) of the bit speed over the last 20 s; none if it never turned",
+    )  # fmt: skip
+    mean_bit_speed: float = _row("mean bit speed", "rad/s", "over the whole run")
+    min_bit_speed: float = _row("lowest bit speed", "rad/s", "over the whole run")
+    peak_bit_speed: float = _row("peak bit speed", "rad/s", "over the whole run")
+    peak_pipe_torque: float = _row(
+        "peak pipe torque", "N*m", "largest magnitude in the uppermost element"
+    )
+    peak_top_torque: float = _row("peak top torque", "N*m", "largest magnitude at the drive")
+    settling_time: float | None = _row(
+        "settling time", "s",
+        "after which the bit stays within 2 % of the set speed; none if not for the last 5 s",
+    )  # fmt: skip
+    settling_time_wide: float | None = _row("settling time to 5 %", "s", "the same within 5 %")
+    mean_weight_on_bit: float = _row("mean WOB", "N", "time mean over the whole run")
+    rop_proxy: float = _row(
+        "ROP proxy", "1", "mean of weight x |bit speed| over nominal weight x set speed"
+    )
+    work_at_bit: float = _row("work at bit", "J", "work done on the rock")
+    work_per_turn: float | None = _row(
+        "work per turn", "J", "the same per revolution of the bit; none if it hardly turned"
+    )
+    time_outside_table: float = _row(
+        "time outside table", "s", "with the weight on bit outside the friction table"
+    )
 
     def as_dict(self) -> dict[str, Any]:
         """The measures by name; None for what is undefined or not finite."""
@@ -58,6 +79,26 @@ class Measures:
             key: None if isinstance(value, float) and not math.isfinite(value) else value
             for key, value in asdict(self).items()
         }
+
+
+BATCH_MEASURES = tuple(one.name for one in fields(Measures))
+"""Names of what the batch engine returns of a lane, NaN where `Measures` has None."""
+MEASURES = {
+    name: Measure(name, *about)
+    for name, about in (
+        *((one.name, one.metadata["measure"]) for one in fields(Measures)),
+        (
+            "mean_weight_after_start",
+            ("mean WOB after start", "N", "time mean without the first 20 s; of draws alone"),
+        ),
+    )
+}
+"""Every measure by its name."""
+
+
+def units_of(*names: str) -> dict[str, str]:
+    """SI units of some measures, by name."""
+    return {name: MEASURES[name].unit for name in names}
 
 
 def status_of(

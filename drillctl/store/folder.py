@@ -72,20 +72,6 @@ class RunFolder:
             with suppress(OSError):  # something else was put in meanwhile
                 self.path.rmdir()
 
-    def blocks(self) -> Any:
-        """Blocks kept in this folder."""
-        from drillctl.store.blocks import FolderBlocks
-
-        folder = self.path / "blocks"
-        folder.mkdir(exist_ok=True)
-        return FolderBlocks(folder)
-
-    def shelf(self) -> Any:
-        """Realizations kept in this folder."""
-        from drillctl.store.realizations import FolderShelf
-
-        return FolderShelf(self.path)
-
 
 def claim(
     verb: str,

@@ -715,18 +715,18 @@ class Counted:
     """`run_batch` that counts its calls and is interrupted at one of them."""
 
     def __init__(self, monkeypatch, stop_at=None):
-        from drillctl.ensemble import sweeps
+        from drillctl.ensemble import running, sweeps
 
         self.calls, self.stop_at = 0, stop_at
-        self.real = sweeps.run_batch
+        self.real = running.run_batch
         monkeypatch.setattr(sweeps, "CHUNK", 7)
-        monkeypatch.setattr(sweeps, "run_batch", self)
+        monkeypatch.setattr(running, "run_batch", self)
 
-    def __call__(self, lanes, prepared):
+    def __call__(self, lanes, prepared, give_up):
         self.calls += 1
         if self.calls == self.stop_at:
             raise KeyboardInterrupt
-        return self.real(lanes, prepared)
+        return self.real(lanes, prepared, give_up)
 
 
 def test_interrupted_map_goes_on_and_ends_in_the_same_bits(call, monkeypatch):
@@ -740,7 +740,7 @@ def test_interrupted_map_goes_on_and_ends_in_the_same_bits(call, monkeypatch):
         assert err.rstrip().endswith("drillctl: interrupted")
         assert counted.calls == 2
     assert Path("cut/blocks/000000.npz").is_file()
-    assert not Path("cut/blocks/000001.npz").exists()
+    assert not Path("cut/blocks/000007.npz").exists()
     assert not Path("cut/summary.json").exists()
     with pytest.raises(drillctl.errors.InputError, match="not finished"):
         drillctl.open("cut")
@@ -822,13 +822,13 @@ def kill_after_a_block(arguments, folder, prelude=""):
 def test_killed_map_goes_on_and_ends_in_the_same_bits(call, monkeypatch):
     slow = """
 import time
-from drillctl.studies import sweeps
-real = sweeps.run_batch
+from drillctl.ensemble import running, sweeps
+real = running.run_batch
 sweeps.CHUNK = 7
-def slowly(lanes, prepared):
+def slowly(lanes, prepared, give_up):
     time.sleep(0.3)
-    return real(lanes, prepared)
-sweeps.run_batch = slowly
+    return real(lanes, prepared, give_up)
+running.run_batch = slowly
 """
     kill_after_a_block(["map", DESIGN, *SMALL], "killed", slow)
     counted = Counted(monkeypatch)

@@ -20,9 +20,9 @@ from strict_json import strict
 
 import drillctl
 from drillctl.design.reading import parse_axis, parse_setting
+from drillctl.ensemble import cluster as cluster_module
+from drillctl.ensemble import realizations as realizations_module
 from drillctl.errors import InputError
-from drillctl.studies.uncertainty import cluster as cluster_module
-from drillctl.studies.uncertainty import keeping as keeping_module
 
 HOLDS = (
     (
@@ -41,7 +41,7 @@ FEW = [*SHORT, "--realizations", "12"]
 @pytest.fixture(autouse=True)
 def _small_blocks(monkeypatch):
     """Blocks are of 4 draws."""
-    monkeypatch.setattr(keeping_module, "LANES", 24)
+    monkeypatch.setattr(realizations_module, "LANES", 24)
 
 
 def table(path):
@@ -190,11 +190,11 @@ def test_more_realizations_add_the_missing_ones_only(call, monkeypatch):
     folder_of(call, "run", 10)
     before = drillctl.open("run")
     ran = []
-    from drillctl.studies.uncertainty.job import Job
+    from drillctl.ensemble.realizations import Realizations
 
-    run_block = Job.run
+    run_block = Realizations.run
     monkeypatch.setattr(
-        Job, "run", lambda self, *piece: ran.append(piece) or run_block(self, *piece)
+        Realizations, "run", lambda self, *piece: ran.append(piece) or run_block(self, *piece)
     )
     folder_of(call, "run", 21)
     assert ran == [(10, 2), (12, 4), (16, 4), (20, 1)]
@@ -219,9 +219,9 @@ def folder_of(call, name, realizations):
 @pytest.mark.parametrize("after", [0, 1, 2])
 def test_an_interrupted_run_goes_on_to_the_same_bits(call, monkeypatch, after):
     whole = drillctl.open(folder_of(call, "whole", 12))
-    from drillctl.store.realizations import StoredRealizations
+    from drillctl.ensemble.storing import ZarrBlocks
 
-    keep, kept = StoredRealizations.keep, []
+    keep, kept = ZarrBlocks.keep, []
 
     def interrupted(self, block):
         if len(kept) == after:
@@ -229,11 +229,11 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(call, monkeypatch, after):
         kept.append(block)
         keep(self, block)
 
-    monkeypatch.setattr(StoredRealizations, "keep", interrupted)
+    monkeypatch.setattr(ZarrBlocks, "keep", interrupted)
     code, _, err = call("uncertainty", PAPER, *FEW, "--out", "run")
     assert code == 130
     assert "what is finished is kept: the same with --out run goes on" in err
-    monkeypatch.setattr(StoredRealizations, "keep", keep)
+    monkeypatch.setattr(ZarrBlocks, "keep", keep)
     with pytest.raises(InputError, match="not finished"):
         drillctl.open("run")
     code, _, _ = call("uncertainty", PAPER, *FEW, "--resume", "--out", "run")
@@ -287,9 +287,9 @@ def test_there_must_be_something_to_go_on_with(call, arguments, message):
 
 def begun(call, monkeypatch, *options):
     """A folder with one finished block of three."""
-    from drillctl.store.realizations import StoredRealizations
+    from drillctl.ensemble.storing import ZarrBlocks
 
-    keep, kept = StoredRealizations.keep, []
+    keep, kept = ZarrBlocks.keep, []
 
     def first_only(self, block):
         if kept:
@@ -298,7 +298,7 @@ def begun(call, monkeypatch, *options):
         keep(self, block)
 
     with monkeypatch.context() as patch:
-        patch.setattr(StoredRealizations, "keep", first_only)
+        patch.setattr(ZarrBlocks, "keep", first_only)
         assert call("uncertainty", PAPER, *FEW, *options, "--out", "run")[0] == 130
 
 
@@ -373,8 +373,8 @@ def test_a_read_only_folder_is_told(call, permissions_count):
 
 SCRIPT = """
 import sys
-from drillctl.studies.uncertainty import keeping
-keeping.LANES = 24
+from drillctl.ensemble import realizations
+realizations.LANES = 24
 from drillctl.cli import running
 running.draw = lambda figure, path: path.touch()
 from drillctl.cli import run

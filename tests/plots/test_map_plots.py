@@ -17,8 +17,7 @@ from drillctl.ensemble.audit import Audit
 from drillctl.errors import InputError
 from drillctl.plots import stability_map, sweep_line, time_response
 from drillctl.plots.map import axis_label
-from drillctl.simulation.batch import FLOATS
-from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
 from drillctl.studies import Axis, Sweep, responses
 
 OK, FAILED = STATUSES.index("ok"), STATUSES.index("failed")
@@ -40,7 +39,7 @@ LEVELS = (20.0, 30.0, 40.0)
 def made(design, j1, axes=(KP, WEIGHT), audit=NOBODY, levels=LEVELS):
     """A sweep with these values of J1; NaN stands for a failed cell."""
     j1 = np.asarray(j1, dtype=float)
-    measures = {name: j1.copy() for name in FLOATS}
+    measures = {name: j1.copy() for name in BATCH_MEASURES}
     status = np.where(np.isnan(j1), FAILED, OK).astype(np.int8)
     return Sweep(design, axes, levels, measures, status, audit, 0.02, 16, 0.1, 0.2, {})
 

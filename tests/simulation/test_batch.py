@@ -14,9 +14,9 @@ from test_reference import EVENT_ACCURATE, paper
 import drillctl
 import drillctl.errors
 from drillctl.design import Design
-from drillctl.simulation.batch import FLOATS, measures_of, prepare, run_batch
+from drillctl.simulation.batch import measures_of, prepare, run_batch
 from drillctl.simulation.lanes import lane_numbers, lanes_of, single_lane
-from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
 
 HOLDS = (
     (
@@ -196,7 +196,7 @@ def test_the_same_bits_in_any_order_and_company(seed, count):
     whole = run_batch(lanes, prepared)
     chosen = np.random.default_rng(seed).permutation(75)[:count]
     part = run_batch(lanes[chosen], prepared)
-    for name in FLOATS:
+    for name in BATCH_MEASURES:
         assert np.array_equal(part.measures[name], whole.measures[name][chosen], equal_nan=True)
     assert np.array_equal(part.status, whole.status[chosen])
 
@@ -262,7 +262,7 @@ def test_a_lane_given_up_is_the_whole_one_until_then():
     assert np.all(found.measures["j1"][given_up] > level)
     assert given_up.sum() > 10
     kept = ~given_up
-    for name in FLOATS:
+    for name in BATCH_MEASURES:
         assert np.array_equal(
             found.measures[name][kept], whole.measures[name][kept], equal_nan=True
         )
@@ -288,16 +288,15 @@ def test_who_is_given_up_does_not_depend_on_company():
 
 
 def test_a_string_kept_for_resumed_runs_comes_back_whole(tmp_path):
-    from drillctl.store.blocks import FolderBlocks
+    from drillctl.ensemble.storing import stored_string
 
     sampled = {"controller.drive": {"sampling_period": "20 ms", "torque_limit": "30 kN*m"}}
     for number, values in enumerate(({}, sampled, {"bha.damping": "50 N*m*s"})):
         design = paper(600, 100, 140, **SHORT, **values)
         lanes = single_lane(design)
         made = prepare(lanes, design.tables.simulation)
-        blocks = FolderBlocks(tmp_path)
-        blocks.prepared(number, lambda made=made: made)
-        back = blocks.prepared(number, lambda: pytest.fail("prepared twice"))
+        stored_string(tmp_path, number, lambda made=made: made)
+        back = stored_string(tmp_path, number, lambda: pytest.fail("prepared twice"))
         assert back.scheme == made.scheme
         assert type(back.stepper.string) is type(made.stepper.string)
         assert measures_of(run_batch(lanes, back), 0) == measures_of(run_batch(lanes, made), 0)

@@ -231,8 +231,8 @@ def test_a_run_that_breaks_down_is_counted_with_its_reason(short, monkeypatch):
         batch.status[2] = 5
         return batch
 
-    original = drawn_runs.run_batch
-    monkeypatch.setattr(drawn_runs, "run_batch", broken)
+    original = drawn_runs.measured
+    monkeypatch.setattr(drawn_runs, "measured", broken)
     (case,) = compare(short, realizations=4).cases
     assert [(f.reason, f.count) for f in case.failures] == [("no finite answer", 1)]
     assert case.distribution("j1")["defined"] == 3

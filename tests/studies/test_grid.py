@@ -341,14 +341,14 @@ def test_a_grid_of_ten_million_cells_is_two_columns(paper):
 
 
 def test_a_sweep_makes_the_lanes_of_one_block_at_a_time(paper, monkeypatch):
-    from drillctl.ensemble import sweeps
+    from drillctl.ensemble import running, sweeps
 
     axes = grid(paper, ("controller.kp", 0, 1000, 6), ("controller.ki", 0, 500, 5))
     whole = sweep(paper, axes, audit_cells=0)
     most = []
-    real = sweeps.run_batch
+    real = running.run_batch
     monkeypatch.setattr(sweeps, "CHUNK", 7)
-    monkeypatch.setattr(sweeps, "run_batch", lambda *a: most.append(len(a[0])) or real(*a))
+    monkeypatch.setattr(running, "run_batch", lambda *a: most.append(len(a[0])) or real(*a))
     parts = sweep(paper, axes, audit_cells=0)
     assert most == [7, 7, 7, 7, 2]
     for name, values in whole.measures.items():

@@ -227,16 +227,16 @@ def test_proportional_control_keeps_its_set_speed(lumped):
 
 def test_a_failed_lane_is_told(lumped, around, monkeypatch):
     """Told as failed, and neither bistable nor undecided for want of an answer."""
-    run_batch = attraction.run_batch
+    measured = attraction.measured
 
     def failing(lanes, prepared):
-        batch = run_batch(lanes, prepared)
+        batch = measured(lanes, prepared)
         for values in batch.measures.values():
             values[4] = np.nan
         batch.status[4] = STATUSES.index("failed")
         return batch
 
-    monkeypatch.setattr(attraction, "run_batch", failing)
+    monkeypatch.setattr(attraction, "measured", failing)
     found = three_regions(around.design, around.axes)
     assert found.failed.sum() == 1
     assert found.failed[1, 1]

@@ -9,18 +9,17 @@ import pytest
 import drillctl
 from drillctl import units
 from drillctl.ensemble import grid as grid_module
-from drillctl.ensemble import sweeps as sweeps_module
+from drillctl.ensemble import realizations as realizations_module
+from drillctl.ensemble import running as running_module
 from drillctl.ensemble.grid import axes_of, cell_design
+from drillctl.ensemble.realizations import Drawn, Realizations
+from drillctl.ensemble.running import pieces
+from drillctl.ensemble.storing import MemoryBlocks
 from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.uncertainty import job as job_module
-from drillctl.studies.uncertainty import keeping as keeping_module
-from drillctl.studies.uncertainty import realizations as realizations_module
 from drillctl.studies.uncertainty import uncertainty
-from drillctl.studies.uncertainty.job import Drawn, Job
-from drillctl.studies.uncertainty.keeping import InMemory, pieces
 
 HOLDS = (
     (
@@ -165,7 +164,7 @@ def whole():
 
 def test_blocks_change_nothing(whole, monkeypatch):
     for lanes in (1, 6 * 4, 6 * 7):
-        monkeypatch.setattr(keeping_module, "LANES", lanes)
+        monkeypatch.setattr(realizations_module, "LANES", lanes)
         again = uncertainty(small(), realizations=21)
         assert again.j1.tobytes() == whole.j1.tobytes()
         assert again.status.tobytes() == whole.status.tobytes()
@@ -201,8 +200,8 @@ def test_a_job_goes_by_post():
 
     design = small()
     axes = axes_of(design, design.tables.map.axes)
-    job = Job(design, axes, Drawn(2012), ("j1", "stuck_time"), None)
-    prepared = job.prepare(lambda number, prepare: prepare())
+    job = Realizations(design, axes, Drawn(2012), ("j1", "stuck_time"), None)
+    prepared = job.prepared(lambda number, make: make())
     here = prepared.run(3, 2)
     sent = pickle.loads(pickle.dumps(prepared))
     assert sent.strings[0].scheme == prepared.strings[0].scheme
@@ -223,8 +222,8 @@ def test_pieces_are_cut_at_blocks():
 def test_kept_in_memory_grows():
     design = small()
     axes = axes_of(design, design.tables.map.axes)
-    job = Job(design, axes, Drawn(1), ("j1",), None)
-    kept = InMemory(6, ("j1",))
+    job = Realizations(design, axes, Drawn(1), ("j1",), None)
+    kept = MemoryBlocks(job)
     for first, count in kept.missing(3):
         kept.keep(job.run(first, count))
     assert kept.missing(3) == []
@@ -297,8 +296,7 @@ def test_what_cannot_be_is_refused_before_a_lane_is_run(design, message, monkeyp
     def fail(*arguments):
         raise AssertionError("a lane was run")
 
-    monkeypatch.setattr(job_module, "simulate", fail)
-    monkeypatch.setattr(sweeps_module, "run_batch", fail)
+    monkeypatch.setattr(running_module, "run_batch", fail)
     with pytest.raises(InputError) as caught:
         uncertainty(design())
     assert message in str(caught.value)

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import pytest
 
 import drillctl
+from drillctl.ensemble import cluster as cluster_module
+from drillctl.ensemble import realizations as realizations_module
+from drillctl.ensemble.cluster import Cluster, connect
 from drillctl.ensemble.grid import axes_of
+from drillctl.ensemble.realizations import Drawn, Realizations
+from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError, SimulationError
-from drillctl.studies.uncertainty import cluster as cluster_module
-from drillctl.studies.uncertainty import keeping as keeping_module
 from drillctl.studies.uncertainty import uncertainty
-from drillctl.studies.uncertainty.cluster import Cluster, connect
-from drillctl.studies.uncertainty.job import Drawn, Job
 
 HOLDS = (
     (
@@ -56,7 +57,7 @@ def client():
 
 @pytest.fixture(autouse=True)
 def _small_blocks(monkeypatch):
-    monkeypatch.setattr(keeping_module, "LANES", 25 * 4)
+    monkeypatch.setattr(realizations_module, "LANES", 25 * 4)
 
 
 @pytest.mark.slow
@@ -175,7 +176,7 @@ class Completed(list):
 def job(monkeypatch):
     monkeypatch.setattr(distributed, "as_completed", Completed)
     one = design()
-    return Job(one, axes_of(one, one.tables.map.axes), Drawn(1), ("j1",), None)
+    return Realizations(one, axes_of(one, one.tables.map.axes), Drawn(1), ("j1",), None)
 
 
 def here():
@@ -190,6 +191,17 @@ def test_every_block_comes_once_in_whatever_order(job):
     assert [block.first for block in blocks] != [first for first, _ in pieces]
     assert sorted(block.first for block in blocks) == [first for first, _ in pieces]
     assert list(Cluster(Pretended(here())).blocks(job, [])) == []
+
+
+def test_the_cells_of_a_map_go_to_workers_too(job):
+    length = {"path": STRING, "min": "2500 m", "max": "3000 m", "points": 2}
+    axes = [GAINS[0] | {"points": 3}, length]
+    one = design().replace({"map.axes": axes})
+    workers = Cluster(Pretended(here()))
+    there, alone = sweep(one, workers=workers), sweep(one)
+    assert there.j1.tobytes() == alone.j1.tobytes()
+    assert there.status.tobytes() == alone.status.tobytes()
+    assert (there.step, there.modes) == (alone.step, alone.modes)
 
 
 def test_blocks_of_dead_workers_are_given_out_again(job):

@@ -8,15 +8,15 @@ from drillctl import plots
 from drillctl.reporting.blocks import Block, Figure, Table, Text
 from drillctl.reporting.gather import Gathered
 from drillctl.reporting.words import NOTHING, between, chance, number
+from drillctl.simulation.measures import MEASURES
 
-MEASURES = (
-    ("J1 (s)", "j1", ""),
-    ("time stuck (s)", "stuck_time", ""),
-    ("peak top torque", "peak_top_torque", "N*m"),
-    ("peak pipe torque", "peak_pipe_torque", "N*m"),
-    ("mean weight after the start", "mean_weight_after_start", "N"),
-    ("ROP proxy", "rop_proxy", ""),
-)
+SHOWN = [
+    MEASURES[name]
+    for name in (
+        "j1", "stuck_time", "peak_top_torque", "peak_pipe_torque", "mean_weight_after_start",
+        "rop_proxy",
+    )
+]  # fmt: skip
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
@@ -62,15 +62,13 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
 def _means(gathered: Gathered, cases: dict[str, Any]) -> Table:
     words = gathered.words
     heads = ["case"]
-    for title, _, unit in MEASURES:
-        heads.append(f"{title} ({words.unit(unit)})" if unit else title)
+    heads += [words.measure(one) for one in SHOWN]
     rows = []
     for name, case in cases.items():
         row = [name]
-        for _, key, unit in MEASURES:
-            mean = case["measures"][key]["mean"]
-            scaled = mean if mean is None or not unit else words.scaled(mean, unit)
-            row.append(number(scaled))
+        for one in SHOWN:
+            mean = case["measures"][one.name]["mean"]
+            row.append(number(None if mean is None else words.scaled(mean, one.unit)))
         rows.append(tuple(row))
     return Table("cases", "Means over the draws", tuple(heads), tuple(rows))
 
@@ -89,27 +87,22 @@ def _shares(cases: dict[str, Any]) -> Table:
 def _differences(gathered: Gathered, paired: dict[str, Any]) -> Table:
     words = gathered.words
     heads = ["case"]
-    for title, _, unit in MEASURES:
-        heads.append(f"{title} ({words.unit(unit)})" if unit else title)
+    heads += [words.measure(one) for one in SHOWN]
     rows = []
     for name, measures in paired.items():
         row = [name]
-        for _, key, unit in MEASURES:
-            told = measures[key]
+        for one in SHOWN:
+            told = measures[one.name]
             if told["difference"] is None:
                 row.append(NOTHING)
                 continue
-            value = _scaled(gathered, told["difference"], unit)
+            value = words.scaled(told["difference"], one.unit)
             ends = told["interval_95"]
             text = number(value, 3)
             if ends is not None:
-                low, high = (_scaled(gathered, end, unit) for end in ends)
+                low, high = (words.scaled(end, one.unit) for end in ends)
                 text += f" ({between(low, high, 3)})"
             row.append(text)
         rows.append(tuple(row))
     return Table("differences", "Mean paired difference to the first case (95 % interval)",
                  tuple(heads), tuple(rows))  # fmt: skip
-
-
-def _scaled(gathered: Gathered, value: float, unit: str) -> float:
-    return gathered.words.scaled(value, unit) if unit else value

@@ -6,21 +6,13 @@ from drillctl import plots
 from drillctl.reporting.blocks import Block, Figure, Table
 from drillctl.reporting.gather import Gathered, NotThereError, Study
 from drillctl.reporting.words import NOTHING, Words, number
+from drillctl.simulation.measures import MEASURES, Measure
 
 NAMES = {"simulate": "current", "best": "best of the map", "bad": "a bad one"}
-MEASURES = (
-    ("J1 (s)", "j1", ""),
-    ("time stuck (s)", "stuck_time", ""),
-    ("sticks", "sticks", ""),
-    ("stick-slip index", "stick_slip_index", ""),
-    ("settling time to 2 % (s)", "settling_time", ""),
-    ("peak bit speed", "peak_bit_speed", "rad/s"),
-    ("peak pipe torque", "peak_pipe_torque", "N*m"),
-    ("peak top torque", "peak_top_torque", "N*m"),
-    ("mean weight on bit", "mean_weight_on_bit", "N"),
-    ("ROP proxy", "rop_proxy", ""),
-    ("work per turn", "work_per_turn", "J"),
-)
+SHOWN = (
+    "j1", "stuck_time", "sticks", "stick_slip_index", "settling_time", "peak_bit_speed",
+    "peak_pipe_torque", "peak_top_torque", "mean_weight_on_bit", "rop_proxy", "work_per_turn",
+)  # fmt: skip
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
@@ -32,9 +24,9 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     heads = ["measure", *(NAMES[name] for name in runs)]
     rows = [["engine", *(study.summary["engine"] for study in runs.values())]]
     rows.append(["status", *(s.summary["status"].replace("_", " ") for s in runs.values())])
-    for title, key, unit in MEASURES:
-        head = _head(title, unit, gathered.words)
-        rows.append([head, *(_value(s, key, unit, gathered.words) for s in runs.values())])
+    words = gathered.words
+    for one in (MEASURES[name] for name in SHOWN):
+        rows.append([words.measure(one), *(_value(study, one, words) for study in runs.values())])
     rows += _places(gathered, runs)
     table = Table("responses", "Measures of the runs", tuple(heads), tuple(map(tuple, rows)))
     figure = Figure(
@@ -48,15 +40,9 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     return figure, table
 
 
-def _value(study: Study, key: str, unit: str, words: Words) -> str:
-    value = study.summary["measures"][key]
-    if value is None:
-        return NOTHING
-    return number(words.scaled(value, unit) if unit else value)
-
-
-def _head(title: str, unit: str, words: Words) -> str:
-    return f"{title} ({words.unit(unit)})" if unit else title
+def _value(study: Study, one: Measure, words: Words) -> str:
+    value = study.summary["measures"][one.name]
+    return NOTHING if value is None else number(words.scaled(value, one.unit))
 
 
 def _places(gathered: Gathered, runs: dict[str, Study]) -> list[list[str]]:

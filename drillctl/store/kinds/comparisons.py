@@ -15,8 +15,7 @@ from drillctl.ensemble.cases import Runs
 from drillctl.ensemble.draws import Failures
 from drillctl.ensemble.sweeps import Sweep
 from drillctl.errors import InputError
-from drillctl.simulation.batch import FLOATS
-from drillctl.simulation.measures import Measures
+from drillctl.simulation.measures import BATCH_MEASURES, Measures
 from drillctl.simulation.trajectory import SIGNALS, Simulation
 from drillctl.store.kind import Kind
 from drillctl.store.kinds.axes import axis_of
@@ -111,7 +110,7 @@ def _case_map(
         design=design,
         axes=tuple(axis_of(path, data, map_dimension(path, drawn)) for path in told["axes"]),
         levels=design.tables.map.levels,
-        measures={name: data[f"map_{name}"].values for name in FLOATS},
+        measures={name: data[f"map_{name}"].values for name in BATCH_MEASURES},
         status=data["map_status"].values.astype(np.int8),
         audit=Audit(none, np.empty(0), np.empty(0)),
         **{name: told[name] for name in ("step", "modes", "seconds", "total_seconds")},

@@ -9,7 +9,7 @@ import numpy as np
 from drillctl.design import Design
 from drillctl.ensemble.audit import Audit, choose_cells
 from drillctl.ensemble.sweeps import Sweep
-from drillctl.simulation.batch import FLOATS
+from drillctl.simulation.measures import BATCH_MEASURES
 from drillctl.store.kind import Kind
 from drillctl.store.kinds.axes import asked_axes, axis_of
 from drillctl.studies.loop_maps import QUANTITIES, LoopMap
@@ -27,7 +27,7 @@ def read_sweep(design: Design, data: xarray.Dataset, summary: dict[str, Any]) ->
         design=design,
         axes=axes,
         levels=design.tables.map.levels,
-        measures={name: data[name].values for name in FLOATS if name in data},
+        measures={name: data[name].values for name in BATCH_MEASURES if name in data},
         status=data["status"].values.astype(np.int8),
         audit=Audit(cells, j1.ravel()[cells], data["audited_j1"].values),
         step=summary["step"],
@@ -47,7 +47,7 @@ def read_loop_map(design: Design, data: xarray.Dataset, summary: dict[str, Any])
 
 def asked_measures(kept: tuple[str, ...]) -> dict[str, Any]:
     """What a map that keeps some measures alone was asked for, for `claim`."""
-    return {} if kept == FLOATS else {"measures": list(kept)}
+    return {} if kept == BATCH_MEASURES else {"measures": list(kept)}
 
 
 def _asked_of_sweep(result: Sweep) -> tuple[Design, dict[str, Any]]:

@@ -13,8 +13,8 @@ from drillctl.store.differences import growing_realizations
 from drillctl.store.kind import Kind
 from drillctl.store.kinds.axes import asked_axes, axis_of
 from drillctl.store.names import stored_name
-from drillctl.store.realizations import write_uncertainty
 from drillctl.studies.uncertainty import Uncertainty
+from drillctl.studies.uncertainty.labels import write_uncertainty
 from drillctl.studies.uncertainty.sensitivity import read_sensitivity
 from drillctl.studies.uncertainty.stopping import Look
 from drillctl.studies.uncertainty.study import map_axes

@@ -21,16 +21,17 @@ from drillctl.design import Design
 from drillctl.ensemble.cases import Estimate, Runs, percentile_estimate
 from drillctl.ensemble.draws import CommonDraws, matching_shift
 from drillctl.progress import Progress
+from drillctl.simulation.measures import units_of
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import CONSTANT, GAIN, KI, KP, Policies, Policy
 from drillctl.studies.robust.objective import Objective, objective_of
 
 Array = NDArray[np.float64]
 
-MEASURES = {
-    "j1": "s", "mean_weight_after_start": "N", "rop_proxy": "1", "peak_bit_speed": "rad/s",
-    "peak_pipe_torque": "N*m", "peak_top_torque": "N*m", "settling_time": "s",
-}  # fmt: skip
+MEASURES = units_of(
+    "j1", "mean_weight_after_start", "rop_proxy", "peak_bit_speed", "peak_pipe_torque",
+    "peak_top_torque", "settling_time",
+)  # fmt: skip
 """What is kept of every draw, with its unit."""
 PATHS = (KP, KI, GAIN)
 STARTS = (0.0, 500.0, 1500.0)

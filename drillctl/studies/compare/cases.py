@@ -14,11 +14,11 @@ from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.ensemble.grid import axes_of, shape_of
 from drillctl.ensemble.parameters import Uncertain, uncertain_parameters
-from drillctl.ensemble.sweeps import UNITS, Sweep, sweep
+from drillctl.ensemble.sweeps import Sweep, sweep
 from drillctl.errors import InputError
 from drillctl.progress import Progress, Within
 from drillctl.simulation import Simulation, simulate
-from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.measures import MEASURES, STATUSES
 from drillctl.simulation.trajectory import SIGNALS
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ def _maps(cases: Sequence[Nominal], drawn: Sequence[str]) -> dict[str, Any]:
     absent = np.full(shape_of(like.axes), np.nan)
     for name in like.measures:
         values = [absent if case.map is None else case.map.measures[name] for case in cases]
-        made[f"map_{name}"] = (over, np.stack(values), {"units": UNITS[name]})
+        made[f"map_{name}"] = (over, np.stack(values), {"units": MEASURES[name].unit})
     none = np.full(absent.shape, STATUSES.index("failed"), dtype=np.int8)
     status = [none if case.map is None else case.map.status for case in cases]
     flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}

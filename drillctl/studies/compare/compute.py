@@ -22,11 +22,10 @@ from drillctl.ensemble.draws import CommonDraws, Failures, equalising_shift, run
 from drillctl.ensemble.grid import refuse_too_large
 from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.ensemble.regions import Region, region
-from drillctl.ensemble.sweeps import UNITS
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
-from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.measures import STATUSES, units_of
 from drillctl.studies.compare.cases import (
     Nominal,
     case_designs,
@@ -47,16 +46,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MEASURES = {
-    name: UNITS[name]
-    for name in (
-        "j1", "stuck_time", "stick_slip_index", "peak_bit_speed", "peak_pipe_torque",
-        "peak_top_torque", "settling_time", "mean_weight_on_bit",
-    )
-} | {
-    "mean_weight_after_start": "N", "rop_proxy": UNITS["rop_proxy"],
-    "work_per_turn": UNITS["work_per_turn"], "time_outside_table": UNITS["time_outside_table"],
-}  # fmt: skip
+MEASURES = units_of(
+    "j1", "stuck_time", "stick_slip_index", "peak_bit_speed", "peak_pipe_torque",
+    "peak_top_torque", "settling_time", "mean_weight_on_bit", "mean_weight_after_start",
+    "rop_proxy", "work_per_turn", "time_outside_table",
+)  # fmt: skip
 """What is compared, with its unit."""
 NO_ANSWER = "no finite answer"
 """Reason of a run that broke down."""

@@ -16,16 +16,16 @@ from drillctl.ensemble.draws import DrawnGroup, DrawnLanes, drawn_lanes, run_dra
 from drillctl.ensemble.parameters import Draws, uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.lanes import Lanes
+from drillctl.simulation.measures import units_of
 
 Array = NDArray[np.float64]
 
 LAWS = ("navarro-lopez-suarez", "surface-observer")
 """Laws of a weight that follows the bit speed."""
 GAIN, DELAY = VARIED
-MEASURES = {
-    "j1": "s", "peak_bit_speed": "rad/s", "peak_pipe_torque": "N*m", "mean_weight_on_bit": "N",
-    "mean_weight_after_start": "N",
-}  # fmt: skip
+MEASURES = units_of(
+    "j1", "peak_bit_speed", "peak_pipe_torque", "mean_weight_on_bit", "mean_weight_after_start"
+)
 """What is kept of a run, with its unit."""
 
 

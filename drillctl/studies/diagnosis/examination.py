@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.ensemble import audit as auditing
 from drillctl.ensemble.grid import Axis, Group, axes_of, cell_design, groups, shape_of
+from drillctl.ensemble.running import measured
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.rig.bit_rock import PrintedThreeBranch
-from drillctl.simulation.batch import Prepared, prepare, run_batch, warm_up
+from drillctl.simulation.batch import Prepared, prepare
 from drillctl.studies.diagnosis.engine_speed import Speed, engine_speed
 from drillctl.studies.diagnosis.error_estimate import (
     PROMISES,
@@ -155,7 +156,7 @@ class _Sample:
             lanes, table = part.group.some(part.chosen), part.group.design.tables.simulation
             for row, parts in enumerate(REFINEMENTS):
                 made = refined(lanes.string, table, part.prepared, parts)
-                batch = run_batch(lanes, made)
+                batch = measured(lanes, made)
                 j1[row, part.at] = batch.measures["j1"]
                 if parts == 1:
                     status[part.at] = batch.status
@@ -169,7 +170,7 @@ class _Sample:
             table = part.group.design.tables.simulation
             asked = table.model_copy(update={"accuracy": name, "step": None, "modes": None})
             made = prepare(part.group.telling, asked)
-            j1[part.at] = run_batch(part.group.some(part.chosen), made).measures["j1"]
+            j1[part.at] = measured(part.group.some(part.chosen), made).measures["j1"]
             step = min(step, made.scheme.step)
         return j1, step
 
@@ -211,7 +212,6 @@ def _audited(
 
 def _speed(part: _Part) -> Speed:
     lanes = part.group.some(part.chosen)
-    warm_up(lanes, part.prepared)
     return engine_speed(lanes, part.prepared)
 
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.ensemble.draws import DrawnGroup, Failures, drawn_lanes
 from drillctl.ensemble.parameters import draw
+from drillctl.ensemble.running import measured
 from drillctl.errors import InputError
-from drillctl.simulation.batch import Prepared, prepare, run_batch, trace
+from drillctl.simulation.batch import Prepared, prepare, trace
 from drillctl.simulation.lanes import Lanes
 from drillctl.studies.robust.tuned import (
     StringNumbers,
@@ -156,8 +157,8 @@ def _at_once(design: Design, tuned: tuple[Tuned, ...]) -> bool:
 def _run(
     lanes: Lanes, prepared: Prepared, names: tuple[str, ...], give_up: float
 ) -> dict[str, Array]:
-    measures = run_batch(lanes, prepared, give_up).measures
-    found = {name: measures[name] for name in names if name != "effort"}
+    kept = tuple(name for name in names if name != "effort")
+    found = measured(lanes, prepared, kept, give_up).measures
     if "effort" in names:
         found["effort"] = _effort(lanes, prepared)
     return found

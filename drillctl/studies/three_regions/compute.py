@@ -30,6 +30,7 @@ from drillctl.ensemble.grid import (
     shape_of,
     span,
 )
+from drillctl.ensemble.running import measured
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
@@ -37,7 +38,7 @@ from drillctl.linear.loop_analysis import tolerated_slope
 from drillctl.linear.operating_point import operating_point, rock_at
 from drillctl.linear.slope_margin import SlopeMargins, slope_margins
 from drillctl.progress import SILENT, Progress
-from drillctl.simulation.batch import Prepared, prepare, run_batch, trace
+from drillctl.simulation.batch import Prepared, prepare, trace
 from drillctl.simulation.lanes import Kind, Lanes
 from drillctl.simulation.measures import NARROW_BAND, STATUSES, WINDOW
 from drillctl.store.result import Result, label
@@ -80,7 +81,7 @@ def ends_from(kind: Kind, lanes: Lanes, operating_speed: Array, prepared: Prepar
     steady = np.isfinite(operating_speed)
     framed = steady & (kp == 0.0) & (ki == 0.0)
     lanes = replace(lanes, start=kind, set_speed=np.where(framed, operating_speed, lanes.set_speed))
-    batch = run_batch(lanes, prepared)
+    batch = measured(lanes, prepared)
     # NaN is more than any time: not settled.
     attracted = batch.measures["settling_time"] <= HORIZON - WINDOW
     traced = np.flatnonzero(steady & (kp != 0.0) & (ki == 0.0))

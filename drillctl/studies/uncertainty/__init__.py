@@ -1,10 +1,6 @@
 """Stability regions under uncertainty: a map at thousands of realizations.
 
 - `study.py`: `uncertainty`, from design to result.
-- `realizations.py`: realizations over the cells of a map as lanes; `strings.py`: their prepared
-  strings; `engine.py`: the one place where lanes are run.
-- `job.py`: a block of realizations as work for anyone; `running.py`: all blocks;
-  `cluster.py`: on dask.distributed; `keeping.py`: where finished ones are.
 - `result.py`: `Uncertainty`; `labels.py`: the same as dataset and summary.
 - `probability.py`: probability cell by cell; `areas.py`: of regions; `scatter.py`: what tells
   the sampling error.

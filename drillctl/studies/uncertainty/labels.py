@@ -8,13 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.ensemble.parameters import uncertain_parameters
-from drillctl.ensemble.sweeps import UNITS
+from drillctl.ensemble.realizations import Drawn, Realizations
+from drillctl.ensemble.running import Block
+from drillctl.ensemble.storing import FILES, ZarrBlocks, disk_errors
 from drillctl.errors import InputError
-from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.measures import MEASURES, STATUSES
 from drillctl.studies.uncertainty.objectives import Mean, Quantile, TailMean
 from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import xarray
 
     from drillctl.studies.uncertainty.result import Uncertainty
@@ -38,7 +42,7 @@ def lanes(result: Uncertainty) -> dict[str, Any]:
     """What was simulated, lane by lane, as variables of a dataset."""
     dimensions = ["realization", *(a.path for a in result.axes)]
     variables: dict[str, Any] = {
-        name: (dimensions, values, {"units": UNITS[name]})
+        name: (dimensions, values, {"units": MEASURES[name].unit})
         for name, values in result.measures.items()
     }
     flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
@@ -158,3 +162,28 @@ def _best(result: Uncertainty, name: str) -> dict[str, Any]:
         "interval_95": list(found.interval),
         "alike_cells": None if found.alike is None else int(found.alike.sum()),
     }
+
+
+def write_uncertainty(result: Uncertainty, folder: Path) -> None:
+    """Write a study under uncertainty: lanes that are not there yet, and what follows from them."""
+    import zarr
+
+    from drillctl.store.names import stored_name
+
+    job = Realizations(result.design, result.axes, Drawn(result.seed), tuple(result.measures), None)
+    stored = ZarrBlocks(folder, "realizations", job)
+    for first, count in stored.missing(result.realizations):
+        rows = slice(first, first + count)
+        flat = {k: v[rows].reshape(-1, job.width) for k, v in result.measures.items()}
+        status = result.status[rows].reshape(-1, job.width)
+        stored.keep(Block(first, flat, status, provenance=result.provenance))
+    path = folder / FILES["realizations"]
+    own = set(lanes(result))
+    with disk_errors(path):
+        group = zarr.open_group(path, mode="a")
+        for name in list(group.array_keys()):
+            if name not in own:  # of fewer realizations
+                del group[name]
+        data = dataset(result).drop_vars(own)
+        names = {str(n): stored_name(str(n)) for n in (*data.variables, *data.dims)}
+        data.rename(names).to_zarr(path, mode="a", consolidated=False)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +18,16 @@ from drillctl.ensemble import audit as auditing
 from drillctl.ensemble.draws import Failures, beyond_the_table, told
 from drillctl.ensemble.grid import Axis, axes_of, cell_design, refuse_more_bytes, shape_of
 from drillctl.ensemble.parameters import drawing
+from drillctl.ensemble.realizations import Drawn, Listed, Realizations, Source
+from drillctl.ensemble.running import Blocks, Workers, run
 from drillctl.ensemble.sampling import sampling_of
+from drillctl.ensemble.storing import Memory, Store
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
-from drillctl.simulation.batch import FLOATS
+from drillctl.simulation.measures import BATCH_MEASURES
 from drillctl.studies.uncertainty import sensitivity as indices
-from drillctl.studies.uncertainty.job import Drawn, Job, Listed, Source
-from drillctl.studies.uncertainty.keeping import InMemory, Keeping
 from drillctl.studies.uncertainty.result import Uncertainty
-from drillctl.studies.uncertainty.running import ThisProcess, Workers, run
 from drillctl.studies.uncertainty.scatter import Scatter
 from drillctl.studies.uncertainty.stopping import Look, level_of, look, schedule
 
@@ -44,22 +44,6 @@ COPIES = 4
 """Of what is kept of a lane, that are held at one time at most."""
 
 
-class Shelf(Protocol):
-    """Where the finished blocks of a study are kept, by the name of what they belong to."""
-
-    def keeping(self, name: str, job: Job) -> Keeping:
-        """The place of one of its parts."""
-        ...
-
-
-class NoShelf:
-    """For studies that live in memory only."""
-
-    def keeping(self, name: str, job: Job) -> Keeping:
-        """A place in memory."""
-        return InMemory(job.cells, job.measures)
-
-
 def uncertainty(
     design: Design,
     axes: tuple[Axis, ...] | None = None,
@@ -68,7 +52,7 @@ def uncertainty(
     audit_cells: int | None = None,
     client: Client | None = None,
     progress: Progress = SILENT,
-    shelf: Shelf | None = None,
+    store: Store | None = None,
     workers: Workers | None = None,
     interim: Callable[[SoFar], None] | None = None,
 ) -> Uncertainty:
@@ -89,8 +73,8 @@ def uncertainty(
         Cluster that computes blocks, instead of threads of this process.
     progress : Progress
         Told of lanes.
-    shelf : Shelf, optional
-        Where finished blocks are kept and found again.
+    store : Store, optional
+        Where finished blocks are stored, for a run that resumes; in memory by default.
     workers : Workers, optional
         Who computes blocks, instead of `client` or this process.
     interim : callable, optional
@@ -113,7 +97,7 @@ def uncertainty(
     asked = {path: value for path, value in given.items() if value is not None}
     design = design.replace(asked) if asked else design
     axes = map_axes(design) if axes is None else axes
-    study = _Study(design, axes, progress, shelf or NoShelf(), workers or _workers(client), interim)
+    study = _Study(design, axes, progress, store or Memory(), workers or _workers(client), interim)
     return study.result(begin, audit_cells)
 
 
@@ -127,10 +111,10 @@ def map_axes(design: Design) -> tuple[Axis, ...]:
     return axes_of(design, tables)
 
 
-def _workers(client: Client | None) -> Workers:
+def _workers(client: Client | None) -> Workers | None:
     if client is None:
-        return ThisProcess()
-    from drillctl.studies.uncertainty.cluster import Cluster
+        return None
+    from drillctl.ensemble.cluster import Cluster
 
     return Cluster(client)
 
@@ -143,12 +127,12 @@ class _Study:
         design: Design,
         axes: tuple[Axis, ...],
         progress: Progress,
-        shelf: Shelf,
-        workers: Workers,
+        store: Store,
+        workers: Workers | None,
         interim: Callable[[SoFar], None] | None,
     ) -> None:
         self.design, self.axes, self.progress = design, axes, progress
-        self.shelf, self.workers, self.interim = shelf, workers, interim
+        self.store, self.workers, self.interim = store, workers, interim
         self.table = design.tables.uncertainty
         self.levels = design.tables.map.levels
         refuse_impossible(design, axes)
@@ -165,8 +149,8 @@ class _Study:
         """All of it."""
         nominal = sweep(self.design, self.axes, audit_cells=0, progress=self.progress).j1
         job = self._job(Drawn(self.table.seed), None if self.table.full else self.levels[-1])
-        kept = self.shelf.keeping("realizations", job)
-        job = job.prepare(kept.prepared)
+        kept = self.store.blocks("realizations", job)
+        job = job.prepared(kept.prepared)
         count, looks, seconds = self._run(job, kept, nominal)
         found = self._made(kept, count, nominal)
         sensitivity = None
@@ -184,7 +168,7 @@ class _Study:
             total_seconds=time.perf_counter() - begin,
         )
 
-    def _made(self, kept: Keeping, count: int, nominal: Array) -> Uncertainty:
+    def _made(self, kept: Blocks, count: int, nominal: Array) -> Uncertainty:
         """The first `count` realizations, as yet without what is found out about them."""
         measures, status = kept.read(count)
         shape = (count, *shape_of(self.axes))
@@ -204,10 +188,12 @@ class _Study:
             total_seconds=0.0,
         )
 
-    def _job(self, source: Source, censor: float | None) -> Job:
-        return Job(self.design, self.axes, source, self.measures, censor)
+    def _job(self, source: Source, censor: float | None) -> Realizations:
+        return Realizations(self.design, self.axes, source, self.measures, censor)
 
-    def _run(self, job: Job, kept: Keeping, nominal: Array) -> tuple[int, tuple[Look, ...], float]:
+    def _run(
+        self, job: Realizations, kept: Blocks, nominal: Array
+    ) -> tuple[int, tuple[Look, ...], float]:
         """Realizations that were run, what was seen at each look, and the time (s)."""
         most, until = self.table.realizations, self.table.until
 
@@ -221,13 +207,14 @@ class _Study:
                 self.interim(partial(so_far, asked))
 
         if until is None:
-            seconds = run(job, most, kept, self.workers, self.progress, lambda: after(most))
+            seconds = run(job, most, kept, self.workers, self.progress, lambda: after(most)).total
             return most, (), seconds
         level, seconds = level_of(until, self.levels), 0.0
         scatter = Scatter(sampling_of(self.table).replicates)
         counts, looks = schedule(until.first_look, most), []
         for count in counts:
-            seconds += run(job, count, kept, self.workers, self.progress, partial(after, count))
+            spent = run(job, count, kept, self.workers, self.progress, partial(after, count))
+            seconds += spent.total
             j1 = kept.read(count)[0]["j1"]
             looks.append(look(j1, until, level, len(counts), scatter, self.table.seed))
             if looks[-1].enough(until.half_width):
@@ -237,10 +224,10 @@ class _Study:
     def _sensitivity(self, table: SensitivityTable) -> tuple[indices.Sensitivity, float]:
         columns = indices.points(self.design, table.samples, self.table.seed)
         job = self._job(Listed(columns), None)  # a variance is of all that J1 may be
-        kept = self.shelf.keeping("sensitivity", job)
-        job = job.prepare(kept.prepared)
+        kept = self.store.blocks("sensitivity", job)
+        job = job.prepared(kept.prepared)
         count = len(next(iter(columns.values())))
-        seconds = run(job, count, kept, self.workers, self.progress)
+        seconds = run(job, count, kept, self.workers, self.progress).total
         measures, status = kept.read(count)
         cells = _cells(self.design, self.axes, table)
         found = indices.sensitivity(
@@ -302,8 +289,10 @@ def refuse_impossible(design: Design, axes: tuple[Axis, ...]) -> None:
 
 def _kept(names: tuple[str, ...]) -> tuple[str, ...]:
     for name in names:
-        if name not in FLOATS:
-            raise InputError(f"no measure {name!r}; {nearest(name, FLOATS)}", "uncertainty.keep")
+        if name not in BATCH_MEASURES:
+            raise InputError(
+                f"no measure {name!r}; {nearest(name, BATCH_MEASURES)}", "uncertainty.keep"
+            )
     return tuple(dict.fromkeys(("j1", *names)))
 
 

@@ -15,9 +15,9 @@ from functools import lru_cache
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from drillctl.ensemble.running import Block, Job, Pieces
 from drillctl.errors import InputError, SimulationError
 from drillctl.provenance import provenance
-from drillctl.studies.uncertainty.job import Block, Job
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -34,7 +34,7 @@ class Cluster:
     def __init__(self, client: Client, allow_mixed: bool = False) -> None:
         self._client, self._allow_mixed = client, allow_mixed
 
-    def blocks(self, job: Job, pieces: list[tuple[int, int]]) -> Iterator[Block]:
+    def blocks(self, job: Job, pieces: Pieces) -> Iterator[Block]:
         """The blocks, in the order in which they are finished."""
         from distributed import as_completed
 
