@@ -2,14 +2,14 @@
 
     python -m benchmarks.machine
 
-What is measured, and how: `drillctl/machine.py`.
+What is measured, and how: `benchmarks/peaks.py`.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from drillctl.machine import Machine, measure
+from benchmarks.peaks import Machine, measure
 
 
 def nominal_clock() -> float | None:

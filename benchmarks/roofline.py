@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.cost import Count, count
 from benchmarks.job import Job
+from benchmarks.peaks import Machine
 from benchmarks.peers.engine import map_lanes, on_cores
 from benchmarks.timing import in_turn
-from drillctl.machine import Machine
 from drillctl.simulation.batch import run_batch, warm_up
-from drillctl.simulation.cost import Count, count
 
 MODES = (4, 8, 12, 16, 20, 24, 28)
 STEP, DURATION = 0.02, 10.0

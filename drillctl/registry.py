@@ -35,8 +35,10 @@ WEIGHT_LAWS = (
 """Each module holds `LAWS`, a tuple of `drillctl.rig.weight_on_bit.law.WeightOnBitLaw`."""
 
 STUDIES: tuple[str, ...] = (
+    "drillctl.studies.simulate",
     "drillctl.studies.three_regions",
     "drillctl.studies.regularisation",
+    "drillctl.studies.doctor",
 )
 """Each package holds `STUDY`; its keys in a design file, if any, are in its `settings.py`."""
 

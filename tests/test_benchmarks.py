@@ -10,13 +10,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks import peaks as machine
 from benchmarks import run
+from benchmarks.cost import count
 from benchmarks.exact import exact_j1
 from benchmarks.job import CELLS, Job, load_job
 from benchmarks.peers import MODULES, all_peers
 from benchmarks.timing import in_turn, interleave, row_of
-from drillctl import machine
-from drillctl.simulation.cost import count
 from drillctl.simulation.lanes import Start
 from drillctl.simulation.propagator import string_step
 

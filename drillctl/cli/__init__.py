@@ -14,7 +14,6 @@ from drillctl.cli import (
     linear,
     maps,
     reports,
-    runs,
     tuning,
     uncertain,
 )
@@ -31,9 +30,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "modes": linear.modes,
     "loop": linear.loop,
     "cycle": linear.cycle,
-    "simulate": runs.simulate,
     "map": maps.stability_map,
-    "doctor": maps.doctor,
     "compare": comparisons.compare,
     "delay": comparisons.delay,
     "advantage": advantage.advantage,

@@ -72,33 +72,6 @@ def _full_map(design: Design, measures: list[str] | None, options: Options) -> N
     summary = result.summary()
     if not options.json:
         printing.sweep(result, options.units)
-    if result.audit.verdict == "look":
-        console.note("audit: look: the engines differ by more than 1 % in J1 in some cell")
+    if result.audit.verdict == "check":
+        console.note("audit: check: the engines differ by more than 1 % in J1 in some cell")
     running.conclude(folder, summary, options)
-
-
-@computing
-def doctor(
-    design: Design,
-    options: Options,
-    axis: Axes = None,
-    audit: Annotated[
-        int, typer.Option("--audit", min=0, help="Lanes to audit with the reference solver.")
-    ] = 4,
-) -> None:
-    """Step and modes of the batch engine and why; its estimated and audited error; its speed."""
-    import drillctl
-    from drillctl import plots, printing, store
-
-    design = with_axes(design, axis)
-    folder = store.claim("doctor", design, options.out, audited=audit)
-    if running.shown_again(folder, options, lambda: printing.doctor(store.open(folder.path))):
-        return
-    with running.guarded(folder), console.progress() as bar:
-        result = drillctl.doctor(design, audit, progress=bar)
-    store.write_data(result, folder.path)
-    if len(result.cells):
-        running.draw(plots.error_estimate(result), folder.path / "errors.png")
-    if not options.json:
-        printing.doctor(result)
-    running.conclude(folder, result.summary(), options)

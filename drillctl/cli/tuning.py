@@ -58,8 +58,8 @@ def tune(
     _write(result, folder.path)
     for name, figure in _pictures(result, options):
         running.draw(figure, folder.path / f"{name}.png")
-    if result.certificate.audit_verdict == "look":
-        console.note("audit: look: the engines differ about the level at some realization")
+    if result.certificate.audit_verdict == "check":
+        console.note("audit: check: the engines differ about the level at some realization")
     if not options.json:
         printing.tune(result, options.units)
     running.conclude(folder, result.summary(), options)

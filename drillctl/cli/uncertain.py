@@ -86,8 +86,8 @@ def uncertainty(
     studies.write_uncertainty_tables(result, folder.path)
     for name, figure in uncertain_runs.pictures(result, options.units):
         running.draw(figure, folder.path / f"{name}.png")
-    if result.audit.verdict == "look":
-        console.note("audit: look: the engines differ by more than 1 % in J1 in some lane")
+    if result.audit.verdict == "check":
+        console.note("audit: check: the engines differ by more than 1 % in J1 in some lane")
     if not options.json:
         printing.uncertainty(result, options.units)
     running.conclude(folder, summary, options)

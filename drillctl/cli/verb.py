@@ -134,14 +134,7 @@ def _show(study: Study, result: Any, summary: dict[str, Any], common: Common) ->
     title = result.design.tables.title or result.design.name
     for number, table in enumerate(one for one in study.tables(result) if one.shown):
         head = f"{title}: {table.title}" if number == 0 else table.title
-        rows = [
-            [
-                column.text(cell, common.units)
-                for column, cell in zip(table.columns, row, strict=True)
-            ]
-            for row in table.rows
-        ]
-        console.table(head, [column.head(common.units) for column in table.columns], rows)
+        console.table(head, table.heads(common.units), table.texts(common.units))
     for remark in study.remarks(result, common.units):
         console.line(remark)
 

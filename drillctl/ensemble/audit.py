@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 SEED = 20121
 """Seed of the choice of cells: the same map is audited at the same cells."""
 WORST_ALLOWED = 1e-2
-"""Relative difference in J1 above which a map says `audit: look`."""
+"""Relative difference in J1 above which a map says `audit: check`."""
 TOLERANCE = 1e-7
 """Tolerance of the reference solver in an audit: J1 to some 1e-7."""
 
@@ -49,11 +49,11 @@ class Audit:
 
     @property
     def verdict(self) -> str:
-        """`ok`, `look` when a cell differs too much or failed, `none` without audited cells."""
+        """`ok`, `check` when a cell differs too much or failed, `none` without audited cells."""
         if not len(self.cells):
             return "none"
         fine = np.isfinite(self.reference).all() and (self.worst or 0.0) <= WORST_ALLOWED
-        return "ok" if fine else "look"
+        return "ok" if fine else "check"
 
     def summary(self) -> dict[str, Any]:
         """Number of cells, worst difference, verdict."""

@@ -5,38 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from drillctl import units
-from drillctl.cli.console import line, sized, table
+from drillctl.cli.console import line, table
 from drillctl.printing.words import title_of
-from drillctl.simulation.measures import BATCH_MEASURES, MEASURES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from drillctl.simulation import Simulation
     from drillctl.simulation.limit_cycle import LimitCycle
-
-
-def simulation(result: Simulation, system: units.System) -> None:
-    """Measures of one run."""
-    rows = []
-    for name in BATCH_MEASURES:
-        if name in ("j1_rate", "work_at_bit", "time_outside_table"):  # seldom wanted; in --json
-            continue
-        value, unit = getattr(result.measures, name), MEASURES[name].unit.removeprefix("1")
-        if value is None:
-            rows.append([name, sized(None), ""])
-        else:
-            shown, label = units.displayed(value, unit, system)
-            rows.append([name, sized(shown), label])
-    if result.share_of_yield is not None:
-        rows.append(["share of torsional yield", f"{result.share_of_yield:.1%}", ""])
-    if result.energy is not None:
-        rows.append(["energy balance", f"{result.energy.relative_residual:.0e}", "of the work"])
-    rows.append(["status", result.status, ""])
-    engine = result.engine
-    if result.step is not None:
-        engine = f"{engine}, step {result.step * 1e3:g} ms, {result.modes} modes"
-    table(f"{title_of(result)} ({engine})", ["measure", "value", "unit"], rows)
 
 
 def cycle(result: LimitCycle, system: units.System) -> None:

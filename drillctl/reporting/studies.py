@@ -7,7 +7,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drillctl
-from drillctl import units
 from drillctl.design import Design
 from drillctl.reporting import cells
 from drillctl.studies import base
@@ -17,11 +16,6 @@ from drillctl.studies.base import Requested, Run, Study, studies
 if TYPE_CHECKING:
     from drillctl.progress import Progress
     from drillctl.store import RunFolder
-
-FREE = 20.0
-"""Samples of a run that is kept for its numbers alone are so far apart (s)."""
-FINE = 0.05
-"""And of one that is drawn (s)."""
 
 
 def _applies(asked: Requested) -> str:
@@ -62,16 +56,6 @@ def level_of(design: Design) -> float:
 
 def _both(*reasons: Callable[[Requested], str]) -> Callable[[Requested], str]:
     return lambda asked: next((why for reason in reasons if (why := reason(asked))), "")
-
-
-def _simulated(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    progress.begin("simulating one run", 1)
-    return drillctl.simulate(design, interval=FINE)
-
-
-def _numbers(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    progress.begin("simulating one run", 1)
-    return drillctl.simulate(design, interval=FREE)
 
 
 def _swept(design: Design, folder: RunFolder, progress: Progress) -> Any:
@@ -134,49 +118,6 @@ def _at_setting(asked: Requested) -> Design:
     return design.replace(values)
 
 
-def _cell(which: str) -> Callable[[Requested], Design]:
-    """The design of the best or of a bad cell of the map."""
-
-    def variant(asked: Requested) -> Design:
-        at = asked.done["cells"].summary[which]
-        values = {path: units.SI(value) for path, value in at.items()}
-        return asked.design.replace({**values, "simulation.engine": "batch"})
-
-    return variant
-
-
-def _no_such_cell(which: str) -> Callable[[Requested], str]:
-    def missing(asked: Requested) -> str:
-        return "" if asked.done["cells"].summary[which] else f"the map has no {which} cell"
-
-    return missing
-
-
-def _finer(parts: int, of: str) -> Callable[[Requested], Design]:
-    """The design with elements, or the step of the batch engine, divided."""
-
-    def variant(asked: Requested) -> Design:
-        design = asked.design.replace({"simulation.engine": "batch"})
-        if of == "step":
-            held = asked.done["mesh-1"].summary["step"] / parts
-            return design.replace({"simulation.step": units.SI(held)})
-        sections = design.tables.drillstring.sections
-        counts = {part.name: part.elements for part in design.string.parts.sections}
-        return design.replace({
-            f"drillstring.sections.{table.name}.elements": parts * counts[table.name]
-            for table in sections
-            if table.stiffness is None
-        } if parts > 1 else {})  # fmt: skip
-
-    return variant
-
-
-def _lumped(asked: Requested) -> str:
-    if all(table.stiffness is not None for table in asked.design.tables.drillstring.sections):
-        return "a lumped string has no mesh"
-    return ""
-
-
 def _moded(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return drillctl.modes(design)
 
@@ -227,23 +168,14 @@ def _loop_map(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return studies.loop_map(design, quantities=("slope_margin",), progress=progress)
 
 
-def _examined(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    return drillctl.doctor(design, 0, progress=progress)
-
-
 ALL = (
     Recipe("modes", "the modes", "modes", _moded, settings={"count": 10}),
     Recipe("loop", "the loop", "loop", _looped),
-    Recipe("simulate", "the run at the current setting", "simulate", _simulated),
     Recipe("setting", "the draws at the current setting", "uncertainty", _setting, in_batch,
            _at_setting, settings={"axes": []}, told=_told_of_setting),
     Recipe("map", "the J1 map", "map", _swept, _both(in_batch, fitting_map)),
     Recipe("cells", "the responses over the map", "report-cells", _cells, fitting_map,
            needs=("map",), write=False, told=dict),
-    Recipe("best", "the run at the best cell", "simulate", _simulated, _no_such_cell("best"),
-           _cell("best"), needs=("cells",)),
-    Recipe("bad", "the run at a bad cell", "simulate", _simulated, _no_such_cell("bad"),
-           _cell("bad"), needs=("cells",)),
     Recipe("slope-margin", "the slope margin over the map", "loop-map", _loop_map, over_two_axes),
     Recipe("uncertainty", "the map under uncertainty", "uncertainty", _uncertain,
            _both(in_batch, fitting_map), _under_uncertainty, growing=True),
@@ -252,20 +184,14 @@ ALL = (
            _both(_not_tuned, in_batch)),
     Recipe("advantage", "the benefit of a moving weight", "advantage", _by_name("advantage"),
            _both(_not_weighed, in_batch)),
-    Recipe("doctor", "the errors of the batch engine", "doctor", _examined,
-           settings={"audited": 0}),
-    Recipe("mesh-1", "the run by the batch engine", "simulate", _numbers, in_batch,
-           _finer(1, "elements")),
-    Recipe("mesh-2", "the run with twice the elements", "simulate", _numbers,
-           _both(in_batch, _lumped), _finer(2, "elements")),
-    Recipe("mesh-4", "the run with four times the elements", "simulate", _numbers,
-           _both(in_batch, _lumped), _finer(4, "elements")),
-    Recipe("step-2", "the run with half the step", "simulate", _numbers, in_batch,
-           _finer(2, "step"), needs=("mesh-1",)),
-    Recipe("step-4", "the run with a quarter of the step", "simulate", _numbers, in_batch,
-           _finer(4, "step"), needs=("mesh-1",)),
 )  # fmt: skip
 """Every study, in the order in which they are done."""
+
+
+_ORDER = {
+    "modes": 0, "loop": 10, "setting": 30, "map": 40, "cells": 50, "slope-margin": 80,
+    "uncertainty": 90, "compare": 100, "tune": 110, "advantage": 120,
+}  # fmt: skip
 
 
 def _of(study: Study, recipe: base.Recipe) -> Recipe:
@@ -282,8 +208,7 @@ def _of(study: Study, recipe: base.Recipe) -> Recipe:
 
 def _recipes() -> dict[str, Recipe]:
     """Every study of a report by name, in the order in which they are done."""
-    # Those that stand here come in tens, so that others find a place between them.
-    placed = [(10 * number, recipe) for number, recipe in enumerate(ALL)]
+    placed = [(_ORDER[recipe.name], recipe) for recipe in ALL]
     placed += [
         (one.order, _of(study, one)) for study in studies().values() for one in study.recipes
     ]

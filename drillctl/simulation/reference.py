@@ -33,7 +33,7 @@ class Event:
     """A change of phase."""
 
     time: float  # when (s)
-    kind: Literal["stick", "slip"]  # {'stick', 'slip'}: The bit came to rest, or broke loose
+    kind: Literal["stick", "release"]  # the bit came to rest, or broke loose
     direction: int  # +1 or -1 for a bit that breaks loose forward or backward; 0 for a stick
 
 
@@ -124,7 +124,7 @@ def solve(design: Design, tolerance: float = 1e-8, method: Method = "DOP853") ->
             changes += 1
             direction = system.direction_of(phase)
             if direction or system.direction_of(before):
-                events.append(Event(time, "slip" if direction else "stick", direction))
+                events.append(Event(time, "release" if direction else "stick", direction))
         if changes >= MOST_PHASES:
             raise SimulationError(f"{MOST_PHASES} changes of phase by {time:g} s: chattering")
     energy = _audit(system, first, state)

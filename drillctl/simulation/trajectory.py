@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,7 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.simulation import measures as m
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, Piece
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
+from drillctl.store.result import Result, label
 
 Array = NDArray[np.float64]
 
@@ -24,6 +20,9 @@ FINE = 0.01
 """Interval (s) on which what is not located is measured, whatever the signals' own."""
 FEWEST_SAMPLES = 500
 """Fewest intervals in a run for that; it is finer in a short run."""
+
+MOST_EVENTS = 200
+"""Events of a kind that a summary lists; the data hold all."""
 
 SIGNALS = {
     "top_speed": ("rad/s", "speed of the top drive"),
@@ -39,62 +38,38 @@ SIGNALS = {
 }
 
 
+def _unit(signal: str) -> str:
+    return SIGNALS[signal][0]
+
+
+def _meaning(signal: str) -> str:
+    return SIGNALS[signal][1]
+
+
 @dataclass(frozen=True, eq=False)
-class Simulation:
-    """One run: its signals, events, measures and energy balance.
+class Simulation(Result):
+    """One run: its signals, events, measures and energy balance."""
 
-    Attributes
-    ----------
-    design : Design
-        What was simulated.
-    time : ndarray, shape (samples,)
-        Sampling times (s).
-    signals : dict of ndarray, shape (samples,)
-        By the names of `SIGNALS`.
-    events : tuple of Event
-        Sticks and breaks loose; empty for the batch engine, which does not locate them.
-    measures : Measures
-        Over the whole run.
-    status : str
-        One of `measures.STATUSES`.
-    engine : str
-        `reference` or `batch`.
-    step : float or None
-        Fixed step (s) of the batch engine.
-    modes : int or None
-        Number of modes the batch engine carried.
-    energy : EnergyAudit or None
-        Energy balance of the reference solver.
-    """
+    kind: ClassVar[str] = "simulate"
 
-    design: Design
-    time: Array
-    signals: dict[str, Array]
-    events: tuple[Event, ...]
-    measures: m.Measures
-    status: str
-    engine: str
-    step: float | None
-    modes: int | None
-    energy: EnergyAudit | None
+    design: Design = label(means="what was simulated")
+    time: Array = label("time", unit="s", name="time", means="sampling times")
+    signals: dict[str, Array] = label(
+        "time", unit=_unit, means=_meaning, flat=True
+    )  # by the names of `SIGNALS`
+    events: tuple[Event, ...] = label(means="sticks and releases; none of the batch engine")
+    measures: m.Measures = label(means="over the whole run")
+    status: str = label(means="one of `measures.STATUSES`")
+    engine: str = label(means="`reference` or `batch`")
+    step: float | None = label(unit="s", means="fixed step of the batch engine")
+    modes: int | None = label(means="modes that the batch engine carried")
+    energy: EnergyAudit | None = label(means="energy balance of the reference solver")
 
     @property
     def share_of_yield(self) -> float | None:
         """Peak pipe torque over the torsional yield of the uppermost pipe; None if unknown."""
         limit = self.design.string.yield_torque
         return self.measures.peak_pipe_torque / limit if math.isfinite(limit) else None
-
-    @property
-    def data(self) -> xarray.Dataset:
-        """The signals as a labelled dataset over `time`."""
-        import xarray
-
-        variables = {
-            name: ("time", values, {"units": SIGNALS[name][0], "long_name": SIGNALS[name][1]})
-            for name, values in self.signals.items()
-        }
-        time = ("time", self.time, {"units": "s"})
-        return xarray.Dataset(variables, {"time": time})
 
     def summary(self) -> dict[str, Any]:
         """Measures, status, engine, step, modes, energy; SI units, None where undefined."""
@@ -105,13 +80,20 @@ class Simulation:
             "step": self.step,
             "modes": self.modes,
             "energy": None if self.energy is None else self.energy.summary(),
+            "events": {
+                kind: self._times(kind) for kind in dict.fromkeys(e.kind for e in self.events)
+            },
         }
 
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
+    def _times(self, kind: str) -> list[float]:
+        return [event.time for event in self.events if event.kind == kind][:MOST_EVENTS]
 
-        return save(self, folder)
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """The design with the engine that was used."""
+        design = self.design
+        if self.engine != (design.tables.simulation.engine or "reference"):
+            design = design.replace({"simulation.engine": self.engine})
+        return design, {}
 
 
 def sample(motion: Motion, interval: float = 0.01) -> Simulation:

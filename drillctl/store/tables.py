@@ -29,8 +29,15 @@ class Estimate(NamedTuple):
     interval: tuple[float | None, float | None] | None
 
 
+class Quantity(NamedTuple):
+    """A number (SI) in a column of several units."""
+
+    value: float | None
+    unit: str
+
+
 Cell = Any
-"""Text, a number (SI), an `Estimate`, or None."""
+"""Text, a number (SI), an `Estimate`, a `Quantity`, or None."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +51,7 @@ class Column:
     percent: bool = False  # whether a share is shown in percent
     signed: bool = False  # whether a plus is shown, as of differences
     interval: bool = False  # whether cells are estimates
+    hidden: bool = False  # whether it stands in the CSV file alone
 
     def head(self, system: units.System) -> str:
         """The head for people, with its unit."""
@@ -55,6 +63,8 @@ class Column:
         """A cell as people read it."""
         if isinstance(cell, Estimate):
             return self._estimate(cell, system)
+        if isinstance(cell, Quantity):
+            return quantity(cell.value, cell.unit, system, self.digits)
         if isinstance(cell, str):
             return cell
         if isinstance(cell, bool):
@@ -102,6 +112,21 @@ class Table:
     rows: Iterable[Sequence[Cell]]
     shown: bool = True  # to people; else in its file alone
 
+    def heads(self, system: units.System) -> list[str]:
+        """Heads for people."""
+        return [column.head(system) for column in self.columns if not column.hidden]
+
+    def texts(self, system: units.System) -> list[list[str]]:
+        """Rows for people."""
+        return [
+            [
+                column.text(cell, system)
+                for column, cell in zip(self.columns, row, strict=True)
+                if not column.hidden
+            ]
+            for row in self.rows
+        ]
+
 
 def write_csv(table: Table, folder: Path) -> None:
     """Write a table as `NAME.csv`, in SI, whole or not at all."""
@@ -115,6 +140,8 @@ def write_csv(table: Table, folder: Path) -> None:
 
 
 def _field(value: Cell) -> Any:
+    if isinstance(value, Quantity):
+        value = value.value
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return ""
     return float(value) if isinstance(value, float) else value

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from drillctl.studies.compare.compute import Comparison as Comparison
     from drillctl.studies.delay.compute import WeightDelay as WeightDelay
     from drillctl.studies.delay.compute import weight_delay as weight_delay
-    from drillctl.studies.diagnosis.examination import doctor as doctor
-    from drillctl.studies.diagnosis.result import Doctor as Doctor
+    from drillctl.studies.doctor.compute import Doctor as Doctor
+    from drillctl.studies.doctor.compute import doctor as doctor
     from drillctl.studies.loop_maps import LoopMap as LoopMap
     from drillctl.studies.loop_maps import loop_map as loop_map
     from drillctl.studies.responses import responses as responses
@@ -39,14 +39,14 @@ if TYPE_CHECKING:
 _HOME = {
     "Axis": "drillctl.ensemble.grid",
     "Comparison": "drillctl.studies.compare.compute",
-    "Doctor": "drillctl.studies.diagnosis.result",
+    "Doctor": "drillctl.studies.doctor.compute",
     "Draws": "drillctl.ensemble.parameters",
     "LoopMap": "drillctl.studies.loop_maps",
     "Region": "drillctl.ensemble.regions",
     "Sweep": "drillctl.ensemble.sweeps",
     "Uncertainty": "drillctl.studies.uncertainty",
     "WeightDelay": "drillctl.studies.delay.compute",
-    "doctor": "drillctl.studies.diagnosis.examination",
+    "doctor": "drillctl.studies.doctor.compute",
     "draw": "drillctl.ensemble.parameters",
     "loop_map": "drillctl.studies.loop_maps",
     "region": "drillctl.ensemble.regions",

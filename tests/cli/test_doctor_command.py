@@ -22,7 +22,8 @@ def test_json_and_folder(call):
     }  # fmt: skip
     assert found["audit"]["cells"] == found["audit"]["asked"] == 1
     assert {p.name for p in Path("d").iterdir()} == {
-        "run.json", "design.toml", "data.zarr", "summary.json", "errors.png",
+        "run.json", "design.toml", "data.zarr", "result.json", "summary.json", "errors.png",
+        "scheme.csv", "errors.csv", "audited.csv", "speed.csv",
     }  # fmt: skip
     again = call("doctor", DESIGN, *SMALL, "--json", "--out", "d")
     assert json.loads(again[1]) == found
@@ -34,8 +35,8 @@ def test_in_words(call):
     code, out, err = call("doctor", DESIGN, *SMALL, "--out", "d")
     assert code == 0, err
     for words in (
-        "accuracy: standard", "25 ms", "13, 18 left out", "undamped modes", "99th percentile",
-        "audited: 1 of 1 lanes", "a second", "the reference engine", "'standard'",
+        "at accuracy standard", "25 ms", "13, 18 left out", "undamped modes", "99th percentile",
+        "audit of 1 of 1 lanes", "lanes per second", "the reference engine", "'standard'",
     ):  # fmt: skip
         assert words in out
     assert out.split("results")[0] in call("doctor", DESIGN, *SMALL, "--out", "d")[1]

@@ -119,7 +119,7 @@ def test_audit_is_marked_and_judged(design, field):
     assert "audit: ok (2 cells, worst 1.0e-03 relative in J1)" in figure.get_supxlabel()
     bad = Audit(cells, field.ravel()[cells], np.array([np.nan, np.nan]))
     assert (
-        "audit: look (2 cells, none finished"
+        "audit: check (2 cells, none finished"
         in stability_map(made(design, field, audit=bad)).get_supxlabel()
     )
 
@@ -209,7 +209,7 @@ def test_line_shows_levels_and_audit(design, field):
     dashed = [line.get_ydata()[0] for line in ax.get_lines() if line.get_linestyle() == "--"]
     assert dashed == list(LEVELS)
     assert [text.get_text() for text in ax.texts] == ["20", "30", "40"]
-    assert "audit: look" in figure.get_supxlabel()
+    assert "audit: check" in figure.get_supxlabel()
 
 
 def test_line_with_failed_cells(design, field):

@@ -295,7 +295,7 @@ def test_returns_do_not_count_ripples_or_micro_slips():
          if piece.begin > run.times[0]]
     )  # fmt: skip
     above = fine + design.speed > 18.0
-    releases = [x for x in motion.events if x.kind == "slip" and x.time > run.times[0]]
+    releases = [x for x in motion.events if x.kind == "release" and x.time > run.times[0]]
     assert np.sum(above[1:] & ~above[:-1]) > len(run.times) + 2
     assert len(releases) > len(run.times) + 2
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import drillctl
+from benchmarks.cost import count
 from drillctl import catalog
 from drillctl.simulation.batch import Prepared, prepare
-from drillctl.simulation.cost import count
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.propagator import string_step
-from drillctl.studies.diagnosis import scheme_reasons
-from drillctl.studies.diagnosis.scheme_reasons import explain
+from drillctl.studies.doctor import scheme_reasons
+from drillctl.studies.doctor.scheme_reasons import explain
 
 PAPER = "monteiro-trindade-140kn"
 

@@ -74,11 +74,11 @@ def test_choice_leaves_failed_cells_out():
     [
         ([], [], "none", None),
         ([10.0, 20.0], [10.0, 20.1], "ok", 0.1 / 20.1),
-        ([10.0, 20.0], [10.0, 20.3], "look", 0.3 / 20.3),
-        ([10.0, 20.0], [10.05, np.nan], "look", 0.05 / 10.05),
-        ([10.0], [np.nan], "look", None),
+        ([10.0, 20.0], [10.0, 20.3], "check", 0.3 / 20.3),
+        ([10.0, 20.0], [10.05, np.nan], "check", 0.05 / 10.05),
+        ([10.0], [np.nan], "check", None),
         ([0.0, 1.0], [0.0, 1.0], "ok", 0.0),
-        ([1e-3], [0.0], "look", 1e4),
+        ([1e-3], [0.0], "check", 1e4),
         ([1e-12], [0.0], "ok", 1e-5),
     ],
 )
@@ -101,7 +101,7 @@ def test_a_reference_that_fails_is_a_verdict_not_an_exception(design, monkeypatc
     axes = axes_of(design, design.tables.map.axes)
     values = np.full((3, 2), 5.0)
     found = audit(design, axes, values, LEVELS, 1)  # one cell is run in this process
-    assert found.verdict == "look"
+    assert found.verdict == "check"
     assert found.worst is None
     assert found.batch.tolist() == [5.0]
 

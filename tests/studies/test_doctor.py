@@ -9,9 +9,9 @@ import drillctl
 from drillctl.design.reading import parse_axis
 from drillctl.ensemble import audit
 from drillctl.errors import InputError
-from drillctl.studies.diagnosis import examination
-from drillctl.studies.diagnosis import result as diagnosis
-from drillctl.studies.diagnosis.error_estimate import PROMISES, ErrorEstimate, Promise, errors_of
+from drillctl.studies.doctor import examination
+from drillctl.studies.doctor import result as diagnosis
+from drillctl.studies.doctor.error_estimate import PROMISES, ErrorEstimate, Promise, errors_of
 
 PAPER = "monteiro-trindade-140kn"
 GAINS = ("controller.kp=100:1000:9", "controller.ki=20:500:7")
@@ -63,16 +63,6 @@ def test_the_speed_is_of_whole_lanes(found):
     steps = found.scheme["steps"] * speed["lanes_per_second"]
     # Threads at work at least, at most all of those there are, by the processor's own time.
     assert 0.0 < steps * speed["lane_step_ns"] * 1e-9 < 1.2 * speed["threads"]
-    assert speed["mode_ns"] * found.scheme["modes"] + speed["laws_ns"] == pytest.approx(
-        speed["lane_step_ns"]
-    )
-    # A peak that was measured on a busy core is any number: shares are held to what they are of.
-    assert speed["share_of_peak"] * speed["lane_step_ns"] * 1e-9 == pytest.approx(
-        speed["flops_per_step"] / speed["peak_flops"]
-    )
-    assert speed["pass_share_of_peak"] * speed["mode_ns"] * 1e-9 * found.scheme["modes"] == (
-        pytest.approx(speed["flops_per_step"] / speed["peak_flops"])
-    )
 
 
 def test_it_comes_back_from_disk(found, tmp_path):
@@ -226,7 +216,7 @@ def test_an_audit_that_differs_by_more_than_said_is_looked_at(found):
     worse = audit.Audit(checked.cells, checked.batch, checked.reference * (1 + 1e-2))
     doubted = dataclasses.replace(found, audit=worse)
     assert doubted.confirmed is False
-    assert doubted.verdict in ("look", "not_reached")
+    assert doubted.verdict in ("check", "not_reached")
     none = np.empty(0)
     unaudited = dataclasses.replace(found, audit=audit.Audit(none.astype(int), none, none))
     assert unaudited.confirmed is None
@@ -236,5 +226,5 @@ def test_an_audit_that_differs_by_more_than_said_is_looked_at(found):
 def test_the_audit_begins_no_run_after_its_time(monkeypatch):
     monkeypatch.setattr(examination, "AUDIT_SECONDS", 0.0)
     few = examined(cells=5, **{"simulation.duration": "5 s", "map.levels": [10, 20]})
-    assert len(few.audit.cells) < few.asked == 5
+    assert len(few.audit.cells) < few.requested_audit == 5
     assert np.isfinite(few.audit.reference).all()

@@ -65,6 +65,13 @@ KINDS = (
 """Every section, in the order in which they are read."""
 
 
+_ORDER = {
+    "summary": 0, "rig": 10, "operating-point": 20, "modes": 30, "loop": 40, "map": 50,
+    "responses": 60, "uncertainty": 70, "sensitivity": 80, "tuning": 90, "comparison": 100,
+    "advantage": 110, "audit": 120, "glossary": 130,
+}  # fmt: skip
+
+
 def _generic(name: str, study: Study) -> Callable[[Gathered], tuple[Block, ...]]:
     """Remarks, pictures and tables of a study, for a section that says no more."""
 
@@ -88,18 +95,14 @@ def figure(picture: Picture, name: str, system: units.System) -> Figure:
 
 def block(table: Results, system: units.System) -> Table:
     """A table of a study as a block of a report."""
-    heads = tuple(column.head(system) for column in table.columns)
-    rows = tuple(
-        tuple(column.text(cell, system) for column, cell in zip(table.columns, row, strict=True))
-        for row in table.rows
-    )
+    heads, rows = tuple(table.heads(system)), tuple(map(tuple, table.texts(system)))
     caption = table.title[0].upper() + table.title[1:]
     return Table(table.name, caption, heads, rows)
 
 
 def _sections() -> dict[str, Kind]:
     """Every section by name, in the order in which they are read."""
-    placed = [(10 * number, kind) for number, kind in enumerate(KINDS)]
+    placed = [(_ORDER[kind.name], kind) for kind in KINDS]
     for study in studies().values():
         for one in study.sections:
             build = one.build or _generic(one.reads[0], study)

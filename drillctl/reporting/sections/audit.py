@@ -61,7 +61,7 @@ def _checks(gathered: Gathered) -> list[Check]:
             told += f"; better: {found['advice']}"
         accuracy = gathered.design.tables.simulation.accuracy
         question = f"Is the accuracy {accuracy!r} reached?"
-        checks.append(Check(question, found["verdict"] in ("ok", "look"), told))
+        checks.append(Check(question, found["verdict"] in ("ok", "check"), told))
     return checks
 
 

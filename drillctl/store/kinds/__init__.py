@@ -3,7 +3,6 @@
 from drillctl.store.kinds import (
     advantage,
     comparisons,
-    doctor,
     linear,
     maps,
     runs,
@@ -19,6 +18,5 @@ KINDS = (
     *advantage.KINDS,
     *uncertainty.KINDS,
     *tuning.KINDS,
-    *doctor.KINDS,
 )
 """Every kind that is written and read back."""

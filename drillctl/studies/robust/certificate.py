@@ -88,13 +88,13 @@ class Certificate:
     def audit_verdict(self) -> str:
         """`ok` if both solvers put every audited draw on the same side of the level.
 
-        `look` if they do not, or if the reference solver failed; `none` without audited draws.
+        `check` if they do not, or if the reference solver failed; `none` without audited draws.
         How far two solvers are apart on a draw that sticks to the end says little here.
         """
         if not len(self.audit.cells):
             return "none"
         fine = np.isfinite(self.audit.reference).all() and self.other_side == 0
-        return "ok" if fine else "look"
+        return "ok" if fine else "check"
 
     @property
     def message(self) -> str:

@@ -89,7 +89,7 @@ def test_margins_and_audit_are_those_of_their_rooms(found):
     assert certificate.audit_verdict == "ok"
     beyond = dataclasses.replace(audit, reference=audit.reference + 100.0)
     other = dataclasses.replace(certificate, audit=beyond)
-    assert (other.other_side, other.audit_verdict) == ((audit.batch <= 33.0).sum(), "look")
+    assert (other.other_side, other.audit_verdict) == ((audit.batch <= 33.0).sum(), "check")
 
 
 @pytest.mark.parametrize(

@@ -8,29 +8,33 @@ simulated again with the reference solver.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.ensemble import audit as auditing
-from drillctl.ensemble.grid import Axis, Group, axes_of, cell_design, groups, shape_of
-from drillctl.ensemble.running import measured
+from drillctl.ensemble.grid import Axis, Group, axes_of, cell_design, groups, shape_of, span
+from drillctl.ensemble.running import load_kernel, measured
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
+from drillctl.provenance import provenance
 from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.simulation.batch import Prepared, prepare
-from drillctl.studies.diagnosis.engine_speed import Speed, engine_speed
-from drillctl.studies.diagnosis.error_estimate import (
+from drillctl.simulation.lanes import Lanes
+from drillctl.simulation.measures import STATUSES
+from drillctl.store.result import Result, label
+from drillctl.studies.doctor.error_estimate import (
     PROMISES,
     REFINEMENTS,
     ErrorEstimate,
     errors_of,
     refined,
 )
-from drillctl.studies.diagnosis.result import Doctor
-from drillctl.studies.diagnosis.scheme_reasons import SchemeReasons, explain
+from drillctl.studies.doctor.scheme_reasons import SchemeReasons, explain
 
 Array = NDArray[np.float64]
 
@@ -43,6 +47,131 @@ AUDIT_SECONDS = 10.0
 """After so long (s) no further run of the reference solver is begun."""
 LEAST_ORDER = 1.0
 """Order under which a shorter step is no advice."""
+
+
+CONFIRMED, REFERENCE = 3.0, 1e-6
+"""An audited difference confirms an estimate up to so many times it, and what the reference
+solver itself is good for."""
+TIMED_SECONDS = 0.3
+"""Least length of a timed run (s)."""
+MOST_LANES = 65_536
+REPEATS = 3
+"""Runs of which the fastest counts: what others take of the machine is not the engine."""
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Speed of the engine on lanes of a design, the kernel warm."""
+
+    threads: int
+    lanes: int  # in a timed run
+    seconds: float  # it took (s)
+    lanes_per_second: float  # whole lanes, from their start to the end of their horizon
+    lane_step_ns: float  # processor time of a step of a lane (ns)
+
+
+@dataclass(frozen=True, eq=False)
+class Doctor(Result):
+    """What the batch engine does with a design, on a sample of the cells of its map.
+
+    The sample is the design alone where the default map does not fit it. `scheme` holds step,
+    modes and the reasons for them, of the string with the shortest step if axes change the
+    string.
+    """
+
+    kind: ClassVar[str] = "doctor"
+
+    design: Design = label(means="that was examined")
+    axes: tuple[Axis, ...] = label(means="of the map that the sample is from")
+    cells: NDArray[np.int64] = label("lane", name="cell", means="the sample, in the flattened map")
+    estimate: ErrorEstimate = label(flat=True, means="J1 of the lanes at three schemes")
+    status: NDArray[np.int8] = label("lane", flags=STATUSES, means="status at the scheme")
+    scheme: dict[str, Any] | None = label(means="None if the engine refuses the design")
+    strings: int = label(means="strings in the sample")
+    audit: auditing.Audit = label(means="lanes simulated again with the reference solver")
+    requested_audit: int = label(means="how many were requested")
+    speed: dict[str, Any] | None = label(means="as `Speed`")
+    refused: str | None = label(means="why the batch engine does not take this design")
+    advice: str | None = label(means="what would keep the promise of the accuracy")
+    total_seconds: float = label(unit="s", means="from call to return")
+    provenance: dict[str, str] = label(
+        default_factory=provenance, means="versions and processor it came from"
+    )
+
+    @property
+    def engine(self) -> str:
+        """Engine that `simulate` uses for this design."""
+        return self.design.tables.simulation.engine or "reference"
+
+    @property
+    def accuracy(self) -> str:
+        """Accuracy that the design asks for; explicit steps and modes are held to it too."""
+        return self.design.tables.simulation.accuracy
+
+    @property
+    def confirmed(self) -> bool | None:
+        """Whether the audited differences are such as the estimate says; None without any."""
+        known = np.isfinite(self.audit.differences)
+        if not known.any():
+            return None
+        own = self.estimate.of_lanes[np.searchsorted(self.cells, self.audit.cells)]
+        said = np.fmax(own, self.estimate.errors.median)
+        allowed = CONFIRMED * said + REFERENCE
+        return bool((self.audit.differences[known] <= allowed[known]).all())
+
+    @property
+    def verdict(self) -> str:
+        """`ok`, `not_reached`, `check` if the audit does not confirm the estimate, `refused`."""
+        if self.refused is not None:
+            return "refused"
+        if not PROMISES[self.accuracy].kept(self.estimate.of_lanes):
+            return "not_reached"
+        return "check" if self.confirmed is False else "ok"
+
+    def summary(self) -> dict[str, Any]:
+        """Scheme and reasons, estimated and audited error, speed, verdict; SI units."""
+        promise = PROMISES[self.accuracy]
+        scheme = None if self.scheme is None else self.scheme | {"strings": self.strings}
+        return {
+            "verdict": self.verdict,
+            "refused": self.refused,
+            "advice": self.advice,
+            "engine": self.engine,
+            "scheme": scheme,
+            "estimate": {
+                "lanes": len(self.cells),
+                "failed": int((~np.isfinite(self.estimate.of_lanes)).sum()),
+                **self.estimate.errors.summary(),
+                "order": self.estimate.order,
+                "promised": {"median": promise.median, "p99": promise.p99},
+            },
+            "audit": {
+                **self.audit.summary(),
+                "asked": self.requested_audit,
+                "confirms_estimate": self.confirmed,
+                "lanes": [self._audited(i) for i in range(len(self.audit.cells))],
+            },
+            "speed": self.speed,
+            "axes": span(self.axes),
+            "total_seconds": self.total_seconds,
+        }
+
+    def _audited(self, number: int) -> dict[str, Any]:
+        cell = int(self.audit.cells[number])
+        where = np.unravel_index(cell, shape_of(self.axes)) if self.axes else ()
+        lane = int(np.searchsorted(self.cells, cell))
+        return {
+            "at": {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)},
+            "j1": float(self.audit.batch[number]),
+            "reference_j1": float(self.audit.reference[number]),
+            "relative_difference": float(self.audit.differences[number]),
+            "estimated_error": float(self.estimate.of_lanes[lane]),
+        }
+
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """How many lanes were audited, where that is not usual."""
+        audit = {} if self.requested_audit == AUDITED else {"audit": self.requested_audit}
+        return self.design, audit
 
 
 def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILENT) -> Doctor:
@@ -89,8 +218,8 @@ def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILE
         scheme=main.reasons().summary(),
         strings=len(sample.parts),
         audit=audited,
-        asked=audit_cells,
-        speed=speed.summary(),
+        requested_audit=audit_cells,
+        speed=asdict(speed),
         refused=None,
         advice=advice,
         total_seconds=time.perf_counter() - begin,
@@ -109,7 +238,7 @@ def _refused(design: Design, begin: float) -> Doctor:
         scheme=None,
         strings=0,
         audit=auditing.Audit(np.empty(0, dtype=np.int64), none, none),
-        asked=0,
+        requested_audit=0,
         speed=None,
         refused="'printed-three-branch' is not a law of the batch engine: maps, regions and "
         "comparisons refuse it; single runs with the reference solver take it",
@@ -211,8 +340,28 @@ def _audited(
 
 
 def _speed(part: _Part) -> Speed:
-    lanes = part.group.some(part.chosen)
-    return engine_speed(lanes, part.prepared)
+    """Time enough lanes for about two seconds."""
+    lanes, prepared = part.group.some(part.chosen), part.prepared
+    load_kernel(lanes, prepared)
+    many = lanes
+    while (seconds := _best(many, prepared, 1)[0]) < TIMED_SECONDS and len(many) < MOST_LANES:
+        # The first runs are slow for other reasons than their lanes: not too much at once.
+        wanted = len(many) * min(10.0, max(1.5, 1.3 * TIMED_SECONDS / seconds))
+        many = lanes[np.arange(min(MOST_LANES, int(wanted) + 1)) % len(lanes)]
+    seconds, used = _best(many, prepared, REPEATS)
+    step = 1e9 * used / (len(many) * prepared.scheme.steps)
+    return Speed(numba.get_num_threads(), len(many), seconds, len(many) / seconds, step)
+
+
+def _best(lanes: Lanes, prepared: Prepared, repeats: int) -> tuple[float, float]:
+    """Least time on the clock and of all threads (s)."""
+    results = []
+    for _ in range(repeats):
+        begin, used = time.perf_counter(), time.process_time()
+        measured(lanes, prepared)
+        results.append((time.perf_counter() - begin, time.process_time() - used))
+    clock, busy = zip(*results, strict=True)
+    return min(clock), min(busy)
 
 
 def _advice(design: Design, sample: _Sample, estimate: ErrorEstimate, main: _Part) -> str:

@@ -14,6 +14,7 @@ from drillctl.rig.drillstring import Drillstring
 from drillctl.simulation.batch import Prepared
 from drillctl.simulation.propagator import string_step
 from drillctl.simulation.scheme import ACCURACIES, Scheme
+from drillctl.store.result import label
 
 Array = NDArray[np.float64]
 
@@ -97,7 +98,7 @@ class ErrorEstimate:
 
     # shape (3, lanes): At the scheme, at half and at a quarter of its step (s); NaN where a lane
     # failed
-    j1: Array
+    j1: Array = label("refinement", "lane", unit="s")
 
     @cached_property
     def best(self) -> Array:

@@ -1,0 +1,172 @@
+"""One run of a design: time response, measures, energy balance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, Literal
+
+from drillctl.studies.applies import in_batch
+from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Study
+
+if TYPE_CHECKING:
+    from drillctl.design import Design
+    from drillctl.simulation.trajectory import Simulation
+    from drillctl.store.tables import Table
+
+HIDDEN = ("j1_rate", "work_at_bit", "time_outside_table")
+"""Measures that are in the summary alone."""
+FREE = 20.0
+"""Interval (s) between the samples of a run that is kept for its measures alone."""
+FINE = 0.05
+"""And of one that is drawn (s)."""
+
+
+def computed(design: Design, run: Run) -> Simulation:
+    """The run, by the design's engine."""
+    from drillctl.simulation import simulate
+
+    run.progress.begin("simulating", 1)
+    return simulate(design, interval=run.options.get("interval", 0.01))
+
+
+def tables(result: Simulation) -> Iterator[Table]:
+    """Measures, status and engine."""
+    from drillctl.simulation.measures import MEASURES
+    from drillctl.store.tables import Column, Quantity, Table
+
+    rows: list[list[Any]] = [
+        [one.label, Quantity(getattr(result.measures, one.name), one.unit), one.unit]
+        for one in MEASURES.values()
+        if one.name not in HIDDEN
+    ]
+    if result.share_of_yield is not None:
+        rows.append(["peak pipe torque over torsional yield", f"{result.share_of_yield:.1%}", ""])
+    if result.energy is not None:
+        residual = f"{result.energy.relative_residual:.0e} of the work"
+        rows.append(["energy that does not balance", residual, ""])
+    rows.append(["status", result.status.replace("_", " "), ""])
+    engine = result.engine
+    if result.step is not None:
+        engine = f"{engine} engine, step {result.step * 1e3:g} ms, {result.modes} modes"
+    else:
+        engine = f"{engine} solver"
+    columns = (Column("measure"), Column("value"), Column("unit", hidden=True))
+    yield Table("measures", f"one run ({engine})", columns, rows)
+
+
+def pictures(result: Simulation) -> Iterator[Picture]:
+    """Speeds, torques and weight over time."""
+    from drillctl import plots
+
+    yield Picture(
+        "time-response", "Speeds of bit and top drive over time; grey where the bit stands still.",
+        f"Time response: {result.status.replace('_', ' ')}, J1 {result.measures.j1:.4g} s.",
+        lambda system: plots.time_response(result),
+    )  # fmt: skip
+
+
+def summary(result: Simulation) -> dict[str, Any]:
+    """The result's own, and the share of the torsional yield where the grade is known."""
+    found = result.summary()
+    if result.share_of_yield is not None:
+        found["share_of_torsional_yield"] = result.share_of_yield
+    return found
+
+
+def _cell(which: str) -> Callable[[Requested], Design]:
+    """The design of the best or of a bad cell of the map."""
+
+    def variant(request: Requested) -> Design:
+        from drillctl import units
+
+        at = request.summary("cells")[which]
+        values = {path: units.SI(value) for path, value in at.items()}
+        return request.design.replace({**values, "simulation.engine": "batch"})
+
+    return variant
+
+
+def _no_such_cell(which: str) -> Callable[[Requested], str]:
+    def missing(request: Requested) -> str:
+        return "" if request.summary("cells")[which] else f"the map has no {which} cell"
+
+    return missing
+
+
+def _finer_mesh(parts: int) -> Callable[[Requested], Design]:
+    """The design by the batch engine with its elements divided."""
+
+    def variant(request: Requested) -> Design:
+        design = request.design.replace({"simulation.engine": "batch"})
+        if parts == 1:
+            return design
+        counts = {part.name: part.elements for part in design.string.parts.sections}
+        return design.replace({
+            f"drillstring.sections.{table.name}.elements": parts * counts[table.name]
+            for table in design.tables.drillstring.sections
+            if table.stiffness is None
+        })  # fmt: skip
+
+    return variant
+
+
+def _finer_step(parts: int) -> Callable[[Requested], Design]:
+    """The design by the batch engine with its step divided."""
+
+    def variant(request: Requested) -> Design:
+        from drillctl import units
+
+        step = units.SI(request.summary("mesh-1")["step"] / parts)
+        return request.design.replace({"simulation.engine": "batch", "simulation.step": step})
+
+    return variant
+
+
+def _without_mesh(request: Requested) -> str:
+    if all(table.stiffness is not None for table in request.design.tables.drillstring.sections):
+        return "a lumped string has no mesh"
+    return in_batch(request)
+
+
+def _recipes() -> Iterator[Recipe]:
+    """The run at the current setting, at cells of the map, with finer steps and meshes."""
+    drawn, numbers = {"interval": FINE}, {"interval": FREE}
+    yield Recipe("simulate", "the run at the current setting", options=drawn, order=20)
+    for order, which, title in ((60, "best", "the best cell"), (70, "bad", "a bad cell")):
+        yield Recipe(
+            which, f"the run at {title}", _no_such_cell(which), _cell(which), ("cells",), drawn,
+            order=order,
+        )  # fmt: skip
+    yield Recipe(
+        "mesh-1", "the run by the batch engine", in_batch, _finer_mesh(1), (), numbers, order=140
+    )
+    for order, parts, title in ((141, 2, "twice"), (142, 4, "four times")):
+        yield Recipe(
+            f"mesh-{parts}", f"the run with {title} the elements", _without_mesh,
+            _finer_mesh(parts), (), numbers, order=order,
+        )  # fmt: skip
+    for order, parts, title in ((143, 2, "half the step"), (144, 4, "a quarter of the step")):
+        yield Recipe(
+            f"step-{parts}", f"the run with {title}", in_batch, _finer_step(parts), ("mesh-1",),
+            numbers, order=order,
+        )  # fmt: skip
+
+
+STUDY = Study(
+    name="simulate",
+    help="Simulate one run: time response, measures, energy",
+    group="Simulate",
+    compute=computed,
+    options=(
+        Option(
+            "engine", Literal["reference", "batch"], "Located events, or fixed steps.",
+            sets="simulation.engine",
+        ),
+    ),
+    python="simulate",
+    call="drillctl.simulation:simulate",
+    tables=tables,
+    pictures=pictures,
+    summary=summary,
+    recipes=tuple(_recipes()),
+)  # fmt: skip
