@@ -29,7 +29,7 @@ UPWARD = {
 }
 CIRCLES = {"linear", "store"}  # rooms that hold one
 LEAVING = ("printing",)  # folders that are no room
-STRAY = {"machine"}  # modules beside the rooms that are not of the ground
+STRAY: set[str] = set()  # modules beside the rooms that are not of the ground
 
 
 def name_of(path: Path) -> str:
