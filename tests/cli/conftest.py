@@ -3,6 +3,7 @@
 import ctypes
 import os
 import sys
+from importlib import import_module
 
 import pytest
 
@@ -13,7 +14,9 @@ from drillctl.cli import run
 def _own_folder(tmp_path, monkeypatch):
     """Runs go to a folder of their own; pictures are not rendered."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("drillctl.cli.running.draw", lambda figure, path: path.touch())
+    for place in ("running", "verb"):
+        module = import_module(f"drillctl.cli.{place}")
+        monkeypatch.setattr(module, "draw", lambda figure, path: path.touch())
 
 
 @pytest.fixture

@@ -173,28 +173,6 @@ def test_cycle_json(call):
     assert abs(back.orbit.multipliers[0]) == pytest.approx(0.6014, abs=1e-4)
 
 
-def test_regions_json(call):
-    axes = ["--axis", "controller.torque=9 kN*m:11 kN*m:3",
-            "--axis", "operating_point.weight_on_bit=96 kN:98.694 kN:3"]  # fmt: skip
-    code, out, _ = call("regions", BISTABLE, "--json", *axes)
-    found = parsed(out)
-    assert code == 0
-    assert found["counts"]["bistable"] > 0
-    assert drillctl.open(f"runs/{BISTABLE}-regions-1").summary() == found
-
-
-def test_regularisation_json(call):
-    axes = ["--axis", "controller.kp=500:650:2", "--axis", "controller.ki=75:150:2"]
-    code, out, _ = call("regularisation", DESIGN, "--json", *axes)
-    found = parsed(out)
-    assert code == 0
-    assert len(found["widths"]) == 6
-    assert drillctl.open(f"runs/{DESIGN}-regularisation-1").summary() == found
-    code, out, _ = call("regularisation", DESIGN, *axes)
-    assert code == 0
-    assert "0.02 rad/s" in out
-
-
 def test_regions_over_one_parameter_are_refused_at_once(call):
     axis = ["--axis", "controller.torque=9 kN*m:11 kN*m:3"]
     code, out, err = call("regions", BISTABLE, *axis, "--out", "one")
@@ -636,11 +614,11 @@ def test_out_with_a_foreign_run_json(call, content):
     assert Path("odd/run.json").read_text() == content
 
 
-@pytest.mark.parametrize("verb", ["modes", "simulate", "map", "loop", "cycle", "regions"])
+@pytest.mark.parametrize("verb", ["modes", "simulate", "map", "loop", "cycle"])
 def test_finished_run_is_shown_again_not_computed(call, monkeypatch, verb):
     arguments = [verb, BISTABLE, *(["--audit", "0"] if verb == "map" else []), *SHORT]
     axis = ["--axis", "start.speed=1 rad/s:14 rad/s:3"] if verb == "map" else []
-    if verb in ("loop", "regions"):
+    if verb == "loop":
         torque = "controller.torque=8 kN*m:12 kN*m:3"
         axis = ["--axis", "start.speed=1 rad/s:14 rad/s:3", "--axis", torque]
     arguments += [*axis, "--out", "once"]
@@ -653,7 +631,6 @@ def test_finished_run_is_shown_again_not_computed(call, monkeypatch, verb):
 
     for place in (
         "linear.modes", "linear.loop", "limit_cycle", "simulate", "studies.sweep",
-        "studies.three_regions",
     ):  # fmt: skip
         monkeypatch.setattr(f"drillctl.{place}", fail, raising=False)
     code, again, err = call(*arguments)
