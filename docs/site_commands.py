@@ -7,7 +7,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
-from drillctl.cli import VERBS, app
+from drillctl.cli import app
 
 
 class Verbs(SphinxDirective):
@@ -16,7 +16,7 @@ class Verbs(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         """Sections in the order of the program's own help."""
         program = typer.main.get_command(app)
-        return [self._section(verb, program.commands[verb]) for verb in VERBS]
+        return [self._section(verb, program.commands[verb]) for verb in program.commands]
 
     def _section(self, verb: str, command: click.Command) -> nodes.section:
         section = nodes.section(ids=[nodes.make_id(verb)], names=[verb])

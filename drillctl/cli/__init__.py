@@ -19,31 +19,31 @@ from drillctl.cli import (
 )
 from drillctl.cli.app import app, run
 from drillctl.cli.verb import command
-from drillctl.studies.base import studies
+from drillctl.studies.base import Group, studies
 
-VERBS: dict[str, Callable[..., None]] = {
-    "models": files.models,
-    "designs": files.designs,
-    "new": files.new,
-    "show": files.show,
-    "validate": files.validate,
-    "modes": linear.modes,
-    "loop": linear.loop,
-    "cycle": linear.cycle,
-    "map": maps.stability_map,
-    "compare": comparisons.compare,
-    "delay": comparisons.delay,
-    "advantage": advantage.advantage,
-    "uncertainty": uncertain.uncertainty,
-    "tune": tuning.tune,
-    "report": reports.report,
+VERBS: dict[str, tuple[Callable[..., None], Group]] = {
+    "models": (files.models, "Describe a rig"),
+    "designs": (files.designs, "Describe a rig"),
+    "new": (files.new, "Describe a rig"),
+    "show": (files.show, "Describe a rig"),
+    "validate": (files.validate, "Describe a rig"),
+    "modes": (linear.modes, "Analyse the loop"),
+    "loop": (linear.loop, "Analyse the loop"),
+    "cycle": (linear.cycle, "Analyse the loop"),
+    "map": (maps.stability_map, "Simulate"),
+    "compare": (comparisons.compare, "Decide"),
+    "delay": (comparisons.delay, "Decide"),
+    "advantage": (advantage.advantage, "Decide"),
+    "uncertainty": (uncertain.uncertainty, "Decide"),
+    "tune": (tuning.tune, "Decide"),
+    "report": (reports.report, "Hand over"),
 }
-"""Every verb, in the order of the help."""
+"""Commands that are no study, with their groups in the help."""
 
-for name, verb in VERBS.items():
-    app.command(name=name)(verb)
+for name, (verb, group) in VERBS.items():
+    app.command(name=name, rich_help_panel=group)(verb)
 for name, study in studies().items():
     if study.command:
-        app.command(name=name)(command(study))
+        app.command(name=name, rich_help_panel=study.group)(command(study))
 
 __all__ = ["VERBS", "app", "run"]

@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 import traceback
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
+from typer.core import TyperGroup
 
 from drillctl import __version__
 from drillctl.errors import DrillctlError, InputError
+from drillctl.studies.base import Group
+
+
+class GroupedCommands(TyperGroup):
+    """Commands under what a person wants to do, their help lines never cut off."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write a section a group, in the order of the groups."""
+        for group in get_args(Group):
+            with formatter.section(group):
+                formatter.write_dl([
+                    (name, command.help or "")
+                    for name, command in self.commands.items()
+                    if getattr(command, "rich_help_panel", None) == group
+                ])  # fmt: skip
+
 
 app = typer.Typer(
     name="drillctl",
+    cls=GroupedCommands,
     help="Control design against torsional stick-slip of oil-well drillstrings.",
     no_args_is_help=True,
     add_completion=False,

@@ -9,30 +9,30 @@ import typer
 from drillctl.cli.options import Debug, DesignName, Json, Sets, loaded
 
 
-def _shelf(shelf: Literal["models", "designs"], as_json: bool) -> None:
+def _listed(kind: Literal["models", "designs"], as_json: bool) -> None:
     from drillctl import catalog
     from drillctl.cli import console
 
-    found = catalog.entries(shelf)
+    found = catalog.entries(kind)
     if as_json:
         keys = [{"name": e.name, "title": e.title, "path": str(e.path)} for e in found]
-        console.emit({shelf: keys})
+        console.emit({kind: keys})
     else:
-        console.table(shelf, ["name", "title"], [[e.name, e.title] for e in found])
+        console.table(kind, ["name", "title"], [[e.name, e.title] for e in found])
 
 
 def models(json: Json = False, debug: Debug = False) -> None:
     """List the shipped models (rigs)."""
-    _shelf("models", json)
+    _listed("models", json)
 
 
 def designs(json: Json = False, debug: Debug = False) -> None:
     """List the shipped designs (cases to run)."""
-    _shelf("designs", json)
+    _listed("designs", json)
 
 
 def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False) -> None:
-    """Print a design with its model and all defaults put in."""
+    """Print a design with its model and every default."""
     from drillctl.cli import console
     from drillctl.design import to_toml
     from drillctl.design.reading import to_tree
@@ -47,7 +47,7 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
 def validate(
     design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False
 ) -> None:
-    """Check a design: every key, unit and range, its axes, draws and cases."""
+    """Check keys, units and ranges, axes, draws and cases."""
     from drillctl.cli import console
     from drillctl.studies.checking import refuse_what_studies_would
 

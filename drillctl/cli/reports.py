@@ -23,7 +23,7 @@ def report(
     ] = "quick",
     sections: Annotated[
         str | None,
-        typer.Option("--sections", metavar="NAME,NAME", help="These sections alone."),
+        typer.Option("--sections", metavar="NAME,NAME", help="Write only these sections."),
     ] = None,
     title: Annotated[
         str | None, typer.Option("--title", help="Title instead of the design's own.")
@@ -33,7 +33,7 @@ def report(
         typer.Option("--format", metavar="html|pdf|md", help="What to write; repeatable."),
     ] = None,
 ) -> None:
-    """The whole design decided, drawn and audited: one HTML file, PDF or Markdown."""
+    """Full report: verdict, figures, accuracy audit."""
     from drillctl.reporting import report as made
 
     with console.progress() as bar, running.library_output_on_stderr():

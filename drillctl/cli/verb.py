@@ -46,7 +46,7 @@ def command(study: Study) -> Callable[..., None]:
         *own,
         *(parameter.replace(kind=_KEYWORD) for parameter in shared.values()),
     ]
-    verb.__name__, verb.__doc__ = study.name, study.help
+    verb.__name__, verb.__doc__ = study.name, f"{study.help}."
     verb.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     verb.__annotations__ = {one.name: one.annotation for one in parameters}
     return verb
