@@ -11,7 +11,7 @@ import numpy as np
 
 import drillctl
 from drillctl.studies.robust import linear_design, search, tuned_parameters
-from drillctl.studies.robust.judge import Judge, Point
+from drillctl.studies.robust.problem import GainProblem, Point
 
 BOUNDS = {"controller.kp": {"min": 200, "max": 1200}, "controller.ki": {"min": 5, "max": 400}}
 CASES = (
@@ -50,7 +50,7 @@ def row(weight: str, speed: str, length: str) -> str:
     design = drillctl.load("monteiro-trindade-140kn", **values)
     linear, found = linear_design(design), search(design)
     fresh = design.replace({"tune": {"realizations": FRESH, "seed": 4242}})
-    judge = Judge(fresh, tuned_parameters(fresh))
+    judge = GainProblem(fresh, tuned_parameters(fresh))
     by_rule, best = judge.points(np.stack([linear.values, found.values]), FRESH)
     margin = f"{linear.slope_margin:.0f} ({linear.slope_margin - linear.excess:.0f})"
     return (

@@ -32,7 +32,7 @@ from drillctl.plots.style import (
 
 if TYPE_CHECKING:
     from drillctl.studies.robust import Tune
-    from drillctl.studies.robust.fresh import FreshRuns
+    from drillctl.studies.robust.certificate import FreshRuns
 
 ROW = 0.42
 """Height of a row (inches)."""

@@ -11,7 +11,7 @@ from drillctl.printing.words import title_of
 if TYPE_CHECKING:
     from drillctl.studies.robust import Tune
     from drillctl.studies.robust.baselines import Baseline
-    from drillctl.studies.robust.fresh import FreshRuns
+    from drillctl.studies.robust.certificate import FreshRuns
 
 
 def tune(result: Tune, system: units.System) -> None:
@@ -22,7 +22,7 @@ def tune(result: Tune, system: units.System) -> None:
     found = result.tuning
     line(
         f"search: {found.trajectories:,} trajectories at {found.realizations} realizations, "
-        f"{found.seconds:.1f} s; derivatives: {found.derivatives}"
+        f"{found.seconds:.1f} s"
     )
     line(
         f"certificate: {result.certificate.trajectories:,} trajectories, "

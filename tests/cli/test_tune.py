@@ -30,16 +30,8 @@ SMALL = [
 
 
 @pytest.fixture
-def quick(call, monkeypatch):
-    """The command without derivatives, which cost more than all the rest."""
-    from drillctl.studies.robust import tune_study
-
-    search = tune_study.search
-    monkeypatch.setattr(
-        tune_study, "search", lambda design, progress, derivatives, verbose: search(
-            design, progress, False, verbose
-        )
-    )  # fmt: skip
+def quick(call):
+    """The command with what follows it."""
     return lambda *arguments: call("tune", *arguments)
 
 

@@ -19,7 +19,7 @@ SMALL = {"realizations": 24, "starts": 1, "certificate": {"realizations": 60, "a
 def found():
     bounds = {"controller.kp": {"min": 600, "max": 660}, "controller.ki": {"min": 120, "max": 170}}
     design = drillctl.load(PAPER, tune={"parameters": bounds, "probability": 0.9, **SMALL})
-    return tune(design, derivatives=False)
+    return tune(design)
 
 
 def lines_of(ax):
@@ -80,7 +80,7 @@ def test_a_bound_that_ends_the_drift_is_an_arrow(found):
 def test_one_parameter_is_a_curve():
     values = {"controller.law": "soft-torque", "simulation.accuracy": "fast"}
     table = {"parameters": {"controller.share": {"min": 0.3, "max": 0.9}}, **SMALL}
-    result = tune(drillctl.load(PAPER, **values, tune=table), derivatives=False)
+    result = tune(drillctl.load(PAPER, **values, tune=table))
     own = Figure()
     ax = own.add_subplot()
     assert plots.tune_neighbourhood(result, ax=ax) is own

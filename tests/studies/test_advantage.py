@@ -147,7 +147,7 @@ def test_an_optimum_is_no_worse_than_that_of_a_search(design):
             for t in policy.tuned
         }
         asked = policy.design.replace({"tune.parameters": ranges})
-        expected = search(asked, derivatives=False)
+        expected = search(asked)
         found = optimum(policy, 50)
         assert len(found.values) == own
         # The search compares smoothed quantiles, of 60 draws here: a share of a second apart.

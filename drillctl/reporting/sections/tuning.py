@@ -109,7 +109,6 @@ def _search(found: dict[str, Any]) -> Table:
     for name, key in (
         ("objective", "objective"), ("its value over the draws of the search", "value"),
         ("draws", "realizations"), ("runs", "trajectories"), ("time (s)", "seconds"),
-        ("derivatives", "derivatives"),
     ):  # fmt: skip
         if found.get(key) is not None:
             value = found[key]

@@ -14,10 +14,8 @@ from drillctl.store.kind import Kind
 from drillctl.store.kinds.axes import axis_of
 from drillctl.store.names import stored_name
 from drillctl.studies.robust.baselines import Baseline
-from drillctl.studies.robust.certificate import Certificate
-from drillctl.studies.robust.fresh import FreshRuns
+from drillctl.studies.robust.certificate import Certificate, FreshRuns, Neighbourhood, Tolerance
 from drillctl.studies.robust.search import Tuning
-from drillctl.studies.robust.tolerance import Neighbourhood, Tolerance
 from drillctl.studies.robust.tune_data import drawn_name
 from drillctl.studies.robust.tune_study import Tune
 from drillctl.studies.robust.tuned import put, tuned_parameters
@@ -42,7 +40,7 @@ def _tuning(design: Design, summary: dict[str, Any]) -> Tuning:
     tuned = tuned_parameters(design)
     values = np.array([summary["gains"][t.path] for t in tuned])
     told = (
-        "share", "violations", "realizations", "trajectories", "stages", "derivatives", "seconds",
+        "share", "violations", "realizations", "trajectories", "stages", "seconds",
         "processor_seconds",
     )  # fmt: skip
     return Tuning(
@@ -113,8 +111,6 @@ def _asked_of_tune(result: Tune) -> tuple[Design, dict[str, Any]]:
     settings: dict[str, Any] = {}
     if any(one.name == "exhaustive grid" for one in result.baselines):
         settings["exhaustive"] = True
-    if result.tuning.derivatives == "not asked for":
-        settings["derivatives"] = False
     return result.design, settings
 
 

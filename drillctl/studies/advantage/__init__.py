@@ -1,7 +1,7 @@
 """PI against PI with a weight on bit that follows the bit speed, each at its robust optimum.
 
 - `policies.py`: what is compared, and what of it is tuned.
-- `optimum.py`: robust gains without derivatives, from known ones on.
+- `optimum.py`: robust gains of a policy.
 - `cases.py`: policies at their optima on equal terms, at fresh draws.
 - `sweeps.py`: areas over the gains of the drive, front and map over weights and speeds.
 - `delays.py`: against the delay of the path.

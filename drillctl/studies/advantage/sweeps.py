@@ -19,7 +19,7 @@ from drillctl.progress import Progress
 from drillctl.studies.advantage.cases import Measured, Optima, measured, optimum_beside
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import GAIN, SPEED, WEIGHT, Policies, Policy
-from drillctl.studies.robust.evaluation import Evaluation
+from drillctl.studies.robust.runs import GainRuns
 from drillctl.studies.uncertainty.areas import Area, region_areas
 from drillctl.studies.uncertainty.probability import INNER, OUTER, probability_map
 from drillctl.studies.uncertainty.scatter import Scatter
@@ -101,7 +101,7 @@ def _regions(policy: Policy, best: Optimum) -> Regions:
     design = policy.design
     if policy.follows:
         design = design.replace({GAIN: units.SI(gain)})
-    runs = Evaluation(design, drive, table.region_realizations, table.seed)
+    runs = GainRuns(design, drive, table.region_realizations, table.seed)
     points = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
     j1 = runs.measures(points, ("j1",))["j1"]
     shape = (len(axes[0]), len(axes[1]))

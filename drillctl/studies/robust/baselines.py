@@ -18,12 +18,10 @@ from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.robust.crossings import by_path
-from drillctl.studies.robust.fresh import Fresh, FreshRuns
-from drillctl.studies.robust.judge import Judge
+from drillctl.studies.robust.certificate import FreshDraws, FreshRuns
 from drillctl.studies.robust.linear_design import linear_design
-from drillctl.studies.robust.objective import PRICE
-from drillctl.studies.robust.tuned import Tuned
+from drillctl.studies.robust.problem import PRICE, GainProblem
+from drillctl.studies.robust.tuned import Tuned, by_path
 
 Array = NDArray[np.float64]
 
@@ -64,7 +62,7 @@ class Baseline:
 
 
 def baselines(
-    design: Design, fresh: Fresh, exhaustive: Judge | None, progress: Progress = SILENT
+    design: Design, fresh: FreshDraws, exhaustive: GainProblem | None, progress: Progress = SILENT
 ) -> tuple[Baseline, ...]:
     """What the found gains are compared with."""
     made = [
@@ -94,8 +92,8 @@ def baselines(
 Made = tuple[dict[str, Any], FreshRuns, dict[str, float]]
 
 
-def _own(design: Design, fresh: Fresh) -> Made:
-    tuned = fresh.judge.tuned
+def _own(design: Design, fresh: FreshDraws) -> Made:
+    tuned = fresh.problem.tuned
     told = {t.path: parameter(design, t.path).value for t in tuned}
     if any(value is None for value in told.values()):  # by a rule of its law
         return told, fresh.of_design(design), {}
@@ -103,11 +101,11 @@ def _own(design: Design, fresh: Fresh) -> Made:
     return told, fresh.of_gains(np.array([told[t.path] for t in tuned], dtype=float))[1], {}
 
 
-def _paper(design: Design, fresh: Fresh) -> Made:
+def _paper(design: Design, fresh: FreshDraws) -> Made:
     if design.tables.controller.law != "pi":
         raise InputError(f"gains of a PI; the law is {design.tables.controller.law}")
     other = design.replace(dict(PAPER))
-    if set(PAPER) <= {t.path for t in fresh.judge.tuned}:
+    if set(PAPER) <= {t.path for t in fresh.problem.tuned}:
         return dict(PAPER), _own(other, fresh)[1], {}
     return dict(PAPER), fresh.of_design(other), {}
 
@@ -117,13 +115,13 @@ def _law(design: Design, law: str) -> Design:
     return design.replace({"controller.law": ANY_OTHER[law]}).replace({"controller.law": law})
 
 
-def _linear(design: Design, fresh: Fresh) -> Made:
+def _linear(design: Design, fresh: FreshDraws) -> Made:
     found = linear_design(design)
     return found.gains, fresh.of_gains(found.values)[1], {"slope_margin": found.slope_margin}
 
 
-def _nominal(design: Design, fresh: Fresh) -> Made:
-    tuned = fresh.judge.tuned
+def _nominal(design: Design, fresh: FreshDraws) -> Made:
+    tuned = fresh.problem.tuned
     begin = time.perf_counter()
     axes = tuple(Axis(t.path, t.unit, line) for t, line in zip(tuned, _lines(tuned), strict=True))
     found = sweep(design, axes, audit_cells=0, measures=("j1",))
@@ -141,21 +139,21 @@ def _lines(tuned: tuple[Tuned, ...]) -> list[Array]:
     return [np.linspace(t.low, t.high, POINTS) for t in tuned]
 
 
-def _exhaustive(judge: Judge, fresh: Fresh) -> Made:
+def _exhaustive(problem: GainProblem, fresh: FreshDraws) -> Made:
     """The best of a grid by the plain objective at all realizations of the search."""
-    begin, before = time.perf_counter(), judge.trajectories
-    grid = np.meshgrid(*_lines(judge.tuned), indexing="ij")
+    begin, before = time.perf_counter(), problem.trajectories
+    grid = np.meshgrid(*_lines(problem.tuned), indexing="ij")
     cells = np.stack([column.ravel() for column in grid], axis=1)
     least, best = np.inf, cells[0]
     value = np.inf
     for first in range(0, len(cells), POINTS):
-        for point in judge.points(cells[first : first + POINTS], len(judge)):
-            merit = point.value + PRICE * sum(judge.violations(point).values())
+        for point in problem.points(cells[first : first + POINTS], len(problem)):
+            merit = point.value + PRICE * sum(problem.violations(point).values())
             if merit < least:
                 least, best, value = merit, point.values, point.value
     more = {
         "value": value,
-        "trajectories": judge.trajectories - before,
+        "trajectories": problem.trajectories - before,
         "seconds": time.perf_counter() - begin,
     }
-    return by_path(judge.tuned, best), fresh.of_gains(best)[1], more
+    return by_path(problem.tuned, best), fresh.of_gains(best)[1], more

@@ -8,6 +8,11 @@ whose interval (Clopper & Pearson 1934) is exact.
 `passed` means *shown*: the lower end of the 95 % interval is at or above what is required. An
 estimate above it whose interval reaches below is no proof, and the verdict says `not shown`: more
 realizations decide.
+
+A gain may drift until too few realizations stay under the level, all at the draws of the
+certificate. A line from the optimum to a bound is looked at close by first, then ever further
+apart, so that the nearest place where the probability falls below what is required is reported and
+not one behind it; bisection then refines it.
 """
 
 from __future__ import annotations
@@ -24,11 +29,14 @@ from drillctl import units
 from drillctl.design import Design
 from drillctl.ensemble.audit import Audit, choose_cells, references
 from drillctl.ensemble.draws import Failures, beyond_the_table
+from drillctl.ensemble.grid import Axis
+from drillctl.ensemble.cases import Interval, share_interval
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.robust.fresh import Fresh, FreshRuns
-from drillctl.studies.robust.tolerance import Neighbourhood, Tolerance, neighbourhood, tolerances
+from drillctl.studies.robust.problem import GainProblem, Point, rank_weights
+from drillctl.studies.robust.runs import GainRuns
+from drillctl.studies.robust.tuned import Tuned
 
 Array = NDArray[np.float64]
 
@@ -37,6 +45,267 @@ MARGINS = (
     "delay_margin",
 )  # fmt: skip
 """Of `drillctl.loop`."""
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
+"""Of J1, as they are reported."""
+LOOKED_AT = 24
+"""Points on the line from the optimum to a bound, at distances that grow with their square."""
+AT_A_TIME = 6
+"""Of them, run at a time: none behind the first below."""
+HALVINGS = 8
+"""Of the step in which it falls."""
+POINTS = 21
+"""Along each axis of the neighbourhood."""
+LINE_POINTS = 81
+"""Of the neighbourhood of a single parameter."""
+FEW = 500
+"""Draws of the neighbourhood, the first ones: its probabilities are for the eye."""
+AROUND = 0.6
+"""How far the neighbourhood goes on behind the tolerance, over the tolerance's width."""
+LEAST_HALF = 0.02
+"""Its least half width, over that of the bounds."""
+
+
+@dataclass(frozen=True, eq=False)
+class FreshRuns:
+    """J1 of one rig at the fresh draws."""
+
+    # shape (draws,): Seconds; infinite for a run without an answer, NaN for a draw that no rig
+    # has
+    j1: Array
+    value: float  # objective of `[tune]` over the draws that a rig can have (s)
+    level: float  # of J1 (s)
+
+    @property
+    def hits(self) -> int:
+        """Draws with J1 at or under the level; one that no rig has is not."""
+        return int(np.count_nonzero(self.j1 <= self.level))
+
+    @property
+    def probability(self) -> float:
+        """Their share of all draws."""
+        return self.hits / len(self.j1)
+
+    @property
+    def interval(self) -> Interval:
+        """Clopper-Pearson interval of that probability, 95 %."""
+        return share_interval(self.hits, len(self.j1))
+
+    @property
+    def quantiles(self) -> dict[str, float]:
+        """Quantiles of J1 (s) over the draws that a rig can have, by name; infinite ones too."""
+        possible = np.sort(self.j1[~np.isnan(self.j1)])
+        found = {}
+        for q in QUANTILES:
+            weights = rank_weights("quantile", q, len(possible))
+            used = weights > 0.0  # no weight on what is infinite
+            found[f"q{round(100 * q):02d}"] = float(possible[used] @ weights[used])
+        return found
+
+
+def fresh_design(design: Design) -> Design:
+    """The design with the draws of its certificate in place of those of the search.
+
+    They are independent draws, whatever the sampling of the search: the interval is exact for
+    these alone.
+    """
+    table = design.tables.tune
+    return design.replace(
+        {
+            "tune.realizations": table.certificate.realizations,
+            "tune.seed": table.fresh_seed,
+            # The seed of the certificate must differ from that of a search, which this is not.
+            "tune.certificate.seed": table.seed,
+            "uncertainty.sampling": "monte-carlo",
+        }
+    )
+
+
+class FreshDraws:
+    """Runs of any gains and any law at the fresh draws of a design."""
+
+    def __init__(self, design: Design, tuned: tuple[Tuned, ...]) -> None:
+        self.design = fresh_design(design)
+        self.problem = GainProblem(self.design, tuned)
+        self._others = 0
+
+    @property
+    def count(self) -> int:
+        """Draws, those that no rig has included."""
+        return len(self.problem.runs.draws)
+
+    @property
+    def failures(self) -> tuple[Failures, ...]:
+        """Draws that no rig has."""
+        return self.problem.runs.failures
+
+    @property
+    def drawn(self) -> dict[str, Array]:
+        """Drawn values by path (SI), shape (draws,)."""
+        return self.problem.runs.draws.values
+
+    @property
+    def trajectories(self) -> int:
+        """Runs so far."""
+        return self.problem.trajectories + self._others
+
+    def of_gains(self, values: Array) -> tuple[Point, FreshRuns]:
+        """Tuned values (SI), shape (parameters,), as they are judged, and their J1."""
+        (point,) = self.problem.points(values[None, :], len(self.problem))
+        return point, self._spread(self.problem.runs, point.measures["j1"], point.value)
+
+    def of_design(self, design: Design) -> FreshRuns:
+        """A design of any law, at the same draws."""
+        table, objective = self.problem.table, self.problem.objective
+        sampled = design.replace({"uncertainty.sampling": "monte-carlo"})
+        runs = GainRuns(sampled, (), table.realizations, table.seed)
+        measures = runs.measures(np.empty((1, 0)), objective.needs)
+        self._others += runs.trajectories
+        value = float(objective.value({k: v[0] for k, v in measures.items()}))
+        return self._spread(runs, measures["j1"][0], value)
+
+    def shares(self, points: Array, realizations: int | None = None) -> Array:
+        """Share of the first draws, all by default, with J1 at or under the level."""
+        level, problem = self.problem.table.level, self.problem
+        count = self.count if realizations is None else min(realizations, self.count)
+        possible = int(np.searchsorted(problem.runs.numbers, count))
+        j1 = problem.runs.measures(points, ("j1",), 0, possible, give_up=level)["j1"]
+        return np.asarray((j1 <= level).sum(axis=1) / count)
+
+    def _spread(self, runs: GainRuns, j1: Array, value: float) -> FreshRuns:
+        """Over all draws, those that no rig has included."""
+        whole = np.full(self.count, np.nan)
+        whole[runs.numbers] = j1
+        return FreshRuns(whole, value, self.problem.table.level)
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerance:
+    """How far one parameter may drift alone."""
+
+    # of the parameter
+    path: str
+    unit: str
+    value: float  # at the optimum (SI)
+    # between these the probability is never below the required one (SI); both the value itself
+    # where it is so at the optimum already
+    low: float
+    high: float
+    # whether that end is the bound of the search: how far it goes on is not known
+    low_at_bound: bool
+    high_at_bound: bool
+    # shape (points,): Points that were looked at (SI, increasing), and the probability there
+    values: Array
+    probability: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbourhood:
+    """Probability about the optimum over the first one or two parameters."""
+
+    axes: tuple[Axis, ...]  # one or two
+    probability: Array  # shape of the axes: Share of the draws with J1 at or under the level
+    realizations: int  # how many draws
+
+
+def tolerances(
+    fresh: FreshDraws, values: Array, probability: float, progress: Progress
+) -> tuple[Tolerance, ...]:
+    """Tolerance of each parameter."""
+    progress.begin("tolerance of the gains", len(values))
+    found = []
+    for k in range(len(values)):
+        found.append(_tolerance(fresh, values, k, probability))
+        progress.advance(1)
+    return tuple(found)
+
+
+def _tolerance(fresh: FreshDraws, values: Array, k: int, probability: float) -> Tolerance:
+    tuned = fresh.problem.tuned[k]
+    seen = {float(values[k]): probability}
+    ends = []
+    for bound in (tuned.low, tuned.high):
+        if probability < fresh.problem.table.probability:
+            ends.append((float(values[k]), False))
+        else:
+            ends.append(_end(fresh, values, k, bound, seen))
+    at = np.array(sorted(seen))
+    return Tolerance(
+        tuned.path, tuned.unit, float(values[k]),
+        ends[0][0], ends[1][0], ends[0][1], ends[1][1],
+        at, np.array([seen[x] for x in at]),
+    )  # fmt: skip
+
+
+def _end(
+    fresh: FreshDraws, values: Array, k: int, bound: float, seen: dict[float, float]
+) -> tuple[float, bool]:
+    """Where the probability falls below what is required, and whether that is the bound."""
+    required = fresh.problem.table.probability
+    start = float(values[k])
+    line = start + (bound - start) * (np.arange(1, LOOKED_AT + 1) / LOOKED_AT) ** 2
+    if start == bound:
+        return bound, True
+    inside = start
+    for first in range(0, LOOKED_AT, AT_A_TIME):
+        some = line[first : first + AT_A_TIME]
+        shares = fresh.shares(_moved(values, k, some))
+        seen.update(zip(some.tolist(), shares.tolist(), strict=True))
+        below = np.flatnonzero(shares < required)
+        if len(below):
+            inside = inside if below[0] == 0 else float(some[below[0] - 1])
+            return _halved(fresh, values, k, inside, float(some[below[0]]), seen), False
+        inside = float(some[-1])
+    return bound, True
+
+
+def _halved(
+    fresh: FreshDraws,
+    values: Array,
+    k: int,
+    inside: float,
+    outside: float,
+    seen: dict[float, float],
+) -> float:
+    """The last value that keeps the probability, by bisection."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (inside + outside)
+        (share,) = fresh.shares(_moved(values, k, np.array([middle])))
+        seen[middle] = float(share)
+        if share < fresh.problem.table.probability:
+            outside = middle
+        else:
+            inside = middle
+    return inside
+
+
+def _moved(values: Array, k: int, others: Array) -> Array:
+    """Points that differ from the optimum in one parameter."""
+    points = np.tile(values, (len(others), 1))
+    points[:, k] = others
+    return points
+
+
+def neighbourhood(fresh: FreshDraws, values: Array, found: tuple[Tolerance, ...]) -> Neighbourhood:
+    """Probability over the first two parameters, or the only one, about the optimum."""
+    some = min(2, len(values))
+    points = POINTS if some == 2 else LINE_POINTS
+    axes = tuple(
+        _about(tuned, one, points)
+        for tuned, one in zip(fresh.problem.tuned[:some], found[:some], strict=True)
+    )
+    grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
+    cells = np.tile(values, (grid[0].size, 1))
+    for k, column in enumerate(grid):
+        cells[:, k] = column.ravel()
+    count = min(FEW, fresh.count)
+    shares = fresh.shares(cells, count)
+    return Neighbourhood(axes, shares.reshape(grid[0].shape), count)
+
+
+def _about(tuned: Tuned, one: Tolerance, points: int) -> Axis:
+    wide = AROUND * (one.high - one.low) + LEAST_HALF * (tuned.high - tuned.low)
+    low, high = max(tuned.low, one.low - wide), min(tuned.high, one.high + wide)
+    return Axis(tuned.path, tuned.unit, np.linspace(low, high, points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,11 +432,11 @@ def _of(one: Tolerance) -> dict[str, Any]:
 
 
 def certified(
-    design: Design, fresh: Fresh, values: Array, progress: Progress = SILENT
+    design: Design, fresh: FreshDraws, values: Array, progress: Progress = SILENT
 ) -> Certificate:
     """Certify gains."""
     begin, before = time.perf_counter(), fresh.trajectories
-    table, judge = design.tables.tune, fresh.judge
+    table, problem = design.tables.tune, fresh.problem
     point, runs = fresh.of_gains(values)
     margins, no_margins = _margins(design)
     audit = _audit(design, fresh, runs, table.certificate.audit, progress)
@@ -178,7 +447,7 @@ def certified(
         seed=table.fresh_seed,
         drawn=fresh.drawn,
         failures=fresh.failures,
-        violations=judge.violations(point),
+        violations=problem.violations(point),
         margins=margins,
         no_margins=no_margins,
         audit=audit,
@@ -197,7 +466,9 @@ def _margins(design: Design) -> tuple[dict[str, Any], str]:
     return {key: found[key] for key in MARGINS}, ""
 
 
-def _audit(design: Design, fresh: Fresh, runs: FreshRuns, count: int, progress: Progress) -> Audit:
+def _audit(
+    design: Design, fresh: FreshDraws, runs: FreshRuns, count: int, progress: Progress
+) -> Audit:
     """Some draws by the reference solver, spread over what lies under the level and beyond."""
     numbers = choose_cells(runs.j1, (runs.level,), count)
     design = beyond_the_table(design, tuple(fresh.drawn))

@@ -21,13 +21,10 @@ from drillctl.design.study_tables import TuneConstraintsTable
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import tolerated_slope
-from drillctl.studies.robust.crossings import by_path, least_seen
 from drillctl.studies.robust.linear_nlp import PRICE, LinearProgram
-from drillctl.studies.robust.loops import Loop, loops_of, refuse_not_linear
-from drillctl.studies.robust.realizations import designs_at
+from drillctl.studies.robust.loops import Loop, least_seen, loops_of, refuse_not_linear
 from drillctl.studies.robust.requirements import Loops, LoopsState
-from drillctl.studies.robust.spread import spread
-from drillctl.studies.robust.tuned import Tuned, put, tuned_parameters
+from drillctl.studies.robust.tuned import Tuned, by_path, designs_at, put, spread, tuned_parameters
 
 if TYPE_CHECKING:
     from pathlib import Path

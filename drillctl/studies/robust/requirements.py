@@ -16,10 +16,9 @@ from drillctl.linear.loop_analysis import ROUNDING
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.rig.drillstring.frequencies import natural_frequencies
-from drillctl.studies.robust.crossings import Crossing, by_path, crossings_of, slope_margin_of
 from drillctl.studies.robust.line_data import chain
-from drillctl.studies.robust.loops import Loop
-from drillctl.studies.robust.tuned import Tuned, put
+from drillctl.studies.robust.loops import Crossing, Loop, crossings_of, slope_margin_of
+from drillctl.studies.robust.tuned import Tuned, by_path, put
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]

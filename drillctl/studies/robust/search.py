@@ -1,20 +1,26 @@
-"""Gains with the least objective over the realizations: a first look, a race, a trust region.
+"""The search of gains with the least objective: a first look, a race, a population, a polish.
 
-1. *First look*: gains spread over the bounds, each at a few realizations, by the batch engine;
-   besides them the design's own gains and those of the linear design.
-2. *Race*: the better part goes on to more realizations, until few are left.
-3. *Trust region* (`trust_region.py`) from the best that are apart, with CasADi's derivatives at
-   some of the realizations, then from the best of those at all of them.
-4. *Polish* (`polish.py`): steps along the axes and along what they have gained, at all
-   realizations, down to a thousandth of the bounds' width.
+1. *First look*: gains spread over the bounds, each at a few realizations, by the batch engine.
+2. *Race*: the better part goes on to more realizations.
+3. *Population*: differential evolution among what is left, which moves along a narrow valley
+   whatever its direction.
+4. *Polish*: a pattern search at all realizations, down to a thousandth of the bounds' width, from
+   the best of the population and from the best of the gains known before: the design's own and
+   those of the linear design, or those of a neighbour. The better end is taken.
 
-All gains meet the same realizations, so that differences are of gains. Whatever the model of a
-trust region promises, the batch engine decides.
+All gains meet the same realizations, so that differences are of gains. The known gains stay out of
+the population: they would draw all of it into their valley, though others may be deeper. A valley
+as narrow as that of a constant weight is a thousandth of the bounds of three gains, which a search
+that starts elsewhere does not hit; and a law that contains another must never end above it.
+
+J1 jumps where a stick event appears or goes, and the derivatives of its trajectories do not tell
+of it; docs/robust-gains.md has what a search by derivatives took, for the same gains or worse.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -24,26 +30,132 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.robust.crossings import by_path
-from drillctl.studies.robust.judge import Judge, Point
 from drillctl.studies.robust.linear_design import linear_design
-from drillctl.studies.robust.polish import polished
-from drillctl.studies.robust.spread import spread
-from drillctl.studies.robust.trust_region import Derivatives, descended
-from drillctl.studies.robust.tuned import Tuned, put, tuned_parameters
+from drillctl.studies.robust.problem import GainProblem, Point
+from drillctl.studies.robust.tuned import Tuned, by_path, put, spread, tuned_parameters
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 Array = NDArray[np.float64]
 
-FIRST = {1: 64, 2: 400, 3: 800}
-"""Gains of the first look by the number of parameters; more have as many as three."""
-RACE = ((16, 4), (64, 6), (256, 0))
-"""Realizations of each round, and by how much the field is divided after it; the last leaves the
-starts."""
+LOOK = (64, 300, 500, 800)
+"""Gains of the first look by the number of parameters; more have as many as four."""
+RACE = (("first look", 16, 80), ("race", 64, 16))
+"""Rounds of the race: realizations, and how many gains are kept after it."""
+GENERATIONS, AMONG = 20, 100
+"""Of the population, and realizations that it lives among."""
+CROSSING = 0.9
+"""Share of the parameters of a trial that are changed."""
 APART = 0.05
-"""Least distance of two starts over the bounds' width."""
+"""Least distance of two ends of the population that are polished, over the bounds' width."""
+FIRST_STEP, LAST_STEP = 0.01, 1e-3
+"""Of the polish, over the bounds' width."""
+ROUNDS = 14
+"""Most rounds of it."""
+
+Note = Callable[[str, Point], None]
+"""Receives the name of a stage that is over and the best point of it."""
+
+
+def optimum(
+    problem: GainProblem, known: Sequence[Array] = (), ends: int = 1,
+    note: Note = lambda stage, best: None,
+) -> Point:  # fmt: skip
+    """Gains of the least objective, at all realizations.
+
+    `known`: gains (SI) that are polished besides, the best of them; `ends`: how many of the
+    population are, if they are apart.
+    """
+    points = spread(problem.tuned, LOOK[min(len(problem.tuned), len(LOOK)) - 1])
+    for stage, count, kept in RACE:
+        field_ = sorted(problem.points(points, min(count, len(problem))), key=_merit)
+        points = np.stack([point.values for point in field_[:kept]])
+        note(stage, field_[0])
+    population = _evolved(problem, points)
+    note("population", population[0])
+    starts = [problem.at_all(point) for point in _apart(problem, population, ends)]
+    inside = [problem.values(problem.shares(np.asarray(one, dtype=float))) for one in known]
+    if inside:
+        starts.append(min(problem.points(np.stack(inside), len(problem)), key=_merit))
+    best = min((polished(problem, start) for start in starts), key=_merit)
+    note("polish", best)
+    return best
+
+
+def _merit(point: Point) -> float:
+    return point.merit
+
+
+def _evolved(problem: GainProblem, points: Array) -> list[Point]:
+    """A population after some generations, the best first.
+
+    Differential evolution (Storn & Price, J. Global Optim. 11 (1997) 341-359), the variant that
+    leans to the best (current-to-best/1): a batch of trials at a time is what the engine likes,
+    and differences within a population lie along the valley that it has settled in.
+    """
+    random, count = np.random.Generator(np.random.Philox(0)), min(AMONG, len(problem))
+    population = problem.points(points, count)
+    size, n = len(population), len(problem.tuned)
+    for _ in range(GENERATIONS):
+        shares = np.stack([problem.shares(point.values) for point in population])
+        best = shares[int(np.argmin([point.merit for point in population]))]
+        pairs = np.stack([random.permutation(size)[:2] for _ in range(size)])
+        scale = random.uniform(0.4, 0.9, (size, 1))
+        moved = shares + scale * (best - shares + shares[pairs[:, 0]] - shares[pairs[:, 1]])
+        taken = random.random((size, n)) < CROSSING
+        trials = problem.points(problem.values(np.where(taken, moved, shares)), count)
+        population = [min(pair, key=_merit) for pair in zip(population, trials, strict=True)]
+    return sorted(population, key=_merit)
+
+
+def _apart(problem: GainProblem, points: list[Point], most: int) -> list[Point]:
+    """The first of some points that are apart from each other."""
+    chosen: list[Point] = []
+    for point in points:
+        away = [
+            np.max(np.abs(problem.shares(point.values) - problem.shares(one.values)))
+            for one in chosen
+        ]
+        if all(distance > APART for distance in away):
+            chosen.append(point)
+        if len(chosen) == most:
+            break
+    return chosen
+
+
+def polished(problem: GainProblem, start: Point) -> Point:
+    """The end of a pattern search (Hooke & Jeeves 1961) from a point, at all realizations.
+
+    A step each way along every axis and along the direction that the last round gained by; half
+    the step where nothing is gained. It needs no slope, and goes on where J1 jumps.
+    """
+    best, step = problem.at_all(start), FIRST_STEP
+    gained = np.zeros(len(best.values))
+    for _ in range(ROUNDS):
+        trials = problem.points(_around(problem, best, step, gained), len(problem))
+        found = min(trials, key=_merit)
+        if found.merit < best.merit:
+            gained = problem.shares(found.values) - problem.shares(best.values)
+            best = found
+            continue
+        gained = np.zeros(len(best.values))
+        step *= 0.5
+        if step < LAST_STEP:
+            break
+    return best
+
+
+def _around(problem: GainProblem, best: Point, step: float, gained: Array) -> Array:
+    """Points a step away along every axis, and twice what was gained last."""
+    n, at = len(best.values), problem.shares(best.values)
+    moves = [sign * step * np.eye(n)[k] for k in range(n) for sign in (1.0, -1.0)]
+    if gained.any():
+        moves.append(2.0 * gained)
+    elif n == 2:  # a valley lies across the axes more often than not
+        moves += [step * np.array([a, b]) for a in (0.7, -0.7) for b in (0.7, -0.7)]
+    points = np.stack([problem.values(at + move) for move in moves])
+    return points[np.any(points != best.values, axis=1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +169,7 @@ class Tuning:
     tuned : tuple of Tuned
         What was tuned.
     values : ndarray, shape (parameters,)
-        Their values (SI); where requirements cannot be met, of the closest point found.
+        Their values (SI); where requirements cannot be met, of the closest point.
     value : float
         Objective at all realizations of the search (s).
     share : float
@@ -67,13 +179,11 @@ class Tuning:
     realizations : int
         How many could be run.
     trajectories : int
-        Runs of the batch engine, and of CasADi with each direction of a derivative as one more.
+        Runs of the batch engine.
     stages : list of dict
         What each stage led to, and the trajectories until then.
     message : str
-        What was found.
-    derivatives : str
-        How they were taken, or why not.
+        The result in a sentence.
     seconds, processor_seconds : float
         Time that it took (s).
     """
@@ -88,7 +198,6 @@ class Tuning:
     trajectories: int
     stages: list[dict[str, Any]]
     message: str
-    derivatives: str
     seconds: float
     processor_seconds: float
 
@@ -117,7 +226,6 @@ class Tuning:
             "realizations": self.realizations,
             "trajectories": self.trajectories,
             "stages": self.stages,
-            "derivatives": self.derivatives,
             "message": self.message,
             "seconds": self.seconds,
             "processor_seconds": self.processor_seconds,
@@ -134,22 +242,20 @@ class Tuning:
 class _Log:
     """Stages as they end."""
 
-    judge: Judge
+    problem: GainProblem
     progress: Progress
     stages: list[dict[str, Any]] = field(default_factory=list)
 
-    def note(self, name: str, best: Point, **more: Any) -> None:
+    def note(self, stage: str, best: Point) -> None:
         """A stage is over."""
         self.progress.advance(1)
         self.stages.append({
-            "stage": name, "best": by_path(self.judge.tuned, best.values), "merit": best.merit,
-            "realizations": best.realizations, "trajectories": self.judge.trajectories, **more,
+            "stage": stage, "best": by_path(self.problem.tuned, best.values), "merit": best.merit,
+            "realizations": best.realizations, "trajectories": self.problem.trajectories,
         })  # fmt: skip
 
 
-def search(
-    design: Design, progress: Progress = SILENT, derivatives: bool = True, verbose: bool = False
-) -> Tuning:
+def search(design: Design, progress: Progress = SILENT, verbose: bool = False) -> Tuning:
     """Search the gains of the least objective.
 
     Parameters
@@ -158,16 +264,14 @@ def search(
         Its `[tune]` table says what is tuned and to what end, `[uncertain]` what is drawn. Step
         and modes are those of accuracy `fast` unless the design gives a step.
     progress : Progress
-        Told of finished stages.
-    derivatives : bool
-        Whether to take trust-region steps by derivatives, where the laws allow it.
+        Receives finished stages.
     verbose : bool
         Let IPOPT print.
 
     Returns
     -------
     Tuning
-        A level that no gains reach, or requirements that none meet, are told in its message.
+        A level that no gains reach, or requirements that none meet, are stated in its message.
 
     Raises
     ------
@@ -175,42 +279,33 @@ def search(
         A parameter that does not exist, bounds reversed, or no realization that a rig can have.
     """
     begin, processor = time.perf_counter(), time.process_time()
-    tuned = tuned_parameters(design)
-    judge = searching_judge(design, tuned)
-    log = _Log(judge, progress)
-    progress.begin("tuning", 5)
-    field_ = _race(judge, _first_look(judge, design, verbose), log)
-    made = Derivatives.of(judge) if derivatives else "not asked for"
-    if isinstance(made, Derivatives):
-        ends = [descended(judge, made, start) for start in field_]
-        best = min((judge.at_all(point) for point in ends), key=_merit)
-        log.note("trust region", best, starts=len(field_))
-        best = descended(judge, made, best)
-        log.note("trust region at all realizations", best)
-    else:
-        best = min((judge.at_all(point) for point in field_), key=_merit)
-    best = polished(judge, best)
-    log.note("polish", best)
-    how = made if isinstance(made, str) else "forward mode of CasADi through the scheme"
-    return _told(design, judge, best, log, how, begin, processor)
+    problem = search_problem(design, tuned_parameters(design))
+    log = _Log(problem, progress)
+    progress.begin("tuning", len(RACE) + 2)
+    known = [one for one in (problem.own(design), _linear(design, verbose)) if one is not None]
+    best = optimum(problem, known, problem.table.starts, log.note)
+    missed = problem.violations(best)
+    return Tuning(
+        design=put(design, problem.tuned, best.values),
+        tuned=problem.tuned,
+        values=best.values,
+        value=best.value,
+        share=best.share,
+        violations=missed,
+        realizations=len(problem),
+        trajectories=problem.trajectories,
+        stages=log.stages,
+        message=_message(problem, best, missed),
+        seconds=time.perf_counter() - begin,
+        processor_seconds=time.process_time() - processor,
+    )
 
 
-def searching_judge(design: Design, tuned: tuple[Tuned, ...]) -> Judge:
-    """What a search judges gains by: its realizations, `fast` unless a step is given."""
+def search_problem(design: Design, tuned: tuple[Tuned, ...]) -> GainProblem:
+    """The problem of a search: its realizations, `fast` unless a step is given."""
     if design.tables.simulation.step is None:
         design = design.replace({"simulation.accuracy": "fast"})
-    return Judge(design, tuned)
-
-
-def _merit(point: Point) -> float:
-    return point.merit
-
-
-def _first_look(judge: Judge, design: Design, verbose: bool) -> Array:
-    """Gains of the first look, shape (points, parameters)."""
-    points = spread(judge.tuned, FIRST[min(len(judge.tuned), 3)])
-    more = [judge.own(design), _linear(design, verbose)]
-    return np.vstack([points, *(point for point in more if point is not None)])
+    return GainProblem(design, tuned)
 
 
 def _linear(design: Design, verbose: bool) -> Array | None:
@@ -221,53 +316,9 @@ def _linear(design: Design, verbose: bool) -> Array | None:
         return None
 
 
-def _race(judge: Judge, points: Array, log: _Log) -> list[Point]:
-    """The starts that are left of many gains."""
-    names = {0: "first look"}
-    for round_, (count, divisor) in enumerate(RACE):
-        count = min(count, len(judge))
-        found = judge.points(points, count)
-        found.sort(key=_merit)
-        log.note(names.get(round_, f"race, round {round_}"), found[0], gains=len(points))
-        if divisor:
-            kept = max(len(points) // divisor, judge.table.starts)
-            points = np.stack([point.values for point in found[:kept]])
-    chosen: list[Point] = []
-    for point in found:
-        apart = [
-            np.max(np.abs(judge.shares(point.values) - judge.shares(c.values))) for c in chosen
-        ]
-        if all(distance > APART for distance in apart):
-            chosen.append(point)
-        if len(chosen) == judge.table.starts:
-            break
-    return chosen
-
-
-def _told(
-    design: Design, judge: Judge, best: Point, log: _Log, how: str, begin: float, processor: float
-) -> Tuning:
-    missed = judge.violations(best)
-    return Tuning(
-        design=put(design, judge.tuned, best.values),
-        tuned=judge.tuned,
-        values=best.values,
-        value=best.value,
-        share=best.share,
-        violations=missed,
-        realizations=len(judge),
-        trajectories=judge.trajectories,
-        stages=log.stages,
-        message=_message(judge, best, missed),
-        derivatives=how,
-        seconds=time.perf_counter() - begin,
-        processor_seconds=time.process_time() - processor,
-    )
-
-
-def _message(judge: Judge, best: Point, missed: dict[str, float]) -> str:
-    at = ", ".join(f"{k} = {v:.6g}" for k, v in by_path(judge.tuned, best.values).items())
-    table = judge.table
+def _message(problem: GainProblem, best: Point, missed: dict[str, float]) -> str:
+    at = ", ".join(f"{k} = {v:.6g}" for k, v in by_path(problem.tuned, best.values).items())
+    table = problem.table
     if missed:
         worst = max(missed, key=lambda key: missed[key])
         return (

@@ -11,9 +11,8 @@ from drillctl.design import Design
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.studies.robust.baselines import Baseline, baselines
-from drillctl.studies.robust.certificate import Certificate, certified
-from drillctl.studies.robust.fresh import Fresh
-from drillctl.studies.robust.search import Tuning, search, searching_judge
+from drillctl.studies.robust.certificate import Certificate, FreshDraws, certified
+from drillctl.studies.robust.search import Tuning, search, search_problem
 from drillctl.studies.robust.tuned import tuned_parameters
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ class Tune:
     Attributes
     ----------
     design : Design
-        As it was asked for.
+        As it was given.
     tuning : Tuning
         What the search found, at its own realizations.
     certificate : Certificate
@@ -118,7 +117,6 @@ class Tune:
 def tune(
     design: Design,
     exhaustive: bool = False,
-    derivatives: bool = True,
     progress: Progress = SILENT,
     verbose: bool = False,
 ) -> Tune:
@@ -132,10 +130,8 @@ def tune(
     exhaustive : bool
         Whether to go through a grid of 41 x 41 gains at the realizations of the search as well:
         some 1.7 million trajectories.
-    derivatives : bool
-        Whether the search takes steps by derivatives, where the laws allow it.
     progress : Progress
-        Told of stages.
+        Receives finished stages.
     verbose : bool
         Let IPOPT print.
 
@@ -143,7 +139,7 @@ def tune(
     -------
     Tune
         Requirements that cannot be met, a level that no gains reach and a certificate that
-        fails are told in its message.
+        fails are stated in its message.
 
     Raises
     ------
@@ -153,9 +149,9 @@ def tune(
     """
     begin = time.perf_counter()
     tuned = tuned_parameters(design)
-    fresh = Fresh(design, tuned)  # a certificate that is impossible is told before the search
-    found = search(design, progress, derivatives, verbose)
-    grid = searching_judge(design, tuned) if exhaustive else None
+    fresh = FreshDraws(design, tuned)  # an impossible certificate is refused before the search
+    found = search(design, progress, verbose)
+    grid = search_problem(design, tuned) if exhaustive else None
     return Tune(
         design=design,
         tuning=found,

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from drillctl.studies.robust.fresh import FreshRuns
+from drillctl.studies.robust.certificate import FreshRuns
 from drillctl.studies.robust.tune_study import Tune
 
 

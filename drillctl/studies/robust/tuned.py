@@ -7,7 +7,7 @@ gains. `drive_numbers` is that step, by the same function of the law, for arrays
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.design.study_tables import RangeTable
+from drillctl.ensemble.parameters import Draws
 from drillctl.errors import InputError, nearest
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive.law import StringNumbers, drive_laws, tracking
@@ -123,6 +124,39 @@ def middle(design: Design, tuned: tuple[Tuned, ...]) -> Design:
     return put(design, tuned, np.array([0.5 * (t.low + t.high) for t in tuned]))
 
 
+def by_path(tuned: tuple[Tuned, ...], values: Array) -> dict[str, float]:
+    """Values (SI), shape (parameters,), by path."""
+    return {t.path: float(v) for t, v in zip(tuned, values, strict=True)}
+
+
+def spread(tuned: tuple[Tuned, ...], count: int) -> Array:
+    """Points (SI), shape (count, parameters), none of them on a bound.
+
+    Additive recurrence on the generalised golden ratio: low discrepancy in any dimension, and the
+    first points of a longer sequence are those of a shorter one (Roberts 2018, after Weyl).
+    """
+    dimension = len(tuned)
+    ratio = 2.0
+    for _ in range(60):  # the root of x^(d+1) = x + 1
+        ratio = (1.0 + ratio) ** (1.0 / (dimension + 1.0))
+    strides = ratio ** -np.arange(1.0, dimension + 1.0)
+    share = (0.5 + np.outer(np.arange(1, count + 1), strides)) % 1.0
+    low = np.array([t.low for t in tuned])
+    return np.asarray(low + share * (np.array([t.high for t in tuned]) - low))
+
+
+def designs_at(design: Design, draws: Draws) -> Iterator[Design]:
+    """The design at every draw that a rig can have; impossible ones are left out."""
+    for number in range(len(draws)):
+        values = {path: units.SI(column[number]) for path, column in draws.values.items()}
+        try:
+            variant = design.replace(values)
+            _ = variant.bit_rock, variant.string
+        except InputError:
+            continue
+        yield variant
+
+
 def string_numbers(string: Drillstring) -> StringNumbers:
     """What drives are tuned to of a string."""
     lumped = string.parts.sections[0].inertia == 0.0
@@ -143,7 +177,7 @@ def drive_numbers(
     for path in given:
         if path not in allowed:
             raise InputError(
-                f"{path!r} has no derivative here; {nearest(path, allowed)}", "tune.parameters"
+                f"{path!r} is not tuned here; {nearest(path, allowed)}", "tune.parameters"
             )
     replaced = {path.removeprefix("controller."): value for path, value in given.items()}
     numbers = SimpleNamespace(**(dict(table) | replaced))

@@ -15,9 +15,13 @@ from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.store.json_files import strict
 from drillctl.studies.robust import search, tune
-from drillctl.studies.robust.certificate import certified
-from drillctl.studies.robust.fresh import Fresh, FreshRuns
-from drillctl.studies.robust.tolerance import HALVINGS, LOOKED_AT
+from drillctl.studies.robust.certificate import (
+    HALVINGS,
+    LOOKED_AT,
+    FreshDraws,
+    FreshRuns,
+    certified,
+)
 from drillctl.studies.robust.tuned import put, tuned_parameters
 
 HOLDS = (
@@ -42,7 +46,7 @@ def tuning(parameters=WINDOW, values=(), certificate=(), **table):
 
 @pytest.fixture(scope="module")
 def found():
-    return tune(tuning(), derivatives=False)
+    return tune(tuning())
 
 
 def j1_of(design, count, seed):
@@ -69,7 +73,7 @@ def test_accuracy_is_that_of_the_design_not_of_the_search():
     coarse = tuning(values={"simulation.accuracy": "fast"})
     fine = tuning(values={"simulation.accuracy": "standard"})
     values = np.array([630.0, 145.0])
-    runs = [Fresh(d, tuned_parameters(d)).of_gains(values)[1] for d in (coarse, fine)]
+    runs = [FreshDraws(d, tuned_parameters(d)).of_gains(values)[1] for d in (coarse, fine)]
     np.testing.assert_array_equal(runs[0].j1, j1_of(put(coarse, tuned_parameters(coarse), values),
                                                     120, 1_000_006))  # fmt: skip
     assert (runs[0].j1 != runs[1].j1).any()
@@ -109,11 +113,11 @@ def test_a_certificate_is_passed_when_its_interval_shows_it(found, hits, verdict
 @pytest.mark.slow
 def test_tolerance_ends_where_the_probability_falls(found):
     design = found.design
-    fresh = Fresh(design, tuned_parameters(design))
+    fresh = FreshDraws(design, tuned_parameters(design))
     required = 0.85
     certificate = certified(
         found.tuned_design.replace({"tune.probability": required}),
-        Fresh(design.replace({"tune.probability": required}), tuned_parameters(design)),
+        FreshDraws(design.replace({"tune.probability": required}), tuned_parameters(design)),
         found.tuning.values,
     )
     widths = {"controller.kp": 400.0, "controller.ki": 200.0}
@@ -133,7 +137,7 @@ def test_tolerance_ends_where_the_probability_falls(found):
 def test_a_gain_that_never_leaves_the_level_meets_the_bounds():
     bounds = {"controller.kp": {"min": 600, "max": 640}}
     design = tuning(bounds, {"operating_point.weight_on_bit": "100 kN"}, {"audit": 0})
-    (one,) = tune(design, derivatives=False).certificate.tolerances
+    (one,) = tune(design).certificate.tolerances
     assert (one.low, one.high) == (600.0, 640.0)
     assert one.low_at_bound
     assert one.high_at_bound
@@ -151,7 +155,7 @@ def test_neighbourhood_is_the_share_of_the_first_draws(found):
 def test_draws_that_no_rig_has_count_against_the_gains():
     uncertain = {"bit_rock.a2_factor": {"distribution": "uniform", "min": 0.2, "max": 1.2}}
     design = tuning(values={"uncertain": uncertain}, certificate={"audit": 0})
-    fresh = Fresh(design, tuned_parameters(design))
+    fresh = FreshDraws(design, tuned_parameters(design))
     _, runs = fresh.of_gains(np.array([630.0, 145.0]))
     lost = sum(failure.count for failure in fresh.failures)
     assert lost == np.isnan(runs.j1).sum() > 5
@@ -162,7 +166,7 @@ def test_draws_that_no_rig_has_count_against_the_gains():
 
 def test_certificates_of_a_quasi_random_search_are_of_independent_draws():
     design = tuning(values={"uncertainty.sampling": "sobol", "uncertainty.realizations": 64})
-    fresh = Fresh(design, tuned_parameters(design))
+    fresh = FreshDraws(design, tuned_parameters(design))
     plain = draw(tuning(), 120, 1_000_006).values
     for path, drawn in fresh.drawn.items():
         np.testing.assert_array_equal(drawn, plain[path])
@@ -226,7 +230,7 @@ def test_baselines_are_the_designs_that_they_name(found):
 def test_baselines_of_another_law_have_its_default_tuning():
     values = {"controller.law": "soft-torque", "controller.share": 0.6}
     design = tuning({"controller.share": {"min": 0.2, "max": 0.9}}, values, {"audit": 0})
-    result = tune(design, derivatives=False)
+    result = tune(design)
     by_name = {one.name: one for one in result.baselines}
     default = drillctl.load(PAPER, **{"controller.law": "soft-torque"})
     expected = j1_of(default, 120, result.certificate.seed)
@@ -240,7 +244,7 @@ def test_baselines_of_another_law_have_its_default_tuning():
 def test_the_exhaustive_grid_is_the_least_of_the_searchs_own_realizations():
     narrow = {"controller.kp": {"min": 610, "max": 650}, "controller.ki": {"min": 130, "max": 160}}
     design = tuning(narrow, realizations=12, certificate={"audit": 0, "realizations": 20})
-    result = tune(design, exhaustive=True, derivatives=False)
+    result = tune(design, exhaustive=True)
     grid = {one.name: one for one in result.baselines}["exhaustive grid"]
     assert grid.found["trajectories"] == 41 * 41 * 12
     fast = design.replace({"simulation.accuracy": "fast"})
@@ -299,13 +303,13 @@ def test_the_interval_holds_the_probability_in_33_of_40_tunes():
             values={"operating_point.weight_on_bit": "144 kN", "simulation.accuracy": "fast"},
             seed=seed, certificate={"audit": 0, "realizations": 400},
         )  # fmt: skip
-        found = search(design, derivatives=False)
-        fresh = Fresh(design, tuned_parameters(design))
+        found = search(design)
+        fresh = FreshDraws(design, tuned_parameters(design))
         _, runs = fresh.of_gains(found.values)
         more = design.replace(
             {"tune.certificate.realizations": 20_000, "tune.certificate.seed": 7_000_000 + seed}
         )
-        _, truth = Fresh(more, tuned_parameters(more)).of_gains(found.values)
+        _, truth = FreshDraws(more, tuned_parameters(more)).of_gains(found.values)
         low, high = runs.interval
         assert 0.3 < truth.probability < 0.995
         held += low <= truth.probability <= high

@@ -8,13 +8,17 @@ import drillctl
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_analysis import tolerated_slope
 from drillctl.linear.slope_margin import slope_margin
-from drillctl.studies.robust.crossings import by_path, crossings_of, least_seen, slope_margin_of
-from drillctl.studies.robust.line_data import TERMS, WITHIN, chain, circles
-from drillctl.studies.robust.loop_points import circle_data, constants_of, point_functions
-from drillctl.studies.robust.loops import loops_of
-from drillctl.studies.robust.pairs import Pair, pair
-from drillctl.studies.robust.spread import spread
-from drillctl.studies.robust.tuned import drive_numbers, put, string_numbers, tuned_parameters
+from drillctl.studies.robust.line_data import TERMS, WITHIN, Pair, chain, circles, pair
+from drillctl.studies.robust.linear_nlp import circle_data, constants_of, point_functions
+from drillctl.studies.robust.loops import crossings_of, least_seen, loops_of, slope_margin_of
+from drillctl.studies.robust.tuned import (
+    by_path,
+    drive_numbers,
+    put,
+    spread,
+    string_numbers,
+    tuned_parameters,
+)
 
 HOLDS = (
     (

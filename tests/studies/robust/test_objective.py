@@ -5,7 +5,7 @@ import pytest
 
 import drillctl
 from drillctl.design.study_tables import TuneTable
-from drillctl.studies.robust.objective import (
+from drillctl.studies.robust.problem import (
     PRICE,
     Objective,
     objective_of,

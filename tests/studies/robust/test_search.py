@@ -7,10 +7,9 @@ import drillctl
 from drillctl.ensemble.draws import drawn_lanes, run_draws
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
-from drillctl.studies.robust.evaluation import Evaluation
-from drillctl.studies.robust.judge import Judge
-from drillctl.studies.robust.search import search
-from drillctl.studies.robust.trust_region import Derivatives, descended
+from drillctl.studies.robust.problem import GainProblem
+from drillctl.studies.robust.runs import GainRuns
+from drillctl.studies.robust.search import optimum, polished, search, search_problem
 from drillctl.studies.robust.tuned import put, tuned_parameters
 
 HOLDS = (
@@ -50,7 +49,7 @@ def bounds(**paths):
 def test_runs_are_those_of_the_design_with_the_gains(parameters, values):
     design = tuning(parameters, values)
     tuned = tuned_parameters(design)
-    runs = Evaluation(design, tuned, 8, 5)
+    runs = GainRuns(design, tuned, 8, 5)
     points = np.array([[0.3 * t.low + 0.7 * t.high for t in tuned], [t.high for t in tuned]])
     found = runs.measures(points, ("j1", "peak_top_torque"))
     assert runs.trajectories == 16
@@ -68,7 +67,7 @@ def test_impossible_draws_are_left_out():
         "uncertain": {"bit_rock.a2_factor": {"distribution": "uniform", "min": 0.2, "max": 1.2}}
     })  # fmt: skip
     assert uncertain_draws
-    runs = Evaluation(design, tuned_parameters(design), 40, 1)
+    runs = GainRuns(design, tuned_parameters(design), 40, 1)
     assert 0 < len(runs) < 40
     assert sum(failure.count for failure in runs.failures) == 40 - len(runs)
     j1 = runs.measures(np.array([[600.0, 140.0]]), ("j1",))["j1"]
@@ -82,13 +81,13 @@ def test_gains_found_beat_a_grid():
     assert found.feasible
     assert abs(found.values[0] - 630) < 15
     assert abs(found.values[1] - 147) < 8
-    judge = Judge(design, tuned_parameters(design))
+    problem = GainProblem(design, tuned_parameters(design))
     axes = np.meshgrid(np.linspace(400, 800, 41), np.linspace(0, 200, 41), indexing="ij")
     grid = np.stack([a.ravel() for a in axes], axis=1)
-    best = min(judge.points(grid, 60), key=lambda point: point.value)
+    best = min(problem.points(grid, 60), key=lambda point: point.value)
     assert found.value <= best.value
-    assert found.trajectories < judge.trajectories / 2
-    again = judge.points(found.values[None, :], 60)[0]
+    assert found.trajectories < problem.trajectories / 2
+    again = problem.points(found.values[None, :], 60)[0]
     assert again.value == found.value
     assert found.share == again.share == (again.measures["j1"] <= 33.0).mean()
     merits = [s["merit"] for s in found.stages if s["realizations"] == 60]
@@ -96,47 +95,42 @@ def test_gains_found_beat_a_grid():
     assert found.design.top_drive.kp == found.values[0]
 
 
-def test_derivatives_lead_down_and_never_up():
-    design = tuning()
-    judge = Judge(design, tuned_parameters(design))
-    made = Derivatives.of(judge)
-    (start,) = judge.points(np.array([[640.0, 120.0]]), 60)
-    before = judge.trajectories
-    end = descended(judge, made, start)
-    assert end.merit < start.merit - 1.0
-    # Each derivative is a run and one more for each direction.
-    assert judge.derivatives % 3 == 0
-    assert judge.trajectories > before + judge.derivatives
-    assert descended(judge, made, end).merit <= end.merit
-
-
-def test_strings_that_differ_have_derivatives_too():
-    uncertain = {
-        "drillstring.sections.pipe.length": {
-            "distribution": "uniform", "min": "2900 m", "max": "3100 m",
-        },
-        "bit_rock.a1_factor": {"distribution": "lognormal", "cov": 0.05},
+def test_a_valley_along_neither_axis_is_followed_to_its_end():
+    """A polish alone stops in another one, at half as much again and more."""
+    values = {
+        "controller.law": "active-damping", "controller.drive.lag": "20 ms",
+        "drillstring.sections.pipe.stiffness_damping": "1 ms",
     }  # fmt: skip
-    design = tuning(WINDOW, {"uncertain": uncertain}, realizations=3, objective="mean")
-    judge = Judge(design, tuned_parameters(design))
-    assert len(judge.runs.groups) == 3
-    made = Derivatives.of(judge)
-    gains = np.array([630.0, 140.0])
-    (point,) = judge.points(gains[None, :], 3)
-    slopes = made.at(point).slopes["j1"]
-    step = np.array([0.0, 1e-4])
-    above, below = judge.points(np.stack([gains + step, gains - step]), 3)
-    difference = (above.measures["j1"] - below.measures["j1"]) / 2e-4
-    np.testing.assert_allclose(slopes[:, 1], difference, rtol=1e-3, atol=1e-5)
-    assert np.ptp(slopes[:, 1]) > 1e-4
+    design = drillctl.load(PAPER, **values, tune={"realizations": 60})
+    problem = search_problem(design, tuned_parameters(design))
+    best = optimum(problem)
+    assert best.realizations == 60
+    (other,) = problem.points(np.array([[80.0, 570.0]]), 60)
+    assert polished(problem, other).merit > 1.5 * best.merit
+    assert polished(problem, best).merit == best.merit
+
+
+def test_known_gains_are_polished_besides():
+    design = tuning(realizations=24)
+    problem = GainProblem(design, tuned_parameters(design))
+    own = problem.own(design)
+    assert tuple(own) == (625.0, 125.0)
+    alone = polished(problem, problem.points(own[None, :], 24)[0])
+    stages = []
+    best = optimum(problem, [np.array([900.0, -5.0]), own], 2, lambda *one: stages.append(one))
+    assert best.merit <= alone.merit
+    assert best.merit <= optimum(problem).merit
+    assert [name for name, _ in stages] == ["first look", "race", "population", "polish"]
+    assert [point.realizations for _, point in stages] == [16, 24, 24, 24]
+    assert (problem.shares(best.values) >= 0.0).all()
 
 
 @pytest.mark.parametrize("objective", ["mean", "cvar", "worst"])
 def test_every_objective_is_lowered(objective):
     design = tuning(objective=objective, realizations=40, starts=1)
     found = search(design)
-    judge = Judge(design, tuned_parameters(design))
-    (paper,) = judge.points(np.array([[625.0, 125.0]]), 40)
+    problem = GainProblem(design, tuned_parameters(design))
+    (paper,) = problem.points(np.array([[625.0, 125.0]]), 40)
     assert found.value < paper.value - 0.3
 
 
@@ -147,21 +141,18 @@ def test_weight_gain_and_drive_are_tuned_together():
     )  # fmt: skip
     design = tuning(parameters, MOVING, realizations=24, starts=1, weights={"lost_weight": 40.0})
     found = search(design)
-    judge = Judge(design, tuned_parameters(design))
-    (held,) = judge.points(np.array([[630.0, 147.0, 2000.0]]), 24)
+    problem = GainProblem(design, tuned_parameters(design))
+    (held,) = problem.points(np.array([[630.0, 147.0, 2000.0]]), 24)
     assert found.value < held.value
-    assert found.derivatives.startswith("forward mode")
 
 
-def test_a_search_goes_without_derivatives():
-    design = tuning(realizations=24, starts=1)
-    found, again = (search(design, derivatives=False) for _ in range(2))
-    assert found.derivatives == "not asked for"
+def test_a_search_gives_the_same_gains_again():
+    design = tuning(WINDOW, {"controller.drive.sampling_period": "25 ms"}, realizations=24)
+    found, again = (search(design) for _ in range(2))
     assert abs(found.values[0] - 630) < 20
     assert (again.values == found.values).all()
-    sampled = tuning(WINDOW, {"controller.drive.sampling_period": "25 ms"})
-    made = Derivatives.of(Judge(sampled, tuned_parameters(sampled)))
-    assert made == "none: the drive is sampled"
+    assert [one["stage"] for one in found.stages][-1] == "polish"
+    assert found.stages[-1]["trajectories"] == found.trajectories
 
 
 def test_a_level_that_no_gains_reach_is_told():
@@ -224,14 +215,14 @@ def test_the_papers_case_within_one_percent_of_the_exhaustive_optimum(seed):
     design = drillctl.load(PAPER, tune={"parameters": WINDOW, "seed": seed})
     found = search(design)
     fast = design.replace({"simulation.accuracy": "fast", "tune": {"seed": 77}})
-    judge = Judge(fast, tuned_parameters(fast))
+    problem = GainProblem(fast, tuned_parameters(fast))
     axes = np.meshgrid(np.linspace(400, 800, 41), np.linspace(0, 200, 41), indexing="ij")
     grid = np.stack([a.ravel() for a in axes], axis=1)
     best = min(
         point.value
         for k in range(0, len(grid), 41)
-        for point in judge.points(grid[k : k + 41], 1000)
+        for point in problem.points(grid[k : k + 41], 1000)
     )
-    assert judge.points(found.values[None, :], 1000)[0].value <= 1.01 * best
+    assert problem.points(found.values[None, :], 1000)[0].value <= 1.01 * best
     assert found.trajectories <= 41 * 41 * 1000 / 10
     assert found.processor_seconds <= 60.0

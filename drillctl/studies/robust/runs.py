@@ -1,4 +1,4 @@
-"""Runs of many gains at the same realizations by the batch engine, every trajectory counted."""
+"""Runs of many gains at the same draws by the batch engine, every trajectory counted."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Ready:
     string: StringNumbers
 
 
-class Evaluation:
+class GainRuns:
     """Measures of gains at the realizations of a design.
 
     The realizations are the first of one sequence, the same for all gains: what is compared is
