@@ -5,13 +5,13 @@
 3. *Population*: differential evolution among what is left, which moves along a narrow valley
    whatever its direction.
 4. *Polish*: a pattern search at all realizations, down to a thousandth of the bounds' width, from
-   the best of the population and from the best of the gains known before: the design's own and
-   those of the linear design, or those of a neighbour. The better end is taken.
+   the best of the population, and from the best of the gains known before where these come near:
+   the design's own and those of the linear design, or those of a neighbour.
 
 All gains meet the same realizations, so that differences are of gains. The known gains stay out of
-the population: they would draw all of it into their valley, though others may be deeper. A valley
-as narrow as that of a constant weight is a thousandth of the bounds of three gains, which a search
-that starts elsewhere does not hit; and a law that contains another must never end above it.
+the population: they would draw all of it into their valley, though others may be deeper. Where a
+law contains another, whose valley is a thousandth of its bounds, it must never end above that one:
+the study of the advantage polishes known gains however far they are behind.
 
 J1 jumps where a stick event appears or goes, and the derivatives of its trajectories do not tell
 of it; docs/robust-gains.md has what a search by derivatives took, for the same gains or worse.
@@ -19,6 +19,7 @@ of it; docs/robust-gains.md has what a search by derivatives took, for the same 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -47,6 +48,8 @@ GENERATIONS, AMONG = 20, 100
 """Of the population, and realizations that it lives among."""
 CROSSING = 0.9
 """Share of the parameters of a trial that are changed."""
+NEAR = 1.2
+"""Merit of known gains, over that of the population's end, up to which they are polished too."""
 APART = 0.05
 """Least distance of two ends of the population that are polished, over the bounds' width."""
 FIRST_STEP, LAST_STEP = 0.01, 1e-3
@@ -59,13 +62,13 @@ Note = Callable[[str, Point], None]
 
 
 def optimum(
-    problem: GainProblem, known: Sequence[Array] = (), ends: int = 1,
+    problem: GainProblem, known: Sequence[Array] = (), near: float = math.inf, ends: int = 1,
     note: Note = lambda stage, best: None,
 ) -> Point:  # fmt: skip
     """Gains of the least objective, at all realizations.
 
-    `known`: gains (SI) that are polished besides, the best of them; `ends`: how many of the
-    population are, if they are apart.
+    `ends`: how many of the population are polished, if they are apart. Of the gains `known` before
+    (SI) the best is polished too, where its merit is within `near` times that of the population.
     """
     points = spread(problem.tuned, LOOK[min(len(problem.tuned), len(LOOK)) - 1])
     for stage, count, kept in RACE:
@@ -75,10 +78,12 @@ def optimum(
     population = _evolved(problem, points)
     note("population", population[0])
     starts = [problem.at_all(point) for point in _apart(problem, population, ends)]
+    best = min((polished(problem, start) for start in starts), key=_merit)
     inside = [problem.values(problem.shares(np.asarray(one, dtype=float))) for one in known]
     if inside:
-        starts.append(min(problem.points(np.stack(inside), len(problem)), key=_merit))
-    best = min((polished(problem, start) for start in starts), key=_merit)
+        other = min(problem.points(np.stack(inside), len(problem)), key=_merit)
+        if other.merit <= near * best.merit:
+            best = min(best, polished(problem, other), key=_merit)
     note("polish", best)
     return best
 
@@ -283,7 +288,7 @@ def search(design: Design, progress: Progress = SILENT, verbose: bool = False) -
     log = _Log(problem, progress)
     progress.begin("tuning", len(RACE) + 2)
     known = [one for one in (problem.own(design), _linear(design, verbose)) if one is not None]
-    best = optimum(problem, known, problem.table.starts, log.note)
+    best = optimum(problem, known, NEAR, problem.table.starts, log.note)
     missed = problem.violations(best)
     return Tuning(
         design=put(design, problem.tuned, best.values),

@@ -1,5 +1,7 @@
 """The search: its runs are those of the design, its gains beat grids, its failures are told."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -110,19 +112,21 @@ def test_a_valley_along_neither_axis_is_followed_to_its_end():
     assert polished(problem, best).merit == best.merit
 
 
-def test_known_gains_are_polished_besides():
+def test_known_gains_are_polished_where_they_come_near():
     design = tuning(realizations=24)
-    problem = GainProblem(design, tuned_parameters(design))
-    own = problem.own(design)
+    tuned = tuned_parameters(design)
+    near, behind, alone = (GainProblem(design, tuned) for _ in range(3))
+    own = near.own(design)
     assert tuple(own) == (625.0, 125.0)
-    alone = polished(problem, problem.points(own[None, :], 24)[0])
     stages = []
-    best = optimum(problem, [np.array([900.0, -5.0]), own], 2, lambda *one: stages.append(one))
-    assert best.merit <= alone.merit
-    assert best.merit <= optimum(problem).merit
+    known = [np.array([900.0, -5.0]), own]
+    best = optimum(near, known, math.inf, 2, lambda *one: stages.append(one))
     assert [name for name, _ in stages] == ["first look", "race", "population", "polish"]
     assert [point.realizations for _, point in stages] == [16, 24, 24, 24]
-    assert (problem.shares(best.values) >= 0.0).all()
+    assert best.merit <= polished(near, near.points(own[None, :], 24)[0]).merit
+    assert best.merit <= optimum(alone).merit == optimum(behind, [own], 1.0).merit
+    assert behind.trajectories == alone.trajectories + 24
+    assert near.trajectories > behind.trajectories + 24 * 10
 
 
 @pytest.mark.parametrize("objective", ["mean", "cvar", "worst"])
