@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.ensemble.audit import Audit, choose_cells, references
+from drillctl.ensemble.cases import Interval, share_interval
 from drillctl.ensemble.draws import Failures, beyond_the_table
 from drillctl.ensemble.grid import Axis
-from drillctl.ensemble.cases import Interval, share_interval
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
