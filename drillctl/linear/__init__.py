@@ -5,13 +5,12 @@ From a string to its answers:
 - `transmission.py`: sections as transmission lines, of finite elements and of the continuum.
 - `ends.py`: the string seen from its two ends, by lines, by modes (`expansion.py`) or by
   solving M, C and K (`banded.py`). All frequency-domain results below take this alone.
-- `counting.py`: undamped natural frequencies, none missed.
 - `response.py`: `frequency_response` from any input to any output, open and closed loop.
 - `operating_point.py`: steady drilling and the slope of the rock there.
 - `slope_margin.py`: D*, the falling slope that a loop tolerates.
 - `boundary.py`: the boundary of the stable gains in closed form.
 - `loop_margins.py`: sensitivity, disk margins, delay margin at the top torque.
-- `impedance.py`, `tuning.py`: the top drive as the string feels it; gains from the string.
+- `tuning.py`: the top drive as the string feels it; gains from the string.
 
 As a state space:
 

@@ -21,7 +21,7 @@ from drillctl.linear.ends import BitSide, WeightPath
 from drillctl.linear.state_space import StateMatrices, closed_loop_matrices, plant_matrices
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import RealDrive, SampledDrive
-from drillctl.rig.top_drive.motion import MEMORY, respond
+from drillctl.rig.top_drive.real_drive import MEMORY, respond
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from drillctl.linear.observer import Observer
 from drillctl.rig.program import Ramp
 from drillctl.rig.top_drive import RealDrive, SampledDrive
-from drillctl.rig.top_drive.motion import (
+from drillctl.rig.top_drive.real_drive import (
     MEMORY,
     SAMPLED_MEMORY,
     begin,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import casadi
 import numpy as np
 import pytest
 
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear.tuning import pipe_impedance, soft_torque, stiff_speed
+from drillctl.rig.top_drive.law import DriveTable, StringNumbers, drive_laws, tracking
 
 DESIGN = "monteiro-trindade-140kn"
 
@@ -65,3 +67,36 @@ def test_misuse_is_refused():
         drillctl.load("navarro-lopez-2dof", controller={"law": "soft-torque"})
     with pytest.raises(InputError, match="kp: unknown key"):
         drillctl.load(DESIGN, controller={"law": "stiff-speed", "kp": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("table", "rates"),
+    [
+        ({}, [0.2, 0.0, 1.0, 1.0, 0.0]),
+        ({"tracking_time": "2 s"}, [0.5, 0.0, 0.5, 0.5, 0.0]),
+        ({"anti_windup": "none"}, [0.0] * 5),
+    ],
+)
+def test_the_rate_of_the_anti_windup_is_the_same_of_numbers_arrays_and_symbols(table, rates):
+    drive = DriveTable(**table)
+    pairs = np.array([(600.0, 120.0), (600.0, 0.0), (0.0, 120.0), (-5.0, 3.0), (0.0, 0.0)])
+    kp, ki = casadi.SX.sym("kp"), casadi.SX.sym("ki")
+    symbols = casadi.Function("rate", [kp, ki], [casadi.SX(tracking(kp, ki, drive))])
+    np.testing.assert_array_equal(tracking(*pairs.T, drive), rates)
+    for (p, i), rate in zip(pairs.tolist(), rates, strict=True):
+        assert tracking(p, i, drive) == float(symbols(p, i)) == rate
+
+
+@pytest.mark.parametrize("name", drive_laws())
+def test_one_function_gives_a_drive_of_numbers_and_of_symbols(name):
+    table = {"torque": "7 kN*m"} if name == "constant-torque" else {}
+    table |= {"kp": 600.0, "ki": 120.0} if name == "pi" else {}
+    design = drillctl.load(DESIGN, controller={"law": name} | table)
+    law = drive_laws()[name]
+    numbers = law.controller(design.tables.controller, design.string)
+    known = StringNumbers(*(getattr(design.string, field) for field in StringNumbers._fields))
+    assert law.controller(design.tables.controller, known) == numbers
+    symbols = StringNumbers(*casadi.vertsplit(casadi.SX.sym("string", len(known))))
+    made = law.controller(design.tables.controller, symbols)
+    found = casadi.Function("law", list(symbols), [casadi.SX(number) for number in made])(*known)
+    assert [float(number) for number in found] == pytest.approx(numbers, rel=1e-15)

@@ -12,7 +12,7 @@ that both are zero in steady drilling.
   the string feels of the drive, its inertia apart.
 
 `RealDrive` and `SampledDrive` have a memory: filters, integral, motor. They have an `impedance` and
-the `torque` of steady motion; how they move is in `motion`.
+the `torque` of steady motion; how they move is in `real_drive`.
 
 Each law has a file, which `drillctl.registry` names: its keys in a design, one pure function from
 these and the string to the numbers of its controller, and its `LAWS` entry. What makes a drive real
