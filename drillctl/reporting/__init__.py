@@ -12,7 +12,7 @@ A thin reader of results: it computes nothing itself beyond calling the studies.
 """
 
 from drillctl.reporting.making import FORMATS, Report, report
-from drillctl.reporting.profiles import FULL, PROFILES, QUICK, STANDARD, Profile
+from drillctl.reporting.recipes import FULL, PROFILES, QUICK, STANDARD, Profile
 from drillctl.reporting.sections import SECTIONS
 
 __all__ = [

@@ -14,8 +14,7 @@ from drillctl import store
 from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.reporting.profiles import Profile
-from drillctl.reporting.studies import RECIPES, Recipe
+from drillctl.reporting.recipes import RECIPES, Profile, Recipe
 from drillctl.reporting.words import Words
 from drillctl.store.json_files import read_json
 from drillctl.store.result import Result

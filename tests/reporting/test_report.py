@@ -16,7 +16,7 @@ from drillctl.cli import run
 from drillctl.errors import InputError, SimulationError
 from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, gather, making
 from drillctl.reporting import html as pdf
-from drillctl.reporting.verdict import verdict
+from drillctl.reporting.sections.summary import verdict
 
 
 def test_every_section_is_there_or_says_why_not(small):

@@ -15,7 +15,6 @@ from drillctl.reporting.sections import (
     advantage,
     audit,
     comparison,
-    glossary,
     loop,
     modes,
     operating_point,
@@ -60,7 +59,7 @@ KINDS = (
     Kind("audit", "Audit",
          ("simulate", "map", "uncertainty", "doctor", "mesh-1", "mesh-2", "mesh-4", "step-2",
           "step-4"), audit.build),
-    Kind("glossary", "Glossary", (), glossary.build),
+    Kind("glossary", "Glossary", (), rig.build_glossary),
 )  # fmt: skip
 """Every section, in the order in which they are read."""
 

@@ -1,8 +1,12 @@
-"""The studies that a report is made of: what each asks for, and when it does not apply."""
+"""How much is computed for a report: a look, the design as it stands, or everything.
+
+The studies that a report is made of: what each asks for, and when it does not apply.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,6 +20,85 @@ from drillctl.studies.base import Requested, Run, Study, studies
 if TYPE_CHECKING:
     from drillctl.progress import Progress
     from drillctl.store import RunFolder
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What a report spends on its studies."""
+
+    name: str  # by which it is asked for
+    told: str  # one line of what it means, for people
+    points: int | None  # most points along an axis of the map; None for those of the design
+    # cells of the map that are simulated again with the reference solver; None for as many as the
+    # design says
+    audited: int | None
+    realizations: int | None  # most draws over the map; None for those of the design
+    lanes: int  # most lanes over the map and all draws
+    setting: int  # draws at the design's own setting alone
+    # lanes under uncertainty that are simulated again; None for as many as cells
+    drawn_audit: int | None
+    sensitivity: bool  # whether Sobol indices are computed where the design asks for them
+    # whether the cases of the design are compared, and its gains tuned
+    compared: bool
+    tuned: bool
+
+    def applied(self, design: Design) -> Design:
+        """The design with its map and draws cut down to what the profile spends."""
+        values: dict[str, Any] = {}
+        if self.points is not None and any(a.points > self.points for a in design.tables.map.axes):
+            values["map.axes"] = [
+                {
+                    "path": axis.path, "min": axis.min, "max": axis.max,
+                    "points": min(axis.points, self.points),
+                }
+                for axis in design.tables.map.axes
+            ]  # fmt: skip
+        if self.audited is not None:
+            values["map.audit_cells"] = min(self.audited, design.tables.map.audit_cells)
+        if not self.sensitivity and design.tables.uncertainty.sensitivity is not None:
+            values["uncertainty.sensitivity"] = None
+        changed = design.replace(values) if values else design
+        draws = self._draws(changed)
+        if draws != changed.tables.uncertainty.realizations:
+            changed = changed.replace({"uncertainty.realizations": draws})
+        return changed
+
+    def _draws(self, design: Design) -> int:
+        """So many that neither their own bound nor that of the lanes is passed."""
+        table = design.tables.uncertainty
+        cells = 1
+        for axis in (*design.tables.map.axes, *table.axes):
+            cells *= axis.points
+        most = max(2, self.lanes // cells)
+        if self.realizations is not None:
+            most = min(most, self.realizations)
+        draws = min(table.realizations, most)
+        if table.sampling == "monte-carlo" or draws == table.realizations:
+            return draws
+        each = max(1, draws // table.replicates)
+        if table.sampling == "sobol":  # whose points come in powers of two
+            each = 1 << (each.bit_length() - 1)
+        return each * table.replicates
+
+
+QUICK = Profile(
+    name="quick", told="a look: a map of 21 x 21 cells, 200 draws, no comparison, no tuning",
+    points=21, audited=4, realizations=200, lanes=1_000_000, setting=2000, drawn_audit=0,
+    sensitivity=False, compared=False, tuned=False,
+)  # fmt: skip
+STANDARD = Profile(
+    name="standard", told="the design's own map; its draws up to four million lanes",
+    points=None, audited=None, realizations=None, lanes=4_000_000, setting=10_000,
+    drawn_audit=None, sensitivity=True, compared=False, tuned=False,
+)  # fmt: skip
+FULL = Profile(
+    name="full", told="everything the design asks for, comparison and tuning included",
+    points=None, audited=None, realizations=None, lanes=1_000_000_000, setting=10_000,
+    drawn_audit=None, sensitivity=True, compared=True, tuned=True,
+)  # fmt: skip
+
+PROFILES = {profile.name: profile for profile in (QUICK, STANDARD, FULL)}
+"""Profiles by name."""
 
 
 def _applies(asked: Requested) -> str:
