@@ -65,7 +65,7 @@ FORCE_RATE = Kind("force rate", "N/s", ("kN/s", "N/s"))
 INTEGRAL_GAIN = Kind("gain", "N*m/rad", ("N*m/rad",))
 
 # What the common units are in SI, as pint has it to the bit: pint takes half a second to start, and
-# is asked for the others alone.
+# reads the others alone.
 _KNOWN: dict[str, dict[str, float]] = {
     "rad/s": {
         "rpm": 0.10471975511965977, "rev/min": 0.10471975511965977, "rad/s": 1.0,
@@ -171,14 +171,14 @@ def parse(value: object, kind: Kind) -> float:
         raise _no_quantity(value, kind)
     if not isinstance(value, str):
         return _bare(value, kind)
-    found = _TEXT.match(value)
-    if found is None:
+    match = _TEXT.match(value)
+    if match is None:
         raise _no_quantity(value, kind)
-    number = _magnitude(found, value)
-    if not found["unit"]:
+    number = _magnitude(match, value)
+    if not match["unit"]:
         return _bare(number, kind)
     try:
-        return number * _factor(found["unit"], kind)
+        return number * _factor(match["unit"], kind)
     except InputError as error:
         raise InputError(f"{shown(value)}: {error.problem}") from None
 
@@ -189,16 +189,16 @@ def _no_quantity(value: object, kind: Kind) -> InputError:
     )
 
 
-def _magnitude(found: re.Match[str], value: str) -> float:
+def _magnitude(match: re.Match[str], value: str) -> float:
     """The number in front of the unit; `4 1/2` is four and a half."""
-    if found["number"] is not None:
-        return float(found["number"])
+    if match["number"] is not None:
+        return float(match["number"])
     # Not int(): Python refuses whole numbers of thousands of digits with an error of its own.
-    under = float(found["under"])
+    under = float(match["under"])
     if under == 0.0:
         raise InputError(f"{shown(value)} divides by zero")
-    part = float(found["over"]) / under
-    whole = found["whole"]
+    part = float(match["over"]) / under
+    whole = match["whole"]
     if whole is None:
         return part
     return math.copysign(abs(float(whole)) + part, -1.0 if whole.startswith("-") else 1.0)

@@ -106,7 +106,7 @@ class Design:
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What is allowed but hardly meant, told once when a design is used."""
+        """What is allowed but hardly meant, reported once when a design is used."""
         return parts.warnings_of(self.tables, self.bit_rock.static_torque(self._weight_at_rest))
 
     @property
@@ -117,12 +117,12 @@ class Design:
 
     @property
     def simple_drive(self) -> bool:
-        """Whether the drive is ideal: two gains, or a constant torque, tell all of it."""
+        """Whether the drive is ideal: two gains, or a constant torque, describe it."""
         return isinstance(self.top_drive, (PI, ConstantTorque))
 
     @property
     def simple_loop(self) -> bool:
-        """Whether the linear loop is told by two gains: no memory in drive or weight.
+        """Whether two gains describe the linear loop: no memory in drive or weight.
 
         An alarm, which drilling steadily never sets off, is none.
         """

@@ -66,7 +66,7 @@ def _changed(
 
 def _overlay_sections(base: object, top: list[Any]) -> list[Any]:
     if not isinstance(base, list) or not (_named(base) and _named(top)):
-        return top  # not sections at all: left for the validation to tell
+        return top  # not sections at all: left for the validation to report
     for layer in (base, top):
         refuse_same_names([section["name"] for section in layer], "drillstring.sections")
     merged = {section["name"]: section for section in base}

@@ -188,10 +188,8 @@ def _refuse_impossible_friction(law: BitRockLaw, weight: float) -> None:
 
 def table_range(tables: DesignTables) -> tuple[float, float]:
     """Lowest and highest weight (N) of the friction table; any weight without a table."""
-    rows = getattr(tables.bit_rock, "table", None)
-    if rows is None:
-        return 0.0, HEAVIEST
-    return rows[0].weight_on_bit, rows[-1].weight_on_bit
+    rows = getattr(tables.bit_rock, "weights", ())
+    return (rows[0], rows[-1]) if rows else (0.0, HEAVIEST)
 
 
 def torque_at_set_speed(tables: DesignTables) -> float:
@@ -238,7 +236,7 @@ def program(tables: DesignTables) -> Program:
     if scenario.weight_on_bit.start is not None:
         if point.weight_on_bit == 0.0:
             raise InputError(
-                "0 leads nowhere: a program needs a final weight", "operating_point.weight_on_bit"
+                "must be > 0: final weight of the program", "operating_point.weight_on_bit"
             )
         first = scenario.weight_on_bit.start / point.weight_on_bit - 1.0
         weight = Ramp(first, scenario.weight_on_bit.begin, scenario.weight_on_bit.end)

@@ -53,7 +53,7 @@ class Parameter:
     def refusal(self, value: float) -> str | None:
         """Why its table allows no such value (SI), or None if it does.
 
-        What other keys have to say to it is not asked.
+        Rules that tie it to other keys are not checked.
         """
         if self.check is None:
             return None
@@ -72,10 +72,10 @@ class Parameter:
             Not a finite number, or not of this kind.
         """
         if self.kind is not None:
-            found = units.parse(value, self.kind)
-            if not math.isfinite(found):
+            si = units.parse(value, self.kind)
+            if not math.isfinite(si):
                 raise InputError(f"{shown(value)} is not a finite {self.kind.name}")
-            return found
+            return si
         if isinstance(value, str):
             try:
                 value = float(value)
@@ -107,25 +107,25 @@ def _near_paths(path: str, known: dict[str, Parameter]) -> str:
 
 def parameters(design: Design) -> list[Parameter]:
     """Every numeric parameter that `--set` and sweep axes take, in file order."""
-    found: list[Parameter] = []
-    _collect(design.tables, "", found)
-    return found
+    result: list[Parameter] = []
+    _collect(design.tables, "", result)
+    return result
 
 
-def _collect(table: Table, prefix: str, found: list[Parameter]) -> None:
+def _collect(table: Table, prefix: str, result: list[Parameter]) -> None:
     for key, info in type(table).model_fields.items():
         if key in _HIDDEN:
             continue
         value = getattr(table, key)
         path = f"{prefix}{key}"
         if isinstance(value, Table):
-            _collect(value, f"{path}.", found)
+            _collect(value, f"{path}.", result)
         elif path == "drillstring.sections":
             for section in value:
-                _collect(section, f"{path}.{section.name}.", found)
+                _collect(section, f"{path}.{section.name}.", result)
         elif _is_number(info.annotation):
             whole = _is_number(info.annotation, int) and not _is_number(info.annotation, float)
-            found.append(Parameter(path, kind_of(info), value, whole, _check_of(info)))
+            result.append(Parameter(path, kind_of(info), value, whole, _check_of(info)))
 
 
 def _is_number(annotation: Any, *types: type) -> bool:
@@ -144,10 +144,10 @@ def _check_of(info: Any) -> BeforeValidator | None:
 
 
 def _notes_inside(annotation: Any) -> list[Any]:
-    found: list[Any] = list(getattr(annotation, "__metadata__", ()))
+    result: list[Any] = list(getattr(annotation, "__metadata__", ()))
     for argument in get_args(annotation):
-        found += _notes_inside(argument)
-    return found
+        result += _notes_inside(argument)
+    return result
 
 
 def kind_of(info: Any) -> Kind | None:

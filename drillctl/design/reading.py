@@ -76,9 +76,9 @@ def _merged(path: Path, seen: tuple[Path, ...]) -> Tree:
 
 
 def _model_path(model: str, design: Path) -> Path:
-    """A model given as a path is looked for beside the design first."""
+    """A model given as a path is searched beside the design first."""
     beside = design.parent / model
-    with suppress(OSError):  # a name no file can have; `find` tells it
+    with suppress(OSError):  # a name no file can have; `find` reports it
         if beside.suffix == ".toml" and beside.is_file():
             return beside.resolve()
     return catalog.find(model, ("models", "designs")).resolve()

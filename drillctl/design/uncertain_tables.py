@@ -226,7 +226,7 @@ class UncertaintyTable(Table):
 
 def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Distributions by dotted path, whether the paths were quoted in the file or not."""
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for key, value in tree.items():
         path = f"{prefix}{key.strip(chr(34))}"
         inside = isinstance(value, Mapping) and value
@@ -235,9 +235,9 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         else:
             deeper = {path: value}
         for leaf, table in deeper.items():
-            both = isinstance(table, Mapping) and isinstance(found.get(leaf), Mapping)
-            found[leaf] = {**found[leaf], **table} if both else table
-    return found
+            both = isinstance(table, Mapping) and isinstance(result.get(leaf), Mapping)
+            result[leaf] = {**result[leaf], **table} if both else table
+    return result
 
 
 _FILE_KEYS = ("file", "column", "unit")
@@ -289,13 +289,13 @@ def _numbers(path: Path, column: str | None, where: str) -> list[float]:
         rows = rows[1:]
     elif column is not None:
         raise InputError(f"{path} has no line of column names to find {column!r} in", where)
-    found = []
+    result = []
     for number, row in enumerate(rows, start=1):
         text = row[index].strip() if index < len(row) else ""
         if not _is_number(text):
             raise InputError(f"{path}: {shown(text)} in row {number} is not a number", where)
-        found.append(float(text))
-    return found
+        result.append(float(text))
+    return result
 
 
 def _is_number(text: str) -> bool:

@@ -1,4 +1,4 @@
-"""From plain TOML data to validated tables, with errors told in the user's own words."""
+"""From plain TOML data to validated tables, with errors in the user's own words."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def validated(tree: Tree, origin: str) -> DesignTables:
                 tables, parts.drillstring(tables), parts.torque_at_set_speed(tables)
             )
     except ValidationError as error:
-        raise _told(_first(error.errors()), tree, origin) from None
+        raise _reported(_first(error.errors()), tree, origin) from None
     except InputError as error:
         raise error.within(origin) if origin else error from None
     return tables
@@ -65,7 +65,7 @@ def _first(problems: list[Any]) -> Any:
     return first
 
 
-def _told(problem: Any, tree: Tree, origin: str) -> InputError:
+def _reported(problem: Any, tree: Tree, origin: str) -> InputError:
     """The first pydantic error as one of ours."""
     path = _path(problem["loc"], tree)
     where = f"{origin}: {path}" if origin and path else origin or path

@@ -1,6 +1,6 @@
 """What changes by the clock in a run: set speed, weight on bit, rock.
 
-A design describes the rig as it ends; a program tells what was before. The set speed and the
+A design describes the rig as it ends; a program says what was before. The set speed and the
 nominal weight come up (or down) to their values along a straight line, or in a step; the rock is
 another one until a moment.
 """

@@ -22,27 +22,27 @@ LARGEST_COUNT = 10**9
 """Of anything that is counted: what is larger is a slip of the pen."""
 
 
-def _any(found: float, written: object) -> None:
+def _any(si: float, written: object) -> None:
     pass
 
 
-def _positive(found: float, written: object) -> None:
-    if not found > 0:
+def _positive(si: float, written: object) -> None:
+    if not si > 0:
         raise InputError(f"{shown(written)} is not allowed: it must be greater than 0")
 
 
-def _not_negative(found: float, written: object) -> None:
-    if not found >= 0:
+def _not_negative(si: float, written: object) -> None:
+    if not si >= 0:
         raise InputError(f"{shown(written)} is not allowed: it must be 0 or more")
 
 
 def _read(kind: Kind, check: Check = _any) -> BeforeValidator:
     def read(value: object) -> float:
-        found = units.parse(value, kind)
-        if not math.isfinite(found):
+        si = units.parse(value, kind)
+        if not math.isfinite(si):
             raise InputError(f"{shown(value)} is not a finite {kind.name}")
-        check(found, value)
-        return found + 0.0  # never -0.0: equal designs have equal hashes
+        check(si, value)
+        return si + 0.0  # never -0.0: equal designs have equal hashes
 
     return BeforeValidator(read)
 
@@ -52,19 +52,19 @@ def number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"{shown(value)} is not a number; write it without quotes or unit")
     try:
-        found = float(value)
+        si = float(value)
     except OverflowError:
-        found = math.inf
-    if not math.isfinite(found):
+        si = math.inf
+    if not math.isfinite(si):
         raise InputError(f"{shown(value)} is not a finite number")
-    return found + 0.0
+    return si + 0.0
 
 
 def _number(check: Check = _any) -> BeforeValidator:
     def read(value: object) -> float:
-        found = number(value)
-        check(found, value)
-        return found
+        si = number(value)
+        check(si, value)
+        return si
 
     return BeforeValidator(read)
 
@@ -89,18 +89,18 @@ SHORTEST_PERIOD = 1e-3
 """Shortest sampling period (s) but for none."""
 
 
-def _none_or_lag(found: float, written: object) -> None:
-    if found != 0.0 and not found >= SHORTEST_LAG:
+def _none_or_lag(si: float, written: object) -> None:
+    if si != 0.0 and not si >= SHORTEST_LAG:
         raise InputError(f"{shown(written)} is not allowed: it must be 0 or at least 0.1 ms")
 
 
-def _none_or_period(found: float, written: object) -> None:
-    if found != 0.0 and not found >= SHORTEST_PERIOD:
+def _none_or_period(si: float, written: object) -> None:
+    if si != 0.0 and not si >= SHORTEST_PERIOD:
         raise InputError(f"{shown(written)} is not allowed: it must be 0 or at least 1 ms")
 
 
-def _not_positive(found: float, written: object) -> None:
-    if not found <= 0:
+def _not_positive(si: float, written: object) -> None:
+    if not si <= 0:
         raise InputError(f"{shown(written)} is not allowed: it must be 0 or less")
 
 
@@ -120,8 +120,8 @@ def _limit(kind: Kind, check: Check = _positive) -> BeforeValidator:
     return BeforeValidator(reads)
 
 
-def _share(found: float, written: object) -> None:
-    if not 0.0 <= found <= 1.0:
+def _share(si: float, written: object) -> None:
+    if not 0.0 <= si <= 1.0:
         raise InputError(f"{shown(written)} is not allowed: it must lie between 0 and 1")
 
 

@@ -85,7 +85,7 @@ LAWS = (
                 static=("a2",),
                 sliding=("a1",),
                 keys='`law = "jansen-van-den-steen"` (a1, a2), `law = "coulomb"` (a)',
-                use="To tell what the static peak does from what the falling slope does.",
+                use="To separate the effect of the static peak from that of the falling slope.",
                 curves=(("Jansen & van den Steen", JansenVanDenSteen(0.047, 0.085)),),
             ),
         ),

@@ -49,7 +49,7 @@ class Form:
     static: tuple[str, ...] = ()
     sliding: tuple[str, ...] = ()
     decay: tuple[str, ...] = ()
-    # for docs/laws.md: how a design asks for it, when it is of use, curves in the picture
+    # for docs/laws.md: how a design requests it, when it is of use, curves in the picture
     keys: str = ""
     use: str = ""
     curves: tuple[tuple[str, Any], ...] = ()

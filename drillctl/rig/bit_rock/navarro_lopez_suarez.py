@@ -340,15 +340,20 @@ class FrictionCoefficients(Table):
             refuse_rising(self.a2 * self.a2_factor, self.a1 * self.a1_factor)
         return self
 
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """Weights on bit of the rows (N); none without a table."""
+        return tuple(row.weight_on_bit for row in self.table or ())
+
     def over_weight(self) -> OverWeight:
         """The law through the rows of the table, for a weight that moves."""
         return over_weight(self._rows(), self.a1_factor, self.a2_factor, self.beta_factor)
 
     def at(self, weight: float) -> NavarroLopezSuarez:
         """The law at a weight on bit (N)."""
-        found = self._coefficients(weight)
+        given = self._coefficients(weight)
         law = NavarroLopezSuarez(
-            found.a1 * self.a1_factor, found.a2 * self.a2_factor, found.beta * self.beta_factor
+            given.a1 * self.a1_factor, given.a2 * self.a2_factor, given.beta * self.beta_factor
         )
         if law.a2 < law.a1:
             raise InputError(
@@ -373,7 +378,7 @@ class FrictionCoefficients(Table):
     def _rows(self) -> WeightTable:
         rows = self.table or ()
         return WeightTable(
-            weight=tuple(row.weight_on_bit for row in rows),
+            weight=self.weights,
             a1=tuple(row.a1 for row in rows),
             a2=tuple(row.a2 for row in rows),
             beta=tuple(row.beta for row in rows),

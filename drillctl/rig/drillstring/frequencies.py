@@ -42,9 +42,9 @@ def natural_frequencies(
         high *= 2.0
         if high > 1e12:  # a spring without inertia at both its ends has no more
             break
-    found = min(count, int(still.below(np.array([high]))[0]))
-    number = np.arange(found)
-    lower, upper = np.zeros(found), np.full(found, high)
+    total = min(count, int(still.below(np.array([high]))[0]))
+    number = np.arange(total)
+    lower, upper = np.zeros(total), np.full(total, high)
     for _ in range(BISECTIONS):
         middle = 0.5 * (lower + upper)
         under = still.below(middle) > number

@@ -111,7 +111,7 @@ class DriveLaw:
     tuned: tuple[str, ...]  # keys that may be tuned
     ranges: Callable[[Any, Any], Ranges]  # of table and string: what is tuned by default, and where
     tuned_to_string: bool = True  # whether anything follows from the string
-    # for docs/laws.md: class or rule, how a design asks for it, when it is of use
+    # for docs/laws.md: class or rule, how a design requests it, when it is of use
     forms: tuple[tuple[Callable[..., Any], str, str], ...] = ()
 
     @property

@@ -174,7 +174,7 @@ def _damping(table: Any, string: Any) -> Controller:
 
 
 def _damping_ranges(table: Any, string: Any) -> Ranges:
-    """From a quarter to four times what the string asks for."""
+    """From a quarter to four times the values that follow from the string."""
     damper, spring = active_damping(string)
     return {"spring": (spring / 4, 4 * spring), "damper": (damper / 4, 4 * damper)}
 

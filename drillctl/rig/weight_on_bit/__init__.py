@@ -2,7 +2,7 @@
 
 A law is a `NamedTuple` of numbers. One that acts at once has two pure functions of the bit speed
 in its own direction (rad/s, not negative): `weight(speed)` (N) and its `slope(speed)` (N s/rad);
-`moves` tells whether the weight changes at all. Others (`PATHS`) have a memory instead and give
+`moves` says whether the weight changes at all. Others (`PATHS`) have a memory instead and give
 the `command` that a hoist follows; the engines keep the memory.
 
 Each law has a file, which `drillctl.registry` names: its equation, its keys in a design, how it is

@@ -122,7 +122,7 @@ class RealWeight(NamedTuple):
         return False
 
     def command(self, seen: Any, nominal: Any) -> Any:
-        """Weight asked for (N) at a speed seen (rad/s) and the nominal weight of the hour (N)."""
+        """Commanded weight (N) at a measured speed (rad/s) and the present nominal weight (N)."""
         free = nominal + self.gain * (seen - self.set_speed)
         kept = free + (free < self.least) * (self.least - free)
         return kept + (kept > self.most) * (self.most - kept)
@@ -131,7 +131,7 @@ class RealWeight(NamedTuple):
 class ObservedWeight(NamedTuple):
     r"""The law of `RealWeight` with a bit speed estimated at the surface.
 
-    An observer of the string sees top speed and top torque and tells the bit speed (see
+    An observer of the string reads top speed and top torque and estimates the bit speed (see
     `drillctl.linear.observer`); no signal comes up from the bit. What the bit does reaches the
     top, and the estimate, one travel time of the pipe later.
 
@@ -160,7 +160,7 @@ class ObservedWeight(NamedTuple):
         return False
 
     def command(self, seen: Any, nominal: Any) -> Any:
-        """Weight asked for (N) at a speed seen (rad/s) and the nominal weight of the hour (N)."""
+        """Commanded weight (N) at a measured speed (rad/s) and the present nominal weight (N)."""
         return RealWeight.command(self, seen, nominal)  # type: ignore[arg-type]
 
 

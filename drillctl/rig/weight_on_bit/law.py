@@ -66,7 +66,7 @@ class WeightOnBitLaw:
     # law of the table, the nominal weight (N) and the set speed (rad/s)
     make: Callable[[Any, float, float], WeightLaw]
     moves: bool = True  # whether the weight changes while the bit drills
-    # for docs/laws.md: each `NamedTuple` it makes, how a design asks for it, when it is of use
+    # for docs/laws.md: each `NamedTuple` it makes, how a design requests it, when it is of use
     forms: tuple[tuple[type, str, str], ...] = ()
 
     @property
