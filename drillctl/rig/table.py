@@ -173,7 +173,8 @@ WeightRateLimit = Annotated[float | None, units.FORCE_RATE, _limit(units.FORCE_R
 class Table(BaseModel):
     """A table of a design: unknown keys refused, frozen when made."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # A table that is part of another is never validated alone: half of the validators are not built.
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 def law_name(table: type[Table]) -> str:
