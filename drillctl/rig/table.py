@@ -173,7 +173,7 @@ WeightRateLimit = Annotated[float | None, units.FORCE_RATE, _limit(units.FORCE_R
 class Table(BaseModel):
     """A table of a design: unknown keys refused, frozen when made."""
 
-    # A table that is part of another is never validated alone: half of the validators are not built.
+    # A table inside another is never validated alone: half of the validators need not be built.
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
