@@ -1,16 +1,31 @@
 """Nonlinear simulation of the closed loop with set-valued friction.
 
 - `reference.py`: adaptive integration with located events; `system.py`, `phases.py`: its
-  equations; `drive_in_time.py`, `weight_in_time.py`: laws with a memory in them; `printed.py`: the
-  paper's own three branches; `trajectory.py`: signals and measures.
-- `batch.py`: thousands of lanes at a fixed step; `lanes.py`: what a lane is; `propagator.py`:
-  the exact step of the string; `step_laws.py`: laws with a memory for it; `kernels/`: compiled
-  loops and nothing else; `scheme.py`: step and modes; `scheme_reasons.py`: why these;
-  `cost.py`: operations of a step.
-- `start.py`, `measures.py`: shared by both.
+  equations; `laws_in_time.py`: laws with a memory in them; `printed.py`: the paper's own three
+  branches; `run.py`, `trajectory.py`: signals and measures.
+- `batch.py`: thousands of lanes at a fixed step; `lanes.py`: what a lane is and how it starts;
+  `propagator.py`: the exact step of the string; `step_laws.py`: laws with a memory for it;
+  `kernels/`: compiled loops and nothing else; `scheme.py`: step and modes.
+- `measures.py`: what both measure; `limit_cycle/`: periodic motions.
 """
 
-from drillctl.simulation.run import simulate
-from drillctl.simulation.trajectory import Simulation
+from __future__ import annotations
 
-__all__ = ["Simulation", "simulate"]
+from typing import TYPE_CHECKING, Any
+
+from drillctl.registry import resolve
+
+if TYPE_CHECKING:
+    from drillctl.simulation.run import simulate as simulate
+    from drillctl.simulation.trajectory import Simulation as Simulation
+
+_HOME = {"Simulation": "trajectory", "simulate": "run"}
+
+__all__ = [*_HOME]
+
+
+def __getattr__(name: str) -> Any:
+    # Lanes are made without the reference solver and what of SciPy it takes.
+    if name in _HOME:
+        return resolve(f"drillctl.simulation.{_HOME[name]}:{name}")
+    raise AttributeError(f"module 'drillctl.simulation' has no attribute {name!r}")

@@ -7,17 +7,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.linear.observer import Observer, observer_of
 from drillctl.rig.bit_rock import contact
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.program import Program
 from drillctl.rig.weight_on_bit import AlarmWeight
+
+if TYPE_CHECKING:
+    from drillctl.linear.observer import Observer
 
 Array = NDArray[np.float64]
 Kind = Literal["rest", "turning", "wound_up"]
@@ -174,6 +176,7 @@ def lane_numbers(design: Design) -> dict[str, float]:
 
 def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
     """Lanes on the string of `design`, with the types of its laws."""
+    from drillctl.linear.observer import observer_of  # SciPy, which axes need not wait for
 
     def law(part: str, like: Any) -> Any:
         return type(like)(*(np.ascontiguousarray(numbers[f"{part}.{f}"]) for f in like._fields))

@@ -3,29 +3,42 @@
 from __future__ import annotations
 
 from drillctl.design import Design
-from drillctl.ensemble.grid import axes_of
-from drillctl.ensemble.parameters import uncertain_parameters
-from drillctl.studies.advantage.compute import checked
-from drillctl.studies.advantage.policies import policies
-from drillctl.studies.compare.cases import case_designs, refuse_unequal
-from drillctl.studies.delay.lanes import following_design
-from drillctl.studies.robust import tuned_parameters
-from drillctl.studies.uncertainty.study import map_axes, refuse_impossible
+from drillctl.studies.base import studies
 
 
 def refuse_what_studies_would(design: Design) -> None:
-    """Refuse (`InputError`) what a study would: axes, draws, cases, delays, what is tuned."""
+    """Refuse (`InputError`) what a study would; defaults need not fit every law.
+
+    What a check needs is imported only if the design has its table.
+    """
     if "axes" in design.tree.get("map", {}):
+        from drillctl.ensemble.grid import axes_of
+
         axes_of(design, design.tables.map.axes)
     if design.tables.uncertain:
+        from drillctl.ensemble.parameters import uncertain_parameters
+
         uncertain_parameters(design)
     if "uncertainty" in design.tree:
+        from drillctl.studies.uncertainty.study import map_axes, refuse_impossible
+
         refuse_impossible(design, map_axes(design))
     if design.tables.compare.cases:
+        from drillctl.studies.compare.cases import case_designs, refuse_unequal
+
         refuse_unequal(case_designs(design))
     if "weight_delay" in design.tree:
+        from drillctl.studies.delay.lanes import following_design
+
         following_design(design)
     if "advantage" in design.tree:
+        from drillctl.studies.advantage.compute import checked
+        from drillctl.studies.advantage.policies import policies
+
         checked(policies(design))
     if "tune" in design.tree:
+        from drillctl.studies.robust import tuned_parameters
+
         tuned_parameters(design)
+    for study in studies().values():
+        study.check(design)
