@@ -58,7 +58,7 @@ ENTRIES = (
     ),
     Entry(
         "pi-vs-dynamic-wob-140kn",
-        "a constant weight on bit against one that follows the bit speed",
+        "constant against dynamic weight on bit",
         "full",
         COMPARISON,
     ),
@@ -102,16 +102,16 @@ def index() -> str:
     """The page that leads to all of them."""
     lines = [
         "# Reports", "",
-        "What the shipped designs give, made by the tool itself with `make reports`: Markdown,",
-        "pictures and `summary.json` here, the HTML of each under `runs/reports/`.", "",
+        "Reports of shipped designs, written by `make reports`: Markdown, figures and",
+        "`summary.json` here, the HTML of each under `runs/reports/`.", "",
         "- [The paper beside drillctl](paper.md): each statement and figure of Monteiro & Trindade",
-        "  (2012), what was found here, and what had to be reconstructed.",
+        "  (2012), the result of drillctl, and what had to be reconstructed.",
     ]  # fmt: skip
     for entry in ENTRIES:
         lines.append(f"- [{entry.design}]({entry.design}/README.md): {entry.about}.")
     lines += [
         "",
-        "`tests/test_reports.py` computes the numbers of these pages again and holds them to the",
+        "`tests/test_reports.py` recomputes the numbers of these pages and compares them with the",
         "committed ones.",
         "",
     ]
