@@ -61,7 +61,6 @@ _HOME = {
     "sweep": "drillctl.studies",
     "advantage": "drillctl.studies.advantage",
     "compare": "drillctl.studies.compare.compute",
-    "stability_map": "drillctl.studies",
     "uncertainty": "drillctl.studies.uncertainty",
     "tune": "drillctl.studies.robust",
     "open": "drillctl.store",

@@ -36,6 +36,7 @@ WEIGHT_LAWS = (
 
 STUDIES: tuple[str, ...] = (
     "drillctl.studies.simulate",
+    "drillctl.studies.map",
     "drillctl.studies.three_regions",
     "drillctl.studies.regularisation",
     "drillctl.studies.doctor",

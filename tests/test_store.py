@@ -120,7 +120,7 @@ def test_modes_back(bistable, tmp_path, monkeypatch):
     from drillctl.cli import run
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("drillctl.cli.running.draw", lambda figure, path: None)
+    monkeypatch.setattr("drillctl.cli.verb.draw", lambda figure, path: None)
     assert run(["modes", "navarro-lopez-4dof", "--out", "m"]) == 0
     back = drillctl.open("m")
     fresh = drillctl.modes(drillctl.load("navarro-lopez-4dof"))

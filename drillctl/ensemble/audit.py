@@ -15,6 +15,7 @@ from drillctl.design import Design
 from drillctl.ensemble.grid import Axis, cell_design, shape_of
 from drillctl.errors import SimulationError
 from drillctl.progress import SILENT, Progress
+from drillctl.store.result import label
 
 Array = NDArray[np.float64]
 
@@ -30,10 +31,15 @@ TOLERANCE = 1e-7
 class Audit:
     """Batch engine against reference solver at some cells."""
 
-    cells: NDArray[np.int64]  # shape (audited,): Index in the flattened map
-    # shape (audited,): J1 by either (s); NaN where the reference solver failed
-    batch: Array
-    reference: Array
+    cells: NDArray[np.int64] = label(
+        "audited", name="audited_{of}", means="index in the flattened map"
+    )
+    batch: Array = label("audited", unit="s", name="audited_{of}_by_batch", means="J1 of the map")
+    reference: Array = label(
+        "audited", unit="s", name="audited_j1",
+        means="J1 by the reference solver; NaN where that failed",
+    )  # fmt: skip
+    of: str = "cell"  # what was audited: cells of a map, lanes of realizations
 
     @property
     def differences(self) -> Array:
@@ -54,6 +60,13 @@ class Audit:
             return "none"
         fine = np.isfinite(self.reference).all() and (self.worst or 0.0) <= WORST_ALLOWED
         return "ok" if fine else "check"
+
+    def sentence(self, what: str) -> str:
+        """The verdict, and how far the engines differ at most."""
+        text = f"audit: {self.verdict}, {len(self.cells)} {what}"
+        if self.worst is None:
+            return text
+        return f"{text}, worst relative difference in J1 {self.worst:.2g}"
 
     def summary(self) -> dict[str, Any]:
         """Number of cells, worst difference, verdict."""

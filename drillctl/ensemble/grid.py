@@ -30,6 +30,7 @@ from drillctl.rig.top_drive.law import tracking
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.simulation.measures import BATCH_MEASURES
 from drillctl.store.result import label
+from drillctl.store.tables import texts
 
 Array = NDArray[np.float64]
 
@@ -73,6 +74,13 @@ def span(axes: tuple[Axis, ...]) -> dict[str, dict[str, float]]:
         a.path: {"min": float(a.values[0]), "max": float(a.values[-1]), "points": len(a)}
         for a in axes
     }
+
+
+def over_axes(axes: tuple[Axis, ...]) -> dict[str, list[str]]:
+    """Values of the axes (SI) at every cell of their grid, as texts by path."""
+    values = [np.array(texts(a.values), dtype=object) for a in axes]
+    grids = np.meshgrid(*values, indexing="ij")
+    return {a.path: grid.ravel().tolist() for a, grid in zip(axes, grids, strict=True)}
 
 
 OF_THE_ROCK = ("friction.", "before.", "weight.", "weight_program.", "set_speed")

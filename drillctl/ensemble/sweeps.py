@@ -6,9 +6,9 @@ import itertools
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,10 @@ from drillctl.ensemble.grid import (
     axes_of,
     divisions,
     group_of,
+    other_axes,
     refuse_too_large,
     shape_of,
+    span,
 )
 from drillctl.ensemble.regions import Region, region
 from drillctl.ensemble.running import (
@@ -41,52 +43,33 @@ from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.batch import CHUNK, Prepared, prepare
 from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
+from drillctl.store.result import Result, label
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
-    """Measures over a grid of parameters.
+class Sweep(Result):
+    """Measures over a grid of parameters."""
 
-    Attributes
-    ----------
-    design : Design
-        What was varied.
-    axes : tuple of Axis
-        Parameters and their values.
-    levels : tuple of float
-        Levels of J1 (s).
-    measures : dict of ndarray, shape of the grid
-        Those that were kept, by the names of `simulation.measures.MEASURES`; NaN where undefined.
-    status : ndarray of int8, shape of the grid
-        Index into `simulation.measures.STATUSES`.
-    audit : Audit
-        Cells simulated again with the reference solver.
-    step, modes : float and int, or None
-        Scheme of the batch engine; None where it differs from string to string.
-    seconds, total_seconds : float
-        Spent in the lanes alone and from call to return (s).
-    provenance : dict of str
-        Versions and processor it came from.
-    """
+    kind: ClassVar[str] = "map"
 
-    design: Design
-    axes: tuple[Axis, ...]
-    levels: tuple[float, ...]
-    measures: dict[str, Array]
-    status: NDArray[np.int8]
-    audit: auditing.Audit
-    step: float | None
-    modes: int | None
-    seconds: float
-    total_seconds: float
-    provenance: dict[str, str] = field(default_factory=provenance)
+    design: Design = label(means="what was varied")
+    axes: tuple[Axis, ...] = label(means="parameters and their values")
+    levels: tuple[float, ...] = label(unit="s", means="levels of J1")
+    measures: dict[str, Array] = label(
+        "axes", unit=lambda name: MEASURES[name].unit, flat=True,
+        means=lambda name: MEASURES[name].meaning,
+    )  # fmt: skip
+    status: NDArray[np.int8] = label("axes", flags=STATUSES, means="how the run ended")
+    audit: auditing.Audit = label(flat=True, means="cells simulated again by the reference solver")
+    step: float | None = label(unit="s", means="of the batch engine; None where it differs")
+    modes: int | None = label(means="of the batch engine; None where it differs")
+    seconds: float = label(unit="s", means="in the lanes alone")
+    total_seconds: float = label(unit="s", means="from call to return")
+    provenance: dict[str, str] = label(
+        means="versions and processor it came from", default_factory=provenance
+    )
 
     @property
     def j1(self) -> Array:
@@ -107,35 +90,11 @@ class Sweep:
         at = {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)}
         return float(self.j1[where]), at
 
-    @property
-    def data(self) -> xarray.Dataset:
-        """All measures, labelled by parameter path, with units and provenance."""
-        import xarray
-
-        paths = [a.path for a in self.axes]
-        coordinates = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
-        variables: dict[str, Any] = {
-            name: (paths, values, {"units": MEASURES[name].unit})
-            for name, values in self.measures.items()
-        }
-        flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
-        variables["status"] = (paths, self.status, flags)
-        variables["audited_cell"] = ("audited", self.audit.cells, {})
-        variables["audited_j1"] = ("audited", self.audit.reference, {"units": "s"})
-        return xarray.Dataset(variables, coordinates, dict(self.provenance))
-
     def summary(self) -> dict[str, Any]:
         """Axes, minimum, regions, audit, failures, times; SI units, parameters by path."""
         minimum = self.minimum
         return {
-            "axes": {
-                a.path: {
-                    "min": float(a.values[0]),
-                    "max": float(a.values[-1]),
-                    "points": len(a),
-                }
-                for a in self.axes
-            },
+            "axes": span(self.axes),
             "minimum": None if minimum is None else {"j1": minimum[0], "at": minimum[1]},
             "regions": {f"{level:g}": r.summary() for level, r in self.regions.items()},
             "audit": self.audit.summary(),
@@ -150,11 +109,15 @@ class Sweep:
             "total_seconds": self.total_seconds,
         }
 
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """Axes, audited cells and measures that the design does not give."""
+        settings = other_axes(self)
+        cells = auditing.choose_cells(self.j1, self.levels, self.design.tables.map.audit_cells)
+        if not np.array_equal(cells, self.audit.cells):
+            settings["audited"] = self.audit.cells.tolist()
+        if tuple(self.measures) != BATCH_MEASURES:
+            settings["measure"] = [name for name in self.measures if name != "j1"]
+        return self.design, settings
 
 
 def sweep(

@@ -3,7 +3,6 @@
 from drillctl.printing.advantage import advantage
 from drillctl.printing.comparison import comparison
 from drillctl.printing.linear import loop, modes
-from drillctl.printing.maps import sweep
 from drillctl.printing.runs import cycle
 from drillctl.printing.tuning import tune
 from drillctl.printing.uncertainty import uncertainty
@@ -15,7 +14,6 @@ __all__ = [
     "cycle",
     "loop",
     "modes",
-    "sweep",
     "tune",
     "uncertainty",
     "weight_delay",

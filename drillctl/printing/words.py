@@ -21,11 +21,6 @@ def head_of(name: str, label: str) -> str:
     return f"{name} ({label})" if label not in ("", "1") else name
 
 
-def span_of(bounds: tuple[float, float] | None, factor: float) -> str:
-    """From the least to the largest value, times a factor."""
-    return "-" if bounds is None else f"{bounds[0] * factor:g} to {bounds[1] * factor:g}"
-
-
 def place_of(at: dict[str, float], axes: tuple[Axis, ...], system: units.System) -> str:
     """Values of parameters by path with their units."""
     words = []

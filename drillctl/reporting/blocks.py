@@ -6,8 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from drillctl.store.tables import Table as Results
+from drillctl.studies.base import Picture
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
+
+    from drillctl import units
 
 
 @dataclass(frozen=True)
@@ -106,3 +111,18 @@ class Document:
     problems: tuple[str, ...]  # why it is not complete; the first thing that is read
     sections: tuple[Section, ...]  # in the order to be read
     left_out: tuple[tuple[str, str], ...]  # titles of other sections and why they are not here
+
+
+def figure(picture: Picture, name: str, system: units.System) -> Figure:
+    """A picture of a study as a block of a report."""
+    return Figure(
+        picture.name, picture.caption, picture.alt, lambda: picture.draw(system), (name,),
+        picture.paper,
+    )  # fmt: skip
+
+
+def block(table: Results, system: units.System) -> Table:
+    """A table of a study as a block of a report."""
+    heads, rows = tuple(table.heads(system)), tuple(map(tuple, table.texts(system)))
+    caption = table.title[0].upper() + table.title[1:]
+    return Table(table.name, caption, heads, rows)

@@ -141,13 +141,6 @@ def _both(*reasons: Callable[[Requested], str]) -> Callable[[Requested], str]:
     return lambda asked: next((why for reason in reasons if (why := reason(asked))), "")
 
 
-def _swept(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    from drillctl import studies
-    from drillctl.ensemble.storing import Folder
-
-    return studies.sweep(design, progress=progress, store=Folder(folder.path))
-
-
 def _cells(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return cells.traced(design, folder.path, progress)
 
@@ -256,7 +249,6 @@ ALL = (
     Recipe("loop", "the loop", "loop", _looped),
     Recipe("setting", "the draws at the current setting", "uncertainty", _setting, in_batch,
            _at_setting, settings={"axes": []}, told=_told_of_setting),
-    Recipe("map", "the J1 map", "map", _swept, _both(in_batch, fitting_map)),
     Recipe("cells", "the responses over the map", "report-cells", _cells, fitting_map,
            needs=("map",), write=False, told=dict),
     Recipe("slope-margin", "the slope margin over the map", "loop-map", _loop_map, over_two_axes),
@@ -268,11 +260,9 @@ ALL = (
     Recipe("advantage", "the benefit of a moving weight", "advantage", _by_name("advantage"),
            _both(_not_weighed, in_batch)),
 )  # fmt: skip
-"""Every study, in the order in which they are done."""
-
-
+"""Every study that is no object yet, in the order in which they are done."""
 _ORDER = {
-    "modes": 0, "loop": 10, "setting": 30, "map": 40, "cells": 50, "slope-margin": 80,
+    "modes": 0, "loop": 10, "setting": 30, "cells": 50, "slope-margin": 80,
     "uncertainty": 90, "compare": 100, "tune": 110, "advantage": 120,
 }  # fmt: skip
 

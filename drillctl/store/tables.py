@@ -9,10 +9,13 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.store.json_files import write_text
@@ -137,6 +140,28 @@ def write_csv(table: Table, folder: Path) -> None:
         cells = zip(table.columns, row, strict=True)
         writer.writerow([field for column, cell in cells for field in column.fields(cell)])
     write_text(folder / f"{table.name}.csv", text.getvalue())
+
+
+def texts(values: NDArray[np.float64]) -> list[str]:
+    """Numbers in full, as Python writes them; what is undefined is an empty field.
+
+    Most of the time of a large table goes into these texts: each different number has one.
+    """
+    ordered = np.sort(values, axis=None)
+    if np.count_nonzero(np.diff(ordered)) < 0.7 * ordered.size:  # NaN differ from each other
+        different, at = np.unique(values, return_inverse=True)
+        made = np.array([*map(repr, different.tolist())], dtype=object)
+        made[np.isnan(different)] = ""
+        found: list[str] = made[at.ravel()].tolist()
+        return found
+    return ["" if v != v else repr(v) for v in values.ravel().tolist()]
+
+
+def write_columns(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
+    """Write columns of texts without commas, quotes or line breaks: fast for many rows."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream, lineterminator="\n").writerow(columns)
+        stream.writelines(f"{','.join(row)}\n" for row in zip(*columns.values(), strict=True))
 
 
 def _field(value: Cell) -> Any:

@@ -25,10 +25,9 @@ if TYPE_CHECKING:
     from drillctl.studies.doctor.compute import doctor as doctor
     from drillctl.studies.loop_maps import LoopMap as LoopMap
     from drillctl.studies.loop_maps import loop_map as loop_map
-    from drillctl.studies.responses import responses as responses
+    from drillctl.studies.map.outputs import responses as responses
     from drillctl.studies.tables import write_comparison as write_comparison
     from drillctl.studies.tables import write_loop_table as write_loop_table
-    from drillctl.studies.tables import write_tables as write_tables
     from drillctl.studies.tables import write_weight_delay as write_weight_delay
     from drillctl.studies.uncertainty import Uncertainty as Uncertainty
     from drillctl.studies.uncertainty import uncertainty as uncertainty
@@ -50,7 +49,7 @@ _HOME = {
     "draw": "drillctl.ensemble.parameters",
     "loop_map": "drillctl.studies.loop_maps",
     "region": "drillctl.ensemble.regions",
-    "responses": "drillctl.studies.responses",
+    "responses": "drillctl.studies.map.outputs",
     "stability_map": "drillctl.ensemble.sweeps",
     "sweep": "drillctl.ensemble.sweeps",
     "uncertain_parameters": "drillctl.ensemble.parameters",
@@ -58,7 +57,6 @@ _HOME = {
     "weight_delay": "drillctl.studies.delay.compute",
     "write_comparison": "drillctl.studies.tables",
     "write_loop_table": "drillctl.studies.tables",
-    "write_tables": "drillctl.studies.tables",
     "write_uncertainty_tables": "drillctl.studies.uncertainty.tables",
     "write_weight_delay": "drillctl.studies.tables",
 }

@@ -5,76 +5,13 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from drillctl.ensemble.cases import QUANTILES
-from drillctl.ensemble.grid import Axis
-from drillctl.ensemble.sweeps import Sweep
+from drillctl.ensemble.grid import over_axes
 from drillctl.simulation.measures import STATUSES
+from drillctl.store.tables import texts, write_columns
 from drillctl.studies.compare.compute import MEASURES, Comparison
 from drillctl.studies.delay.compute import WeightDelay
 from drillctl.studies.loop_maps import LoopMap
-
-
-def write_tables(result: Sweep, folder: Path) -> None:
-    """Write `map.csv`, a row a cell, and `regions.csv`, a row a level; SI units.
-
-    Parameters
-    ----------
-    result : Sweep
-        What was computed.
-    folder : Path
-        Where to.
-    """
-    columns = over_axes(result.axes) | {
-        name: _texts(values) for name, values in result.measures.items()
-    }
-    columns["status"] = np.array(STATUSES, dtype=object)[result.status.ravel()].tolist()
-    write_columns(folder / "map.csv", columns)
-    _write_regions(result, folder)
-
-
-def over_axes(axes: tuple[Axis, ...]) -> dict[str, list[str]]:
-    """Values of the axes at every cell of their grid, as texts by path."""
-    grids = np.meshgrid(*(np.array(_texts(a.values), dtype=object) for a in axes), indexing="ij")
-    return {a.path: grid.ravel().tolist() for a, grid in zip(axes, grids, strict=True)}
-
-
-def _texts(values: NDArray[np.float64]) -> list[str]:
-    """Numbers in full, as Python writes them; what is undefined is an empty field.
-
-    Most of the time of a large table goes into these texts: each different number has one.
-    """
-    if not values.size:
-        return []
-    ordered = np.sort(values, axis=None)
-    if np.count_nonzero(np.diff(ordered)) < 0.7 * ordered.size:  # NaN differ from each other
-        different, at = np.unique(values, return_inverse=True)
-        texts = np.array([*map(repr, different.tolist())], dtype=object)
-        texts[np.isnan(different)] = ""
-        found: list[str] = texts[at.ravel()].tolist()
-        return found
-    return ["" if v != v else repr(v) for v in values.ravel().tolist()]
-
-
-def write_columns(path: Path, columns: dict[str, list[str]]) -> None:
-    """Write columns of texts that hold no commas, quotes or line breaks."""
-    rows = map(",".join, zip(*columns.values(), strict=True))
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        csv.writer(stream).writerow(columns)
-        stream.writelines(f"{row}\r\n" for row in rows)
-
-
-def _write_regions(result: Sweep, folder: Path) -> None:
-    paths = [axis.path for axis in result.axes]
-    with (folder / "regions.csv").open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        ends = [f"{path} {end}" for path in paths for end in ("min", "max")]
-        writer.writerow(["level", "cells", "area_fraction", *ends])
-        for level, region in result.regions.items():
-            bounds = [value for path in paths for value in region.bounds.get(path, ("", ""))]
-            writer.writerow([level, region.cells, region.area_fraction, *bounds])
 
 
 def write_loop_table(result: LoopMap, folder: Path) -> None:
@@ -87,7 +24,7 @@ def write_loop_table(result: LoopMap, folder: Path) -> None:
     folder : Path
         Where to.
     """
-    columns = {name: _texts(values) for name, values in result.values.items()}
+    columns = {name: texts(values) for name, values in result.values.items()}
     write_columns(folder / "loop-map.csv", over_axes(result.axes) | columns)
 
 

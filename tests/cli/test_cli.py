@@ -40,9 +40,10 @@ def _threads_given_back():
 @pytest.fixture
 def _pictures(_own_folder, monkeypatch):
     """Coarse pictures are rendered after all."""
-    monkeypatch.setattr(
-        "drillctl.cli.running.draw", lambda figure, path: figure.savefig(path, dpi=30)
-    )
+    for place in ("running", "verb"):
+        monkeypatch.setattr(
+            f"drillctl.cli.{place}.draw", lambda figure, path: figure.savefig(path, dpi=30)
+        )
 
 
 def refuse(constant):

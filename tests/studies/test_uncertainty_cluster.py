@@ -101,7 +101,7 @@ def test_the_command_takes_a_scheduler(client, tmp_path, monkeypatch, capsys):
     from drillctl.cli import run
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("drillctl.cli.running.draw", lambda figure, path: path.touch())
+    monkeypatch.setattr("drillctl.cli.verb.draw", lambda figure, path: path.touch())
     options = ["--set", "simulation.duration=20 s", "--realizations", "8", "--audit", "0",
                "--axis", "controller.kp=500:700:3",
                "--axis", "controller.ki=100:150:2"]  # fmt: skip

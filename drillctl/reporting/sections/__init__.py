@@ -7,9 +7,9 @@ reason where it does not apply.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from drillctl.reporting.blocks import Block, Figure, Table, Text
+from drillctl.reporting.blocks import Block, Text, block, figure
 from drillctl.reporting.gather import Gathered
 from drillctl.reporting.sections import (
     advantage,
@@ -26,11 +26,7 @@ from drillctl.reporting.sections import (
     tuning,
     uncertainty,
 )
-from drillctl.store.tables import Table as Results
-from drillctl.studies.base import Picture, Study, studies
-
-if TYPE_CHECKING:
-    from drillctl import units
+from drillctl.studies.base import Study, studies
 
 
 class Kind(NamedTuple):
@@ -61,9 +57,7 @@ KINDS = (
           "step-4"), audit.build),
     Kind("glossary", "Glossary", (), rig.build_glossary),
 )  # fmt: skip
-"""Every section, in the order in which they are read."""
-
-
+"""Every section that is not of a study object, in the order in which they are read."""
 _ORDER = {
     "summary": 0, "rig": 10, "operating-point": 20, "modes": 30, "loop": 40, "map": 50,
     "responses": 60, "uncertainty": 70, "sensitivity": 80, "tuning": 90, "comparison": 100,
@@ -82,21 +76,6 @@ def _generic(name: str, study: Study) -> Callable[[Gathered], tuple[Block, ...]]
         return tuple(blocks)
 
     return build
-
-
-def figure(picture: Picture, name: str, system: units.System) -> Figure:
-    """A picture of a study as a block of a report."""
-    return Figure(
-        picture.name, picture.caption, picture.alt, lambda: picture.draw(system), (name,),
-        picture.paper,
-    )  # fmt: skip
-
-
-def block(table: Results, system: units.System) -> Table:
-    """A table of a study as a block of a report."""
-    heads, rows = tuple(table.heads(system)), tuple(map(tuple, table.texts(system)))
-    caption = table.title[0].upper() + table.title[1:]
-    return Table(table.name, caption, heads, rows)
 
 
 def _sections() -> dict[str, Kind]:

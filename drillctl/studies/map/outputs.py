@@ -1,12 +1,16 @@
-"""Time responses at cells of a map, from its best on: what the values of J1 look like."""
+"""Time responses at cells of a map, and every cell as CSV."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
-from drillctl.ensemble.grid import cell_design
+from drillctl.ensemble.grid import cell_design, over_axes
 from drillctl.ensemble.sweeps import Sweep
 from drillctl.simulation import Simulation, simulate
+from drillctl.simulation.measures import STATUSES
+from drillctl.store.tables import texts, write_columns
 
 
 def responses(result: Sweep, count: int = 4) -> list[Simulation]:
@@ -34,3 +38,18 @@ def responses(result: Sweep, count: int = 4) -> list[Simulation]:
     cells = dict.fromkeys(int(np.nanargmin(np.abs(flat - target))) for target in targets)
     designs = [cell_design(result.design, result.axes, cell) for cell in cells]
     return [simulate(design, engine="batch", interval=0.05) for design in designs]
+
+
+def write_cells(result: Sweep, path: Path) -> None:
+    """Write a row a cell: parameters, measures (SI) and status.
+
+    Parameters
+    ----------
+    result : Sweep
+        The map.
+    path : Path
+        Where to.
+    """
+    columns = over_axes(result.axes) | {name: texts(v) for name, v in result.measures.items()}
+    columns["status"] = np.array(STATUSES, dtype=object)[result.status.ravel()].tolist()
+    write_columns(path, columns)

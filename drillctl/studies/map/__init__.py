@@ -1,0 +1,144 @@
+"""J1 over parameters of a design: its map, regions and audit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drillctl.errors import InputError
+from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Study
+
+if TYPE_CHECKING:
+    from drillctl import units
+    from drillctl.design import Design
+    from drillctl.ensemble.sweeps import Sweep
+    from drillctl.store.tables import Table
+
+
+def computed(design: Design, run: Run) -> Sweep:
+    """The map, from the blocks that its folder may hold."""
+    from drillctl.ensemble.storing import Folder
+    from drillctl.ensemble.sweeps import kept_measures, sweep
+
+    try:
+        kept = kept_measures(run.options["measure"] or None)
+    except InputError as error:
+        raise InputError(error.problem, "--measure") from None
+    store = None if run.folder is None else Folder(run.folder)
+    return sweep(design, progress=run.progress, store=store, measures=kept)
+
+
+def tables(result: Sweep) -> Iterator[Table]:
+    """Bounds of the regions."""
+    from drillctl.store.tables import Column, Table
+
+    columns = [
+        Column("level", "J1 at or under", "s"), Column("cells"),
+        Column("area_fraction", "share of the map", percent=True),
+    ]  # fmt: skip
+    for axis in result.axes:
+        columns.append(Column(f"{axis.path} min", f"{axis.path} from", axis.unit))
+        columns.append(Column(f"{axis.path} max", "to", axis.unit))
+    rows: list[list[Any]] = []
+    for level, region in result.regions.items():
+        ends = [end for axis in result.axes for end in region.bounds.get(axis.path, (None, None))]
+        rows.append([level, region.cells, region.area_fraction, *ends])
+    title = "regions of the map, bounds between the centres of their outermost cells"
+    yield Table("regions", title, tuple(columns), rows)
+
+
+def pictures(result: Sweep) -> Iterator[Picture]:
+    """The map, and responses at some of its cells."""
+    from drillctl import plots
+
+    axes, minimum = result.axes, result.minimum
+    if len(axes) > 2:
+        return
+    draw = plots.stability_map if len(axes) == 2 else plots.sweep_line
+    told = f"Map of J1 over {' and '.join(axis.path for axis in axes)}."
+    if minimum is not None:
+        told += f" Least J1 {minimum[0]:.4g} s."
+    for level, region in result.regions.items():
+        told += f" {region.cells} cells at or under {level:g} s."
+    yield Picture(
+        "map", "J1 over the map with its regions, its minimum and the audited cells.", told,
+        lambda system: draw(result, system=system), paper=len(axes) == 2,
+    )  # fmt: skip
+    if len(axes) == 2:
+        yield Picture(
+            "responses", "Speeds of bit and top drive at cells of growing J1.",
+            "Time responses at the best cell and at cells of growing J1.",
+            lambda system: _responses(result),
+        )  # fmt: skip
+
+
+def _responses(result: Sweep) -> Any:
+    from drillctl import plots
+    from drillctl.studies.map.outputs import responses
+
+    return plots.time_response(responses(result), paths=[axis.path for axis in result.axes])
+
+
+def remarks(result: Sweep, system: units.System) -> Iterator[str]:
+    """Minimum, audit and time."""
+    from drillctl.store.tables import quantity
+
+    if result.minimum is not None:
+        value, at = result.minimum
+        units_of = {axis.path: axis.unit for axis in result.axes}
+        place = ", ".join(f"{path} {quantity(x, units_of[path], system)}" for path, x in at.items())
+        yield f"minimum J1 {value:.3f} s at {place}"
+    yield result.audit.sentence("cells")
+    yield (
+        f"{result.j1.size} cells: {result.seconds:.3f} s in the lanes, "
+        f"{result.total_seconds:.1f} s in all"
+    )
+
+
+def notes(result: Sweep) -> Iterator[str]:
+    """What deserves attention."""
+    if result.minimum is None:
+        yield "warning: no cell gives a finite answer; see the statuses"
+    if result.audit.verdict == "check":
+        yield "audit: check: the engines differ by more than 1 % in J1 in some cell"
+
+
+def files(result: Sweep, folder: Path) -> None:
+    """Every cell with its measures."""
+    from drillctl.studies.map.outputs import write_cells
+
+    write_cells(result, folder / "map.csv")
+
+
+def not_applicable(request: Requested) -> str:
+    """Why a report has no map."""
+    from drillctl.studies.applies import fitting_map, in_batch
+
+    return in_batch(request) or fitting_map(request)
+
+
+STUDY = Study(
+    name="map",
+    help="Map J1 over parameters, with regions and an audit",
+    group="Simulate",
+    compute=computed,
+    options=(
+        Option(
+            "audit", int, "Cells to audit with the reference solver", sets="map.audit_cells"
+        ),
+        Option(
+            "measure", list[str], "Keep only J1 and this measure; repeatable", metavar="NAME"
+        ),
+    ),
+    axes=True,
+    python="stability_map",
+    call="drillctl.ensemble.sweeps:stability_map",
+    resumes=True,
+    tables=tables,
+    pictures=pictures,
+    remarks=remarks,
+    notes=notes,
+    files=files,
+    recipes=(Recipe("map", "the J1 map", not_applicable, order=40),),
+)  # fmt: skip
