@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from drillctl.studies.regularisation.compute import regularisation as regularisation
     from drillctl.studies.robust import tune as tune
     from drillctl.studies.three_regions.compute import three_regions as three_regions
-    from drillctl.studies.uncertainty import uncertainty as uncertainty
+    from drillctl.studies.uncertainty.compute import uncertainty as uncertainty
 
 _HOME = {
     "Design": "drillctl.design",
@@ -61,7 +61,6 @@ _HOME = {
     "sweep": "drillctl.studies",
     "advantage": "drillctl.studies.advantage",
     "compare": "drillctl.studies.compare.compute",
-    "uncertainty": "drillctl.studies.uncertainty",
     "tune": "drillctl.studies.robust",
     "open": "drillctl.store",
     "report": "drillctl.reporting.making",

@@ -37,6 +37,7 @@ WEIGHT_LAWS = (
 STUDIES: tuple[str, ...] = (
     "drillctl.studies.simulate",
     "drillctl.studies.map",
+    "drillctl.studies.uncertainty",
     "drillctl.studies.three_regions",
     "drillctl.studies.regularisation",
     "drillctl.studies.doctor",

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 import drillctl
-from drillctl.studies.uncertainty import uncertainty
+from drillctl.studies.uncertainty.compute import uncertainty
 
 HOLDS = (
     (

@@ -14,7 +14,6 @@ from drillctl.cli import (
     linear,
     reports,
     tuning,
-    uncertain,
 )
 from drillctl.cli.app import app, run
 from drillctl.cli.verb import command
@@ -32,7 +31,6 @@ VERBS: dict[str, tuple[Callable[..., None], Group]] = {
     "compare": (comparisons.compare, "Decide"),
     "delay": (comparisons.delay, "Decide"),
     "advantage": (advantage.advantage, "Decide"),
-    "uncertainty": (uncertain.uncertainty, "Decide"),
     "tune": (tuning.tune, "Decide"),
     "report": (reports.report, "Hand over"),
 }

@@ -77,6 +77,11 @@ class Audit:
         }
 
 
+def unaudited(of: str = "cell") -> Audit:
+    """No cells."""
+    return Audit(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0), of)
+
+
 def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> NDArray[np.int64]:
     """Cells to audit: a seeded random sample, spread over the levels."""
     flat = np.nan_to_num(values.ravel(), nan=np.inf)

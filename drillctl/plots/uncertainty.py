@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from drillctl import units
+from drillctl.ensemble.probability import INNER, MEDIAN, OUTER, needed
 from drillctl.errors import InputError
 from drillctl.plots.style import (
     BLACK,
@@ -33,7 +34,6 @@ from drillctl.plots.style import (
     grid_or_new,
     title_of,
 )
-from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER, needed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -5,7 +5,6 @@ from drillctl.printing.comparison import comparison
 from drillctl.printing.linear import loop, modes
 from drillctl.printing.runs import cycle
 from drillctl.printing.tuning import tune
-from drillctl.printing.uncertainty import uncertainty
 from drillctl.printing.weight_delay import weight_delay
 
 __all__ = [
@@ -15,6 +14,5 @@ __all__ = [
     "loop",
     "modes",
     "tune",
-    "uncertainty",
     "weight_delay",
 ]

@@ -145,24 +145,8 @@ def _cells(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return cells.traced(design, folder.path, progress)
 
 
-def _uncertain(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    from drillctl import studies
-    from drillctl.ensemble.storing import Folder
-
-    return studies.uncertainty(design, progress=progress, store=Folder(folder.path))
-
-
-def _under_uncertainty(asked: Requested) -> Design:
-    """The design with as many audited lanes as the profile spends."""
-    if asked.profile.drawn_audit is None:
-        return asked.design
-    return asked.design.replace({"map.audit_cells": asked.profile.drawn_audit})
-
-
 def _setting(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    from drillctl import studies
-
-    return studies.uncertainty(design, axes=(), audit_cells=0, progress=progress)
+    return drillctl.uncertainty(design, axes=(), audit_cells=0, progress=progress)
 
 
 def _told_of_setting(result: Any) -> dict[str, Any]:
@@ -252,8 +236,6 @@ ALL = (
     Recipe("cells", "the responses over the map", "report-cells", _cells, fitting_map,
            needs=("map",), write=False, told=dict),
     Recipe("slope-margin", "the slope margin over the map", "loop-map", _loop_map, over_two_axes),
-    Recipe("uncertainty", "the map under uncertainty", "uncertainty", _uncertain,
-           _both(in_batch, fitting_map), _under_uncertainty, growing=True),
     Recipe("compare", "the comparison", "compare", _compared, _both(_no_cases, in_batch)),
     Recipe("tune", "the tuning of the gains", "tune", _by_name("tune"),
            _both(_not_tuned, in_batch)),
@@ -263,7 +245,7 @@ ALL = (
 """Every study that is no object yet, in the order in which they are done."""
 _ORDER = {
     "modes": 0, "loop": 10, "setting": 30, "cells": 50, "slope-margin": 80,
-    "uncertainty": 90, "compare": 100, "tune": 110, "advantage": 120,
+    "compare": 100, "tune": 110, "advantage": 120,
 }  # fmt: skip
 
 

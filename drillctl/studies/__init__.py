@@ -29,11 +29,7 @@ if TYPE_CHECKING:
     from drillctl.studies.tables import write_comparison as write_comparison
     from drillctl.studies.tables import write_loop_table as write_loop_table
     from drillctl.studies.tables import write_weight_delay as write_weight_delay
-    from drillctl.studies.uncertainty import Uncertainty as Uncertainty
-    from drillctl.studies.uncertainty import uncertainty as uncertainty
-    from drillctl.studies.uncertainty.tables import (
-        write_uncertainty_tables as write_uncertainty_tables,
-    )
+    from drillctl.studies.uncertainty.result import Uncertainty as Uncertainty
 
 _HOME = {
     "Axis": "drillctl.ensemble.grid",
@@ -43,7 +39,7 @@ _HOME = {
     "LoopMap": "drillctl.studies.loop_maps",
     "Region": "drillctl.ensemble.regions",
     "Sweep": "drillctl.ensemble.sweeps",
-    "Uncertainty": "drillctl.studies.uncertainty",
+    "Uncertainty": "drillctl.studies.uncertainty.result",
     "WeightDelay": "drillctl.studies.delay.compute",
     "doctor": "drillctl.studies.doctor.compute",
     "draw": "drillctl.ensemble.parameters",
@@ -53,11 +49,9 @@ _HOME = {
     "stability_map": "drillctl.ensemble.sweeps",
     "sweep": "drillctl.ensemble.sweeps",
     "uncertain_parameters": "drillctl.ensemble.parameters",
-    "uncertainty": "drillctl.studies.uncertainty",
     "weight_delay": "drillctl.studies.delay.compute",
     "write_comparison": "drillctl.studies.tables",
     "write_loop_table": "drillctl.studies.tables",
-    "write_uncertainty_tables": "drillctl.studies.uncertainty.tables",
     "write_weight_delay": "drillctl.studies.tables",
 }
 

@@ -11,18 +11,6 @@ def refuse_what_studies_would(design: Design) -> None:
 
     What a check needs is imported only if the design has its table.
     """
-    if "axes" in design.tree.get("map", {}):
-        from drillctl.ensemble.grid import axes_of
-
-        axes_of(design, design.tables.map.axes)
-    if design.tables.uncertain:
-        from drillctl.ensemble.parameters import uncertain_parameters
-
-        uncertain_parameters(design)
-    if "uncertainty" in design.tree:
-        from drillctl.studies.uncertainty.study import map_axes, refuse_impossible
-
-        refuse_impossible(design, map_axes(design))
     if design.tables.compare.cases:
         from drillctl.studies.compare.cases import case_designs, refuse_unequal
 

@@ -12,7 +12,7 @@ from drillctl import plots
 from drillctl.errors import InputError
 from drillctl.plots.uncertainty import border
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.uncertainty import uncertainty
+from drillctl.studies.uncertainty.compute import uncertainty
 
 GAINS = [
     {"path": "controller.kp", "min": 400.0, "max": 800.0, "points": 5},

@@ -7,17 +7,27 @@ import pytest
 from scipy import stats
 
 from drillctl.design.uncertain_tables import UntilTable
+from drillctl.ensemble import probability as area_module
 from drillctl.ensemble.cases import share_interval, share_intervals
+from drillctl.ensemble.probability import (
+    INNER,
+    OUTER,
+    Scatter,
+    needed,
+    probability_map,
+    region_areas,
+)
 from drillctl.errors import InputError
-from drillctl.studies.uncertainty import areas as area_module
-from drillctl.studies.uncertainty.areas import region_areas
-from drillctl.studies.uncertainty.best import best_cells, quantile_interval
+from drillctl.studies.uncertainty.best import (
+    Exceedance,
+    Mean,
+    Quantile,
+    TailMean,
+    best_cells,
+    quantile_interval,
+)
 from drillctl.studies.uncertainty.best import values_of as values_of_all
-from drillctl.studies.uncertainty.convergence import convergence
-from drillctl.studies.uncertainty.objectives import Exceedance, Mean, Quantile, TailMean
-from drillctl.studies.uncertainty.probability import INNER, OUTER, needed, probability_map
-from drillctl.studies.uncertainty.scatter import Scatter
-from drillctl.studies.uncertainty.stopping import level_of, look, schedule
+from drillctl.studies.uncertainty.convergence import convergence, level_of, look, schedule
 
 HOLDS = (
     (

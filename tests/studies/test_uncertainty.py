@@ -19,7 +19,7 @@ from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.uncertainty import uncertainty
+from drillctl.studies.uncertainty.compute import uncertainty
 
 HOLDS = (
     (

@@ -16,7 +16,7 @@ from drillctl.ensemble.grid import axes_of
 from drillctl.ensemble.realizations import Drawn, Realizations
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError, SimulationError
-from drillctl.studies.uncertainty import uncertainty
+from drillctl.studies.uncertainty.compute import uncertainty
 
 HOLDS = (
     (

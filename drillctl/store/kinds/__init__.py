@@ -7,7 +7,6 @@ from drillctl.store.kinds import (
     maps,
     runs,
     tuning,
-    uncertainty,
 )
 
 KINDS = (
@@ -16,7 +15,6 @@ KINDS = (
     *maps.KINDS,
     *comparisons.KINDS,
     *advantage.KINDS,
-    *uncertainty.KINDS,
     *tuning.KINDS,
 )
 """Every kind that is written and read back."""

@@ -14,15 +14,13 @@ from drillctl import units
 from drillctl.design import Design
 from drillctl.ensemble.draws import CommonDraws
 from drillctl.ensemble.grid import Axis
+from drillctl.ensemble.probability import INNER, OUTER, Area, Scatter, probability_map, region_areas
 from drillctl.ensemble.sweeps import sweep
 from drillctl.progress import Progress
 from drillctl.studies.advantage.cases import Measured, Optima, measured, optimum_beside
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import GAIN, SPEED, WEIGHT, Policies, Policy
 from drillctl.studies.robust.runs import GainRuns
-from drillctl.studies.uncertainty.areas import Area, region_areas
-from drillctl.studies.uncertainty.probability import INNER, OUTER, probability_map
-from drillctl.studies.uncertainty.scatter import Scatter
 
 Array = NDArray[np.float64]
 

@@ -111,6 +111,14 @@ def files(result: Sweep, folder: Path) -> None:
     write_cells(result, folder / "map.csv")
 
 
+def check(design: Design) -> None:
+    """Refuse (`InputError`) axes that do not fit the design; defaults need not fit every law."""
+    if "axes" in design.tree.get("map", {}):
+        from drillctl.ensemble.grid import axes_of
+
+        axes_of(design, design.tables.map.axes)
+
+
 def not_applicable(request: Requested) -> str:
     """Why a report has no map."""
     from drillctl.studies.applies import fitting_map, in_batch
@@ -140,5 +148,6 @@ STUDY = Study(
     remarks=remarks,
     notes=notes,
     files=files,
+    check=check,
     recipes=(Recipe("map", "the J1 map", not_applicable, order=40),),
 )  # fmt: skip

@@ -1,16 +1,297 @@
 """Stability regions under uncertainty: a map at thousands of realizations.
 
-- `study.py`: `uncertainty`, from design to result.
-- `result.py`: `Uncertainty`; `labels.py`: the same as dataset and summary.
-- `probability.py`: probability cell by cell; `areas.py`: of regions; `scatter.py`: what tells
-  the sampling error.
-- `objectives.py`, `best.py`: best cells, and those that cannot be told apart from them.
-- `convergence.py`, `stopping.py`: how many realizations are enough.
-- `sensitivity.py`: Sobol indices.
+- `compute.py`: from design to result; `result.py`: `Uncertainty`; `outputs.py`: what is written.
+- `best.py`: best cells by several objectives, and those that are no worse beyond doubt.
+- `convergence.py`: how many realizations are enough; `sensitivity.py`: Sobol indices.
 """
 
-from drillctl.studies.uncertainty.probability import ProbabilityMap
-from drillctl.studies.uncertainty.result import Uncertainty
-from drillctl.studies.uncertainty.study import uncertainty
+from __future__ import annotations
 
-__all__ = ["ProbabilityMap", "Uncertainty", "uncertainty"]
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from drillctl.errors import InputError
+from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Study
+
+if TYPE_CHECKING:
+    from drillctl import units
+    from drillctl.design import Design
+    from drillctl.store.folder import Growing
+    from drillctl.store.tables import Table
+    from drillctl.studies.uncertainty.result import Uncertainty
+
+
+def computed(design: Design, run: Run) -> Uncertainty:
+    """The regions, from the blocks that the folder may hold, here or on a cluster."""
+    from drillctl.ensemble.cluster import Cluster, connect
+    from drillctl.ensemble.storing import Folder
+    from drillctl.studies.uncertainty.compute import uncertainty
+    from drillctl.studies.uncertainty.outputs import Interim
+
+    given: dict[str, Any] = {"progress": run.progress}
+    interim = None
+    if run.folder is not None:
+        interim = run.folder / "interim.png"
+        given["store"] = Folder(run.folder)
+        if run.options["interim"] is not None:
+            given["interim"] = Interim(run.options["interim"], interim, run.system)
+    if run.options["scheduler"] is None:
+        result = uncertainty(design, **given)
+    else:
+        with connect(run.options["scheduler"]) as client:
+            workers = Cluster(client, run.options["allow_mixed"])
+            result = uncertainty(design, workers=workers, **given)
+    if interim is not None:
+        interim.unlink(missing_ok=True)
+    return result
+
+
+def growing(design: Design) -> Growing | None:
+    """The number of realizations, to which more can be added."""
+    from drillctl.store.differences import growing_realizations
+
+    return growing_realizations(design)
+
+
+def tables(result: Uncertainty) -> Iterator[Table]:
+    """Areas of the regions, best cells, Sobol indices, and how areas settle."""
+    from drillctl.store.tables import Column, Estimate, Table
+
+    yield _areas("areas", "share of the map by probability (95 % interval)", result)
+    for number, (value, one) in enumerate(result.slices().items(), start=1):
+        title = f"the same at {result.axes[2].path} = {value:g} {result.axes[2].unit}".rstrip()
+        yield _areas(f"areas-{number}", title, one)
+    yield _best(result)
+    if result.sensitivity is not None:
+        yield indices(result)
+    columns = (
+        Column("level", "J1 at or under", "s"), Column("realizations"),
+        Column("area_p95", "P >= 95 %", percent=True, interval=True),
+    )  # fmt: skip
+    rows = [
+        [level, count, Estimate(*area)]
+        for level, areas in result.convergence.areas.items()
+        for count, area in zip(result.convergence.counts, areas, strict=True)
+    ]
+    title = "areas of the inner regions against the number of draws"
+    yield Table("convergence", title, columns, rows, shown=False)
+
+
+def _areas(name: str, title: str, result: Uncertainty) -> Table:
+    from drillctl.store.tables import Column, Estimate, Table
+
+    columns = (
+        Column("level", "J1 at or under", "s"),
+        Column("nominal", "nothing uncertain", percent=True, digits=3),
+        *(
+            Column(f"area_{key}", f"P ≥ {share} %", percent=True, digits=3, interval=True)
+            for key, share in (("p95", 95), ("p50", 50), ("p05", 5))
+        ),
+    )
+    rows = [
+        [
+            level, result.nominal_regions[level].area_fraction,
+            *(Estimate(*area) for area in result.areas[level].values()),
+        ]
+        for level in result.levels
+    ]  # fmt: skip
+    return Table(name, title, columns, rows)
+
+
+def _best(result: Uncertainty) -> Table:
+    from drillctl.store.tables import Column, Estimate, Table
+
+    columns = (
+        Column("objective", "best by"), Column("value", interval=True),
+        *(Column(axis.path, unit=axis.unit) for axis in result.axes),
+        Column("alike_cells", "equally good cells"),
+    )  # fmt: skip
+    rows: list[list[Any]] = []
+    for name in result.objectives:
+        try:
+            found = result.best(name)
+        except InputError as error:
+            rows.append([f"{name}: {error.problem}", *[None] * (len(columns) - 1)])
+            continue
+        alike = None if found.alike is None else int(found.alike.sum())
+        known = None if found.interval == (None, None) else found.interval
+        at = result.at(found.cell).values()
+        rows.append([name, Estimate(found.value, known), *at, alike])
+    return Table("best", "best cells over the draws (J1 in s, 95 % interval)", columns, rows)
+
+
+def indices(result: Uncertainty) -> Table:
+    """Sobol indices of each uncertain parameter."""
+    from drillctl.store.tables import Column, Table
+
+    found = result.sensitivity
+    assert found is not None
+    columns = (
+        Column("of"), Column("parameter"),
+        Column("first", "first index", digits=3), Column("first_error_95", "±", digits=2),
+        Column("total", "total index", digits=3), Column("total_error_95", "±", digits=2),
+    )  # fmt: skip
+    rows = [
+        [
+            one.of, path,
+            *(float(x[k]) for x in (one.first, one.first_error, one.total, one.total_error)),
+        ]
+        for one in found.indices
+        for k, path in enumerate(found.parameters)
+    ]  # fmt: skip
+    title = f"Sobol indices from {found.samples} points (95 % interval)"
+    return Table("sensitivity", title, columns, rows)
+
+
+def pictures(result: Uncertainty) -> Iterator[Picture]:
+    """Regions by probability, their sampling error, convergence, distributions, indices."""
+    from drillctl import plots
+
+    flat = {"": result} if len(result.axes) == 2 else {}
+    flat |= {f"-{k}": one for k, one in enumerate(result.slices().values(), start=1)}
+    for ending, one in flat.items():
+        yield from _maps(one, ending)
+    yield Picture(
+        "convergence", "Areas of the inner regions against the number of draws.",
+        "Curves of the area against the number of draws, with their intervals narrowing.",
+        lambda system: plots.area_convergence(result),
+    )  # fmt: skip
+    yield Picture(
+        "distributions", "J1 over the draws at the best cells.",
+        "Distribution functions of J1 at the cells that are best by mean and by quantile.",
+        lambda system: plots.cell_distributions(result, system=system),
+    )  # fmt: skip
+    if result.sensitivity is not None:
+        yield Picture(
+            "sensitivity", "First and total Sobol indices with their intervals.",
+            "Bars of first and total index for each uncertain parameter.",
+            lambda system: plots.sensitivity_bars(result),
+        )  # fmt: skip
+
+
+def _maps(result: Uncertainty, ending: str) -> Iterator[Picture]:
+    from drillctl import plots
+
+    areas = "; ".join(f"under {x:g} s {next(iter(a.values())).value:.1%}"
+                      for x, a in result.areas.items())  # fmt: skip
+    yield Picture(
+        f"regions{ending}", "Regions by probability: kept in 95 %, 50 % and 5 % of the draws.",
+        f"Bands of the regions over the map. Share kept with 95 %: {areas}.",
+        lambda system: plots.uncertain_regions(result, system=system), paper=True,
+    )  # fmt: skip
+    yield Picture(
+        f"probability{ending}", "Probability that J1 keeps to each level.",
+        "Maps of the probability at each level, with contours.",
+        lambda system: plots.probability_map(result, system=system), paper=True,
+    )  # fmt: skip
+    yield Picture(
+        f"sampling-error{ending}", "Inner regions with their sampling error.",
+        "Cells that are in the inner region, and those that may be, with all intervals at once.",
+        lambda system: plots.region_error(result, system=system), paper=True,
+    )  # fmt: skip
+
+
+def remarks(result: Uncertainty, system: units.System) -> Iterator[str]:
+    """Looks, failures, stopped lanes, audit, draws and time."""
+    for seen in result.looks:
+        low, high = seen.interval
+        yield (
+            f"look at {seen.realizations} realizations: area {seen.area:.2%} ({low:.2%} to "
+            f"{high:.2%}, {seen.confidence:.2%} interval)"
+        )
+    for failure in result.failures:
+        yield (
+            f"{failure.count} of {result.realizations} draws failed; {failure.reason}: "
+            f"{failure.example}"
+        )
+    if result.censored.any():
+        yield (
+            f"{result.censored.mean():.1%} of the lanes were stopped once J1 had passed "
+            f"{result.levels[-1]:g} s: they are outside every region, their J1 is a lower bound"
+        )
+    yield result.audit.sentence("lanes")
+    method = result.design.tables.uncertainty.sampling
+    yield f"{result.realizations} draws ({method}, seed {result.seed}): {', '.join(result.drawn)}"
+    yield (
+        f"{result.trajectories:,} lanes: {result.seconds:.1f} s in blocks, "
+        f"{result.total_seconds:.1f} s in all"
+    )
+
+
+def notes(result: Uncertainty) -> Iterator[str]:
+    """What deserves attention."""
+    if result.audit.verdict == "check":
+        yield "audit: check: the engines differ by more than 1 % in J1 in some lane"
+
+
+def files(result: Uncertainty, folder: Path) -> None:
+    """Cells, draws and contours."""
+    from drillctl.studies.uncertainty.outputs import write_columns_of
+
+    write_columns_of(result, folder)
+
+
+def not_applicable(request: Requested) -> str:
+    """Why a report has no map under uncertainty."""
+    from drillctl.studies.applies import fitting_map, in_batch
+
+    return in_batch(request) or fitting_map(request)
+
+
+def audited_as_profile(request: Requested) -> Design:
+    """The design with as many audited lanes as the profile of a report spends."""
+    count = request.profile.drawn_audit
+    return request.design if count is None else request.design.replace({"map.audit_cells": count})
+
+
+def check(design: Design) -> None:
+    """Refuse (`InputError`) what a run would refuse."""
+    if design.tables.uncertain:
+        from drillctl.ensemble.parameters import uncertain_parameters
+
+        uncertain_parameters(design)
+    if "uncertainty" in design.tree:
+        from drillctl.studies.uncertainty.compute import refuse_impossible
+        from drillctl.studies.uncertainty.result import map_axes
+
+        refuse_impossible(design, map_axes(design))
+
+
+STUDY = Study(
+    name="uncertainty",
+    help="Map J1 over draws: regions by probability, best cells",
+    group="Decide",
+    compute=computed,
+    options=(
+        Option("realizations", int, "Number of draws; more than before extends a run",
+               sets="uncertainty.realizations"),
+        Option("seed", int, "Seed of the draws", sets="uncertainty.seed"),
+        Option("sampling", Literal["monte-carlo", "sobol", "latin-hypercube"],
+               "Method of sampling", sets="uncertainty.sampling"),
+        Option("full", bool, "Run every lane to its end, for means and quantiles",
+               sets="uncertainty.full"),
+        Option("sensitivity", int, "Sobol indices from so many points",
+               sets="uncertainty.sensitivity.samples"),
+        Option("audit", int, "Lanes to audit with the reference solver", sets="map.audit_cells"),
+        Option("resume", bool, "Resume the run in --out; fail if there is none", False, how=True),
+        Option("allow_mixed", bool, "Accept processors of several types", False, how=True),
+        Option("scheduler", str, "Address of a dask.distributed scheduler", how=True),
+        Option("interim", float, "Seconds between interim pictures", how=True, least=0.0),
+    ),
+    axes=True,
+    python="uncertainty",
+    call="drillctl.studies.uncertainty.compute:uncertainty",
+    resumes=True,
+    tables=tables,
+    pictures=pictures,
+    remarks=remarks,
+    notes=notes,
+    files=files,
+    growing=growing,
+    check=check,
+    recipes=(
+        Recipe("uncertainty", "the map under uncertainty", not_applicable, audited_as_profile,
+               order=90),
+    ),
+)  # fmt: skip

@@ -1,4 +1,11 @@
-"""How areas settle as realizations are added."""
+"""How areas settle as realizations are added.
+
+When enough realizations were run: a fixed schedule of looks, intervals corrected for it.
+
+Looking at the data again and again until an interval happens to be narrow makes it hold less
+often than it says. The looks are therefore fixed before the first lane is run, and the interval
+of each has its share of the error that all may make together (Bonferroni).
+"""
 
 from __future__ import annotations
 
@@ -7,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.studies.uncertainty.areas import Area, region_areas
-from drillctl.studies.uncertainty.probability import INNER, probability_map
-from drillctl.studies.uncertainty.scatter import Scatter
+from drillctl.design.uncertain_tables import UntilTable
+from drillctl.ensemble.cases import CONFIDENCE, Interval
+from drillctl.ensemble.probability import INNER, Area, Scatter, probability_map, region_areas
+from drillctl.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -40,3 +48,48 @@ def convergence(j1: Array, levels: tuple[float, ...], scatter: Scatter, seed: in
         tuple(counts),
         {level: tuple(row[k] for row in rows) for k, level in enumerate(levels)},
     )
+
+
+class Look(NamedTuple):
+    """The area as it was known at a number of realizations."""
+
+    realizations: int  # how many had been run
+    area: float  # share of the map
+    interval: Interval  # corrected for the number of looks
+    confidence: float  # of this interval by itself
+
+    def enough(self, half_width: float) -> bool:
+        """Whether the area is known to within a half-width on either side."""
+        low, high = self.interval
+        return max(self.area - low, high - self.area) <= half_width
+
+
+def schedule(first: int, most: int) -> tuple[int, ...]:
+    """Numbers of realizations at which the area is looked at: doubling, up to the most."""
+    looks = []
+    while first < most:
+        looks.append(first)
+        first *= 2
+    return (*looks, most)
+
+
+def level_of(table: UntilTable, levels: tuple[float, ...]) -> float:
+    """The level whose region is to be known: that of the table, or the highest of the map."""
+    if table.level is None:
+        return levels[-1]
+    if table.level not in levels:
+        allowed = ", ".join(f"{level:g}" for level in levels)
+        raise InputError(
+            f"{table.level:g} is no level of the map; allowed: {allowed}", "uncertainty.until.level"
+        )
+    return table.level
+
+
+def look(
+    j1: Array, table: UntilTable, level: float, looks: int, scatter: Scatter, seed: int
+) -> Look:
+    """The area at one of the looks."""
+    confidence = 1.0 - (1.0 - CONFIDENCE) / looks
+    found = probability_map(j1, level, scatter)
+    (area,) = region_areas(j1, [(found, table.probability)], scatter, seed, confidence)
+    return Look(len(j1), area.value, area.interval, confidence)

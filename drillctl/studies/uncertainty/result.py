@@ -2,103 +2,92 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
-from drillctl.ensemble.audit import Audit
+from drillctl.ensemble.audit import Audit, unaudited
 from drillctl.ensemble.draws import Failures
-from drillctl.ensemble.grid import Axis
+from drillctl.ensemble.grid import Axis, axes_of, other_axes
+from drillctl.ensemble.probability import (
+    INNER,
+    MEDIAN,
+    OUTER,
+    Area,
+    ProbabilityMap,
+    Scatter,
+    probability_map,
+    region_areas,
+)
 from drillctl.ensemble.regions import Region, region
 from drillctl.ensemble.sampling import sampling_of
 from drillctl.errors import InputError
 from drillctl.provenance import provenance
-from drillctl.simulation.measures import STATUSES
-from drillctl.studies.uncertainty.areas import Area, region_areas
+from drillctl.simulation.measures import MEASURES, STATUSES
+from drillctl.store.differences import Growing, growing_realizations
+from drillctl.store.result import Result, label
 from drillctl.studies.uncertainty.best import (
     NEEDS_FULL,
     Best,
+    Mean,
+    Objective,
+    Quantile,
+    TailMean,
     Values,
     best_cells,
     objectives,
     values_of,
 )
-from drillctl.studies.uncertainty.convergence import Convergence, convergence
-from drillctl.studies.uncertainty.objectives import Mean, Objective, Quantile, TailMean
-from drillctl.studies.uncertainty.probability import (
-    INNER,
-    MEDIAN,
-    OUTER,
-    ProbabilityMap,
-    probability_map,
-)
-from drillctl.studies.uncertainty.scatter import Scatter
+from drillctl.studies.uncertainty.convergence import Convergence, Look, convergence
 from drillctl.studies.uncertainty.sensitivity import Sensitivity
-from drillctl.studies.uncertainty.stopping import Look
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import shapely
-    import xarray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
-    """J1 over a map at every realization of what is uncertain.
+class Uncertainty(Result):
+    """J1 over a map at every realization of what is uncertain."""
 
-    Attributes
-    ----------
-    design : Design
-        With what is uncertain, named or by default.
-    axes : tuple of Axis
-        Of the map.
-    levels : tuple of float
-        Levels of J1 (s).
-    drawn : dict of ndarray, shape (realizations,)
-        Values (SI) of what is uncertain, by path.
-    measures : dict of ndarray, shape (realizations, axes of the map)
-        `j1` and what else was kept; NaN where undefined.
-    status : ndarray of int8, shape (realizations, axes of the map)
-        Index into `simulation.measures.STATUSES`.
-    nominal : ndarray, shape of the map
-        J1 of the design itself (s).
-    audit : Audit
-        Lanes simulated again with the reference solver; cells of the flattened `status`.
-    failures : tuple of Failures
-        Realizations that no rig has, by reason.
-    looks : tuple of Look
-        At which it was decided whether to go on; empty without such a rule.
-    sensitivity : Sensitivity or None
-        Sobol indices, if they were asked for.
-    seconds, total_seconds : float
-        Spent in blocks, and from call to return (s); of a run that was taken up again since then.
-    provenance : dict of str
-        Versions and processor it came from.
-    """
+    kind: ClassVar[str] = "uncertainty"
 
-    design: Design
-    axes: tuple[Axis, ...]
-    levels: tuple[float, ...]
-    drawn: dict[str, Array]
-    measures: dict[str, Array]
-    status: NDArray[np.int8]
-    nominal: Array
-    audit: Audit
-    failures: tuple[Failures, ...]
-    looks: tuple[Look, ...]
-    sensitivity: Sensitivity | None
-    seconds: float
-    total_seconds: float
-    provenance: dict[str, str] = field(default_factory=provenance)
+    design: Design = label(means="with what is uncertain, named or by default")
+    axes: tuple[Axis, ...] = label(means="of the map")
+    levels: tuple[float, ...] = label(unit="s", means="levels of J1")
+    drawn: dict[str, Array] = label(
+        "realization", flat=True, means="values (SI) of what is uncertain, by path"
+    )
+    measures: dict[str, Array] = label(
+        "realization", "axes", unit=lambda name: MEASURES[name].unit, flat=True,
+        means=lambda name: MEASURES[name].meaning,
+    )  # fmt: skip
+    status: NDArray[np.int8] = label(
+        "realization", "axes", flags=STATUSES, means="how the run ended"
+    )
+    nominal: Array = label("axes", unit="s", name="nominal_j1", means="J1 of the design itself")
+    audit: Audit = label(
+        flat=True, means="lanes of the flattened `status` simulated again by the reference solver"
+    )
+    failures: tuple[Failures, ...] = label(means="realizations that no rig has, by reason")
+    looks: tuple[Look, ...] = label(
+        means="at which it was decided whether to go on; empty without such a rule"
+    )
+    sensitivity: Sensitivity | None = label(means="Sobol indices, if they were requested")
+    seconds: float = label(unit="s", means="in blocks, since the run was last resumed")
+    total_seconds: float = label(unit="s", means="from call to return, since then")
+    provenance: dict[str, str] = label(
+        means="versions and processor it came from", default_factory=provenance
+    )
 
     @property
     def j1(self) -> Array:
@@ -290,7 +279,7 @@ class Uncertainty:
                 measures={key: v[..., k] for key, v in self.measures.items()},
                 status=self.status[..., k],
                 nominal=self.nominal[..., k],
-                audit=Audit(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)),
+                audit=unaudited("lane"),
                 looks=(),
                 sensitivity=None,
             )
@@ -304,21 +293,41 @@ class Uncertainty:
     def _flat(self, values: NDArray[Any]) -> NDArray[Any]:
         return values.reshape(len(values), -1)
 
-    @property
-    def data(self) -> xarray.Dataset:
-        """Lanes, counts, probabilities and draws, labelled by parameter path."""
-        from drillctl.studies.uncertainty.labels import dataset
+    def derived(self) -> dict[str, Any]:
+        """Counts and probabilities by level, moments, and draws with their units."""
+        from drillctl.studies.uncertainty.outputs import derived
 
-        return dataset(self)
+        return derived(self)
 
     def summary(self) -> dict[str, Any]:
         """Levels with areas and intervals, best cells, failures, audit; SI units."""
-        from drillctl.studies.uncertainty.labels import summary
+        from drillctl.studies.uncertainty.outputs import summary
 
         return summary(self)
 
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """Axes and audited lanes that the design does not give."""
+        settings = other_axes(self, map_axes)
+        if len(self.audit.cells) != self.design.tables.map.audit_cells:
+            settings["audited"] = self.audit.cells.tolist()
+        return self.design, settings
 
-        return save(self, folder)
+    def growing(self) -> Growing | None:
+        """The number of realizations, to which more can be added."""
+        return growing_realizations(self.design)
+
+    def write(self, folder: Path) -> None:
+        """Write what the folder does not hold yet: its lanes were written block by block."""
+        from drillctl.studies.uncertainty.outputs import write
+
+        write(self, folder)
+
+
+def map_axes(design: Design) -> tuple[Axis, ...]:
+    """Axes of the map under uncertainty: those of `[map]`, then those of `[uncertainty]`."""
+    tables = (*design.tables.map.axes, *design.tables.uncertainty.axes)
+    paths = [table.path for table in tables]
+    for path in paths:
+        if paths.count(path) > 1:
+            raise InputError(f"two axes run over {path!r}", "uncertainty.axes")
+    return axes_of(design, tables)

@@ -20,6 +20,7 @@ from drillctl.ensemble.cases import CONFIDENCE
 from drillctl.ensemble.parameters import uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
+from drillctl.store.result import label
 from drillctl.studies.uncertainty.best import NEEDS_FULL
 
 Array = NDArray[np.float64]
@@ -36,14 +37,11 @@ class Indices:
 
     of: str  # what they explain
     unit: str  # of that figure
-    # shape (parameters,): Indices; NaN where the figure does not vary
-    first: Array
-    total: Array
-    # shape (parameters,): Half-widths of 95 % bootstrap intervals; NaN where points are too few
-    # to tell
-    first_error: Array
-    total_error: Array
-    variance: float  # of the figure, in its unit squared
+    first: Array = label("parameter", means="NaN where the figure does not vary")
+    total: Array = label("parameter", means="NaN where the figure does not vary")
+    first_error: Array = label("parameter", means="half-width of the 95 % bootstrap interval")
+    total_error: Array = label("parameter", means="the same; NaN with too few points to know")
+    variance: float = label(means="of the figure, in its unit squared")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +51,7 @@ class Sensitivity:
     parameters: tuple[str, ...]  # paths of what is uncertain
     samples: int  # points of Saltelli's design
     trajectories: int  # lanes simulated for it
-    indices: tuple[Indices, ...]  # one a figure
+    indices: tuple[Indices, ...] = label(over="figure", means="one a figure")
 
     def summary(self) -> dict[str, Any]:
         """Indices by figure and parameter."""
@@ -74,16 +72,6 @@ class Sensitivity:
 
 COLUMNS = ("first", "first_error", "total", "total_error")
 """Figures of `Indices` that there is one of a parameter."""
-
-
-def read_sensitivity(told: dict[str, Any]) -> Sensitivity:
-    """A `Sensitivity` from its summary."""
-    found = []
-    for of, one in told["indices"].items():
-        columns = {key: np.array([np.nan if v is None else v for v in one[key]]) for key in COLUMNS}
-        found.append(Indices(of=of, unit=one["unit"], variance=one["variance"], **columns))
-    parameters = tuple(told["parameters"])
-    return Sensitivity(parameters, told["samples"], told["trajectories"], tuple(found))
 
 
 def refuse_correlated(design: Design) -> None:

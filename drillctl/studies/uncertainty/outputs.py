@@ -1,64 +1,45 @@
-"""Stability regions under uncertainty as a labelled dataset, and as a summary."""
+"""What is written and drawn of regions under uncertainty: data, summary, large tables."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.ensemble.grid import over_axes, span
 from drillctl.ensemble.parameters import uncertain_parameters
+from drillctl.ensemble.probability import INNER, MEDIAN, OUTER
 from drillctl.ensemble.realizations import Drawn, Realizations
 from drillctl.ensemble.running import Block
 from drillctl.ensemble.storing import FILES, ZarrBlocks, disk_errors
 from drillctl.errors import InputError
-from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.studies.uncertainty.objectives import Mean, Quantile, TailMean
-from drillctl.studies.uncertainty.probability import INNER, MEDIAN, OUTER
+from drillctl.simulation.measures import STATUSES
+from drillctl.store.codec import TREE, encoded
+from drillctl.store.json_files import write_json
+from drillctl.store.names import stored_name
+from drillctl.store.tables import texts, write_columns
+from drillctl.studies.uncertainty.best import Mean, Quantile, TailMean
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import xarray
-
+    from drillctl import units
     from drillctl.studies.uncertainty.result import Uncertainty
 
 Array = NDArray[np.float64]
 
 
-def dataset(result: Uncertainty) -> xarray.Dataset:
-    """All that a result holds, and the maps that follow from it."""
-    import xarray
-
-    variables = lanes(result) | maps(result)
-    coordinates: dict[str, Any] = {
-        a.path: (a.path, a.values, {"units": a.unit}) for a in result.axes
-    }
-    coordinates["level"] = ("level", np.array(result.levels), {"units": "s"})
-    return xarray.Dataset(variables, coordinates, dict(result.provenance))
-
-
-def lanes(result: Uncertainty) -> dict[str, Any]:
-    """What was simulated, lane by lane, as variables of a dataset."""
-    dimensions = ["realization", *(a.path for a in result.axes)]
-    variables: dict[str, Any] = {
-        name: (dimensions, values, {"units": MEASURES[name].unit})
-        for name, values in result.measures.items()
-    }
-    flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
-    return variables | {"status": (dimensions, result.status, flags)}
-
-
-def maps(result: Uncertainty) -> dict[str, Any]:
-    """Everything else: draws, nominal map, counts with intervals, moments, audit."""
+def derived(result: Uncertainty) -> dict[str, Any]:
+    """What follows from the lanes: counts with intervals, moments; and units of the draws."""
     paths = [a.path for a in result.axes]
     found: dict[str, Any] = {
         one.path: ("realization", result.drawn[one.path], {"units": one.unit})
         for one in uncertain_parameters(result.design)
     }
-    found["nominal_j1"] = (paths, result.nominal, {"units": "s"})
-    found["audited_lane"] = ("audited", result.audit.cells, {})
-    found["audited_j1"] = ("audited", result.audit.reference, {"units": "s"})
+    found["level"] = ("level", np.array(result.levels), {"units": "s"})
     every = list(result.maps.values())
     columns: dict[str, list[NDArray[Any]]] = {
         "count": [one.counts for one in every],
@@ -93,10 +74,7 @@ def summary(result: Uncertainty) -> dict[str, Any]:
         "sampling": table.sampling,
         "replicates": result.scatter.replicates,
         "uncertain": list(result.drawn),
-        "axes": {
-            a.path: {"min": float(a.values[0]), "max": float(a.values[-1]), "points": len(a)}
-            for a in result.axes
-        },
+        "axes": span(result.axes),
         "levels": {f"{level:g}": _level(result, level) for level in result.levels},
         "best": {name: _best(result, name) for name in result.objectives},
         "looks": [
@@ -164,11 +142,9 @@ def _best(result: Uncertainty, name: str) -> dict[str, Any]:
     }
 
 
-def write_uncertainty(result: Uncertainty, folder: Path) -> None:
-    """Write a study under uncertainty: lanes that are not there yet, and what follows from them."""
+def write(result: Uncertainty, folder: Path) -> None:
+    """Write lanes that are not in the folder yet, and all else."""
     import zarr
-
-    from drillctl.store.names import stored_name
 
     job = Realizations(result.design, result.axes, Drawn(result.seed), tuple(result.measures), None)
     stored = ZarrBlocks(folder, "realizations", job)
@@ -178,12 +154,63 @@ def write_uncertainty(result: Uncertainty, folder: Path) -> None:
         status = result.status[rows].reshape(-1, job.width)
         stored.keep(Block(first, flat, status, provenance=result.provenance))
     path = folder / FILES["realizations"]
-    own = set(lanes(result))
+    own = {*result.measures, "status"}
     with disk_errors(path):
         group = zarr.open_group(path, mode="a")
         for name in list(group.array_keys()):
             if name not in own:  # of fewer realizations
                 del group[name]
-        data = dataset(result).drop_vars(own)
+        data = result.data.drop_vars(own)
         names = {str(n): stored_name(str(n)) for n in (*data.variables, *data.dims)}
         data.rename(names).to_zarr(path, mode="a", consolidated=False)
+    write_json(folder / TREE, encoded(result)[0])
+
+
+class Interim:
+    """Pictures of what is finished, from time to time."""
+
+    def __init__(self, every: float, path: Path, system: units.System) -> None:
+        self._every, self._path, self._system = every, path, system
+        self._next = time.monotonic() + every
+
+    def __call__(self, so_far: Callable[[], Uncertainty | None]) -> None:
+        """Draw what is finished if it is time."""
+        if time.monotonic() < self._next:
+            return
+        from drillctl import plots
+
+        result = so_far()
+        if result is not None and len(result.axes) == 2:
+            part = self._path.with_suffix(".part.png")
+            plots.probability_map(result, system=self._system).savefig(part)
+            part.replace(self._path)
+        self._next = time.monotonic() + self._every
+
+
+def write_columns_of(result: Uncertainty, folder: Path) -> None:
+    """Write what has many rows (SI): `cells.csv`, `draws.csv`, and `contours.csv` on request."""
+    columns: dict[str, Array] = {}
+    for level, one in result.maps.items():
+        name = f"probability_{level:g}"
+        columns[name] = one.probability
+        columns[f"{name}_low"], columns[f"{name}_high"] = one.interval
+    columns |= {f"j1_{name}": values for name, values in known(result).items()}
+    columns["nominal_j1"] = result.nominal
+    cells = over_axes(result.axes) | {name: texts(v) for name, v in columns.items()}
+    write_columns(folder / "cells.csv", cells)
+    write_columns(folder / "draws.csv", {path: texts(v) for path, v in result.drawn.items()})
+    if result.design.tables.uncertainty.contours:
+        heads = ["level", "realization", "polygon", "ring", *(a.path for a in result.axes)]
+        rows = [[f"{one}" for one in row] for row in _contours(result)]
+        columns_ = zip(*rows, strict=True) if rows else [[] for _ in heads]
+        write_columns(folder / "contours.csv", dict(zip(heads, columns_, strict=True)))
+
+
+def _contours(result: Uncertainty) -> Iterator[tuple[Any, ...]]:
+    for level in result.levels:
+        for number in range(result.realizations):
+            outline = result.contours(level, number)
+            for k, polygon in enumerate(outline.geoms):
+                for ring, line in enumerate((polygon.exterior, *polygon.interiors)):
+                    for x, y in line.coords:
+                        yield level, number, k, ring, x, y

@@ -16,8 +16,9 @@ from drillctl.design import Design
 from drillctl.design.uncertain_tables import SensitivityTable
 from drillctl.ensemble import audit as auditing
 from drillctl.ensemble.draws import Failures, beyond_the_table, told
-from drillctl.ensemble.grid import Axis, axes_of, cell_design, refuse_more_bytes, shape_of
+from drillctl.ensemble.grid import Axis, cell_design, refuse_more_bytes, shape_of
 from drillctl.ensemble.parameters import drawing
+from drillctl.ensemble.probability import Scatter
 from drillctl.ensemble.realizations import Drawn, Listed, Realizations, Source
 from drillctl.ensemble.running import Blocks, Workers, run
 from drillctl.ensemble.sampling import sampling_of
@@ -27,9 +28,8 @@ from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.measures import BATCH_MEASURES
 from drillctl.studies.uncertainty import sensitivity as indices
-from drillctl.studies.uncertainty.result import Uncertainty
-from drillctl.studies.uncertainty.scatter import Scatter
-from drillctl.studies.uncertainty.stopping import Look, level_of, look, schedule
+from drillctl.studies.uncertainty.convergence import Look, level_of, look, schedule
+from drillctl.studies.uncertainty.result import Uncertainty, map_axes
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -101,16 +101,6 @@ def uncertainty(
     return study.result(begin, audit_cells)
 
 
-def map_axes(design: Design) -> tuple[Axis, ...]:
-    """Axes of the map under uncertainty: those of `[map]`, then those of `[uncertainty]`."""
-    tables = (*design.tables.map.axes, *design.tables.uncertainty.axes)
-    paths = [table.path for table in tables]
-    for path in paths:
-        if paths.count(path) > 1:
-            raise InputError(f"two axes run over {path!r}", "uncertainty.axes")
-    return axes_of(design, tables)
-
-
 def _workers(client: Client | None) -> Workers | None:
     if client is None:
         return None
@@ -180,7 +170,7 @@ class _Study:
             measures={name: values.reshape(shape) for name, values in measures.items()},
             status=status.reshape(shape),
             nominal=nominal,
-            audit=auditing.Audit(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)),
+            audit=auditing.unaudited("lane"),
             failures=(),
             looks=(),
             sensitivity=None,
@@ -245,7 +235,7 @@ class _Study:
             row, cell = divmod(int(lane), found.nominal.size)
             designs.append(cell_design(rig, self.axes, cell).replace(_of(found.drawn, row)))
         reference = auditing.references(designs, self.progress)
-        return auditing.Audit(lanes, known.ravel()[lanes], reference)
+        return auditing.Audit(lanes, known.ravel()[lanes], reference, "lane")
 
     def _failures(self, found: Uncertainty) -> tuple[Failures, ...]:
         """Realizations that failed in every cell, by reason."""
