@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import errno
 import itertools
 import json
@@ -23,6 +24,7 @@ from drillctl.design.reading import parse_axis, parse_setting
 from drillctl.ensemble import cluster as cluster_module
 from drillctl.ensemble import realizations as realizations_module
 from drillctl.errors import InputError
+from drillctl.studies.uncertainty import indices
 
 HOLDS = (
     (
@@ -136,8 +138,8 @@ def test_a_result_of_python_is_saved_and_shown_by_the_command(call):
 def test_tables_for_people(call):
     code, out, err = call("uncertainty", PAPER, *FEW, "--sensitivity", "4")
     assert code == 0
-    for text in ("share of the map by probability (95 % interval)", "P >= 95 %", "best cells",
-                 "Sobol indices, 4 points", "audit: none, 0 lanes",
+    for text in ("share of the map by probability (95 % interval)", "P ≥ 95 %", "best cells",
+                 "Sobol indices from 4 points", "audit: none, 0 lanes",
                  "12 draws (monte-carlo, seed 2012): bit_rock.a1_factor, bit_rock.a2_factor",
                  "results: runs/monteiro-trindade-140kn-uncertainty-1"):  # fmt: skip
         assert text in out
@@ -145,12 +147,22 @@ def test_tables_for_people(call):
     assert "Traceback" not in err
 
 
-def test_an_index_whose_error_is_not_known_says_so():
-    from drillctl.printing.uncertainty import _index
-
-    assert _index(0.5, 0.1) == "0.500 +- 0.100"
-    assert _index(0.5, float("nan")) == "0.500 (error not known)"
-    assert _index(float("nan"), float("nan")) == "-"
+def test_an_index_whose_error_is_not_known_says_so(call):
+    """Of equal values in a resample there is no error; a figure that does not vary has no index."""
+    code, _, _ = call("uncertainty", PAPER, *FEW, "--sensitivity", "4", "--out", "run")
+    assert code == 0
+    result = drillctl.open("run")
+    unknown = np.full(2, np.nan)
+    (first, *others) = result.sensitivity.indices
+    one = dataclasses.replace(first, first=np.array([0.5, np.nan]), first_error=unknown)
+    changed = dataclasses.replace(result.sensitivity, indices=(one, *others))
+    shown = indices(dataclasses.replace(result, sensitivity=changed))
+    texts = [
+        [column.text(cell, "si") for column, cell in zip(shown.columns, row, strict=True)]
+        for row in shown.rows
+    ]
+    assert texts[0][2:4] == ["0.5", "–"]
+    assert texts[1][2:4] == ["–", "–"]
 
 
 def test_maps_over_one_parameter_and_over_three(call):
@@ -232,7 +244,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(call, monkeypatch, after):
     monkeypatch.setattr(ZarrBlocks, "keep", interrupted)
     code, _, err = call("uncertainty", PAPER, *FEW, "--out", "run")
     assert code == 130
-    assert "what is finished is kept: the same with --out run goes on" in err
+    assert "finished blocks are kept: repeat with --out run to resume" in err
     monkeypatch.setattr(ZarrBlocks, "keep", keep)
     with pytest.raises(InputError, match="not finished"):
         drillctl.open("run")
@@ -274,8 +286,8 @@ def test_interim_pictures_show_what_is_finished(call, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--resume"], "--resume: goes with --out"),
-        (["--resume", "--out", "nothing"], "nothing holds no run to go on with"),
+        (["--resume"], "--resume: requires --out"),
+        (["--resume", "--out", "nothing"], "nothing holds no run to resume"),
     ],
 )
 def test_there_must_be_something_to_go_on_with(call, arguments, message):
@@ -319,7 +331,7 @@ def test_another_design_or_version_is_refused_with_the_difference(call, monkeypa
     Path("run/run.json").write_text(json.dumps(held))
     code, _, err = call("uncertainty", PAPER, *FEW, "--out", "run")
     assert code == 2
-    assert "version 0.0.9, this is 0.1.0" in err
+    assert f"version 0.0.9, this is {drillctl.__version__}" in err
 
 
 def test_another_processor_is_refused_unless_allowed(call, monkeypatch):
@@ -375,8 +387,8 @@ SCRIPT = """
 import sys
 from drillctl.ensemble import realizations
 realizations.LANES = 24
-from drillctl.cli import running
-running.draw = lambda figure, path: path.touch()
+from importlib import import_module
+import_module("drillctl.cli.verb").draw = lambda figure, path: path.touch()
 from drillctl.cli import run
 from drillctl.design.reading import parse_axis, parse_setting
 sys.exit(run(sys.argv[1:]))
