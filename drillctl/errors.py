@@ -1,7 +1,7 @@
 """Exceptions. Each derives from the builtin that a caller would expect.
 
-- `InputError`: something the user wrote cannot be used; exit code 2.
-- `SimulationError`: a computation could not be carried out; exit code 1.
+- `InputError`: invalid input; exit code 2.
+- `SimulationError`: a computation failed; exit code 1.
 - `StoreError`: results could not be written or read; exit code 1.
 """
 
@@ -12,18 +12,18 @@ from collections.abc import Iterable, Mapping
 
 
 class DrillctlError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base of all errors that this package raises."""
 
 
 class InputError(DrillctlError, ValueError):
-    """A design, a path or an option that cannot be used.
+    """An invalid design, path or option.
 
     Parameters
     ----------
     problem : str
-        What came, and what is allowed.
+        The given value, and what is allowed.
     where : str, optional
-        File, key or option the problem stands in, e.g. `rig.toml: bha.inertia`.
+        File, key or option with the problem, e.g. `rig.toml: bha.inertia`.
     """
 
     def __init__(self, problem: str, where: str = "") -> None:
@@ -32,20 +32,20 @@ class InputError(DrillctlError, ValueError):
         super().__init__(f"{where}: {problem}" if where else problem)
 
     def within(self, place: str) -> InputError:
-        """The same error, told with the file or key around it."""
+        """The same error with the file or key that contains it."""
         return InputError(self.problem, f"{place}: {self.where}" if self.where else place)
 
 
 class SimulationError(DrillctlError, RuntimeError):
-    """A solver could not finish what was asked of it."""
+    """A solver failed."""
 
 
 class StoreError(DrillctlError, OSError):
-    """A disk that takes no more, or a folder that cannot be read or written."""
+    """A full disk, or a folder that cannot be read or written."""
 
 
 def shown(value: object) -> str:
-    """Return what the user wrote, as short text on one line for a message.
+    """Return a value from the user as short text on one line, for a message.
 
     Parameters
     ----------
@@ -59,28 +59,28 @@ def shown(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int) and abs(value) >= 10**18:
-        return "an enormous number"
+        return "a number of more than 18 digits"
     text = f"{float(value)!r}" if isinstance(value, float) else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """Return a hint that names the valid word closest to `name`, then all of them.
+    """Return a hint with the valid word closest to `name`, then all valid words.
 
     Parameters
     ----------
     name : str
-        The word that was not understood.
+        The invalid word.
     valid : iterable of str
-        The words that would have been.
+        The valid words.
 
     Returns
     -------
     str
-        For instance `did you mean 'inertia'? allowed: damping, inertia`.
+        For example `did you mean 'inertia'? allowed: damping, inertia`.
     """
     words = sorted(valid)
-    # A slip of the pen; else a word with an ending too many; else one of like letters.
+    # A typing error; else a valid word with an extra ending; else a word of similar letters.
     close = difflib.get_close_matches(name, words, n=1, cutoff=0.85)
     close = close or [w for w in words if w and name.startswith(w)]
     close = close or difflib.get_close_matches(name, words, n=1, cutoff=0.5)

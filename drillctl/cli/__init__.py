@@ -1,8 +1,8 @@
-"""The command line: one function a verb, no numerics.
+"""The command line: one generic command for studies, functions for the rest; no numerics.
 
-`app.py` holds the program and its exit codes, `options.py` what verbs have in common, `running.py`
-a run in its folder; the verbs are in files by subject. Every verb takes a design by path or
-shipped name. Exit codes: 0 done, 2 the input is wrong, 130 interrupted, 1 anything else.
+`app.py` holds the program and its exit codes, `options.py` the shared options, `verb.py` the command
+of a study. Every command takes a design by path or shipped name. Exit codes: 0 done, 2 invalid
+input, 130 interrupted, 1 anything else.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ VERBS: dict[str, tuple[Callable[..., None], Group]] = {
     "tune": (tuning.tune, "Decide"),
     "report": (reports.report, "Hand over"),
 }
-"""Commands that are no study, with their groups in the help."""
+"""Commands that are not studies, with their groups in the help."""
 
 for name, (verb, group) in VERBS.items():
     app.command(name=name, rich_help_panel=group)(verb)

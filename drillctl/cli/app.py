@@ -1,4 +1,4 @@
-"""The program: its options without a verb, and how errors become messages and exit codes."""
+"""The program: options without a command, error messages and exit codes."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from drillctl.studies.base import Group
 
 
 class GroupedCommands(TyperGroup):
-    """Commands under what a person wants to do, their help lines never cut off."""
+    """Commands by purpose, with help lines in full."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write a section a group, in the order of the groups."""
+        """Write one section per group, in the order of the groups."""
         for group in get_args(Group):
             with formatter.section(group):
                 formatter.write_dl([
@@ -40,35 +40,35 @@ app = typer.Typer(
 
 
 def run(arguments: list[str]) -> int:
-    """Run a command line and return its exit code; errors are told in one message."""
+    """Run a command line and return its exit code; an error prints one message."""
     usage_error: Any = typer.BadParameter.__mro__[1]
     try:
         code = app(arguments or ["--help"], prog_name="drillctl", standalone_mode=False)
         # Some versions of typer return 130 on an interruption, others raise Abort.
-        return _told("interrupted", 130) if code == 130 else int(code or 0)
+        return _failed("interrupted", 130) if code == 130 else int(code or 0)
     except typer.Exit as stop:
         return int(stop.exit_code)
     except (KeyboardInterrupt, typer.Abort):
-        return _told("interrupted", 130)
+        return _failed("interrupted", 130)
     except usage_error as error:
-        return _told(error.format_message(), 2)
+        return _failed(error.format_message(), 2)
     except Exception as error:
         if "--debug" in arguments:
             traceback.print_exc()
         if isinstance(error, DrillctlError):
-            return _told(str(error), 2 if isinstance(error, InputError) else 1)
-        return _told(f"{type(error).__name__}: {error} (--debug shows where)", 1)
+            return _failed(str(error), 2 if isinstance(error, InputError) else 1)
+        return _failed(f"{type(error).__name__}: {error} (--debug prints the traceback)", 1)
 
 
-def _told(message: str, code: int) -> int:
+def _failed(message: str, code: int) -> int:
     from drillctl.cli import console
 
     console.note(f"drillctl: {message}")
     return code
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         from drillctl.cli import console
 
         console.line(f"drillctl {__version__}")
@@ -78,7 +78,7 @@ def _version(asked: bool) -> None:
 @app.callback()
 def common(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print version.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Control design against torsional stick-slip of oil-well drillstrings."""

@@ -1,4 +1,4 @@
-"""What the command line says: tables on stdout, progress and notes on stderr, strict JSON."""
+"""Output: tables and strict JSON on stdout, progress and notes on stderr."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ if TYPE_CHECKING:
     from rich.progress import Progress as RichBar
 
 PIPED_WIDTH = 160
-"""Width of tables that do not go to a terminal (characters)."""
+"""Width of tables written to a file or pipe (characters)."""
 
 
 def note(text: str) -> None:
-    """A line for people, on stderr."""
+    """Print a line on stderr."""
     print(text, file=sys.stderr)  # noqa: T201
 
 
 def emit(summary: dict[str, Any]) -> None:
-    """One strict JSON object on stdout."""
+    """Print one strict JSON object on stdout."""
     from drillctl.store.json_files import strict
 
     print(json.dumps(strict(summary), allow_nan=False))  # noqa: T201
 
 
 def line(text: str) -> None:
-    """A line of a command's answer, on stdout."""
+    """Print a line on stdout."""
     print(text)  # noqa: T201
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table on stdout; every column but the first is set flush right."""
+    """Print a table on stdout; all columns but the first are right-aligned."""
     from rich.console import Console
     from rich.table import Table
 
@@ -45,11 +45,11 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
         made.add_column(column, justify="left" if number == 0 else "right", overflow="fold")
     for row in rows:
         made.add_row(*row)
-    # Titles and names are the user's: a bracket or a colon in them is no markup.
+    # Titles and names come from the user: brackets and colons in them are not markup.
     console = Console(markup=False, emoji=False, highlight=False)
     if not console.is_terminal:
         console.width = PIPED_WIDTH
-    # Not as the table's own title, which would be broken at the table's width.
+    # Rich would wrap a title of the table at the width of the table.
     console.print(title, style="bold", soft_wrap=True)
     console.print(made)
 
@@ -62,19 +62,19 @@ class Bar:
         self._task: Any = None
 
     def begin(self, task: str, total: int) -> None:
-        """A task begins; the one before is finished."""
+        """Start a task; the previous one is finished."""
         if self._task is not None:
             self._bar.update(self._task, visible=False)
         self._task = self._bar.add_task(task, total=total)
 
     def advance(self, done: int) -> None:
-        """Parts of it are done."""
+        """Add finished parts."""
         self._bar.advance(self._task, done)
 
 
 @contextmanager
 def progress() -> Iterator[Progress]:
-    """Progress on stderr while the block runs; gone when it ends, absent from files and pipes."""
+    """Progress on stderr while the block runs; cleared at its end, absent from files and pipes."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -104,13 +104,13 @@ def progress() -> Iterator[Progress]:
 
 
 def sized(value: float | None, digits: int = 5) -> str:
-    """A number for a table; a dash where there is none."""
+    """Format a number for a table; a dash for None and NaN."""
     return "-" if value is None or value != value else f"{value:.{digits}g}"
 
 
 @contextmanager
 def library_output_on_stderr() -> Iterator[None]:
-    """What a library prints by itself goes to stderr, be it by C or by Python: stdout is JSON's."""
+    """Send what libraries print, from C or Python, to stderr: stdout is reserved for JSON."""
     import ctypes
 
     sys.stdout.flush()
@@ -120,7 +120,7 @@ def library_output_on_stderr() -> Iterator[None]:
         with redirect_stdout(sys.stderr):
             yield
     finally:
-        with suppress(OSError, TypeError):  # not every system names its C library so
-            ctypes.CDLL(None).fflush(None)  # what C holds back goes where it was meant to
+        with suppress(OSError, TypeError):  # not every system has the C library under this name
+            ctypes.CDLL(None).fflush(None)  # buffered output of C must not reach stdout later
         os.dup2(kept, 1)
         os.close(kept)

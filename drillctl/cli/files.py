@@ -1,4 +1,4 @@
-"""Verbs about files: what is shipped, one design in full, checked, or begun."""
+"""Commands on files: list shipped ones, print, check or start a design."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ def _listed(kind: Literal["models", "designs"], as_json: bool) -> None:
     from drillctl import catalog
     from drillctl.cli import console
 
-    found = catalog.entries(kind)
+    entries = catalog.entries(kind)
     if as_json:
-        keys = [{"name": e.name, "title": e.title, "path": str(e.path)} for e in found]
+        keys = [{"name": e.name, "title": e.title, "path": str(e.path)} for e in entries]
         console.emit({kind: keys})
     else:
-        console.table(kind, ["name", "title"], [[e.name, e.title] for e in found])
+        console.table(kind, ["name", "title"], [[e.name, e.title] for e in entries])
 
 
 def models(json: Json = False, debug: Debug = False) -> None:
@@ -37,11 +37,11 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
     from drillctl.design import to_toml
     from drillctl.design.reading import to_tree
 
-    found = loaded(design, sets)
+    loaded_design = loaded(design, sets)
     if json:
-        console.emit(to_tree(found.tables))
+        console.emit(to_tree(loaded_design.tables))
     else:
-        console.line(to_toml(found).rstrip())
+        console.line(to_toml(loaded_design).rstrip())
 
 
 def validate(
@@ -51,12 +51,12 @@ def validate(
     from drillctl.cli import console
     from drillctl.studies.checking import refuse_what_studies_would
 
-    found = loaded(design, sets)
-    refuse_what_studies_would(found)
+    loaded_design = loaded(design, sets)
+    refuse_what_studies_would(loaded_design)
     if json:
-        console.emit({"valid": True, "name": found.name, "path": found.origin})
+        console.emit({"valid": True, "name": loaded_design.name, "path": loaded_design.origin})
     else:
-        console.line(f"{found.origin}: valid")
+        console.line(f"{loaded_design.origin}: valid")
 
 
 def new(

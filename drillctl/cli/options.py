@@ -1,4 +1,4 @@
-"""What verbs have in common: the design with its changed values, how to compute and tell."""
+"""Options shared by all commands, and the design with the values set on the command line."""
 
 from __future__ import annotations
 
@@ -18,27 +18,33 @@ if TYPE_CHECKING:
 DesignName = Annotated[str, typer.Argument(metavar="DESIGN", help="Path or shipped name.")]
 Sets = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="PATH=VALUE", help="Set a value, e.g. controller.kp=300."),
+    typer.Option("--set", metavar="PATH=VALUE", help="Set a value: controller.kp=300; repeatable."),
 ]
 Axes = Annotated[
     list[str] | None,
-    typer.Option("--axis", metavar="PATH=MIN:MAX:POINTS", help="Axis of a map; repeat for more."),
+    typer.Option(
+        "--axis", metavar="PATH=MIN:MAX:POINTS", help="Add an axis to the map; repeatable."
+    ),
 ]
-Draws = Annotated[int | None, typer.Option("--realizations", help="Draws of what is uncertain.")]
+Draws = Annotated[
+    int | None, typer.Option("--realizations", help="Number of draws of the uncertain parameters.")
+]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the draws.")]
-Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results.")]
-Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, nothing else.")]
-Threads = Annotated[int | None, typer.Option("--threads", min=1, help="Threads to use.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Write results to this folder.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on stdout, nothing else.")
+]
+Threads = Annotated[int | None, typer.Option("--threads", min=1, help="Number of threads to use.")]
 Units = Annotated[
     Literal["si", "field"], typer.Option("--units", help="Units of tables and figures.")
 ]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more on stderr.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more on stderr.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
 
 @dataclass(frozen=True)
 class Common:
-    """Options that every command has which computes."""
+    """Options of every command that computes."""
 
     out: Path | None
     json: bool
@@ -54,21 +60,21 @@ def common_options(
     verbose: Verbose = False,
     debug: Debug = False,
 ) -> Common:
-    """The options of every verb that computes; `debug` is read where errors are told."""
+    """Options of every command that computes; `app.run` reads `debug`."""
     if threads is not None:
         _use(threads)
     return Common(out, json, units, verbose)
 
 
 Options = Common
-_asked_of_all = common_options
+_shared_options = common_options
 
 
 def computing(
     verb: Callable[..., None], system: Literal["si", "field"] = "si"
 ) -> Callable[..., None]:
-    """A verb as the command line sees it."""
-    shared = dict(inspect.signature(_asked_of_all, eval_str=True).parameters)
+    """The function that typer reads: design, values set, own options, shared options."""
+    shared = dict(inspect.signature(_shared_options, eval_str=True).parameters)
     shared["units"] = shared["units"].replace(default=system)
     own = [
         parameter.replace(annotation=eval(parameter.annotation, verb.__globals__))
@@ -77,9 +83,9 @@ def computing(
     ]
 
     def command(**given: Any) -> None:
-        asked = {name: given.pop(name) for name in shared}
+        common = {name: given.pop(name) for name in shared}
         design = loaded(given.pop("design"), given.pop("sets"))
-        verb(design=design, options=_asked_of_all(**asked), **given)
+        verb(design=design, options=_shared_options(**common), **given)
 
     kind = inspect.Parameter.KEYWORD_ONLY
     parameters = [
@@ -94,31 +100,31 @@ def computing(
 
 
 def loaded(name: str, sets: list[str] | None) -> Design:
-    """The design of a name or path with its changed values; its warnings are told."""
+    """Load a design by name or path with the values set; print its warnings."""
     from drillctl.cli import console
     from drillctl.design import load, parse_setting
 
-    found = load(name, **dict(parse_setting(text) for text in sets or []))
-    for warning in found.warnings:
+    design = load(name, **dict(parse_setting(text) for text in sets or []))
+    for warning in design.warnings:
         console.note(f"warning: {warning}")
-    return found
+    return design
 
 
 def with_axes(design: Design, axes: list[str] | None) -> Design:
-    """The design with the axes of the command line, if there are any."""
+    """The design with the axes of the command line, if given."""
     from drillctl.design.reading import parse_axis
 
     return design.replace({"map.axes": [parse_axis(text) for text in axes]}) if axes else design
 
 
 def with_values(design: Design, given: dict[str, Any]) -> Design:
-    """The design with the values of options that were given; None stands for not given."""
-    asked = {path: value for path, value in given.items() if value is not None}
-    return design.replace(asked) if asked else design
+    """The design with the values of options; None means not given."""
+    values = {path: value for path, value in given.items() if value is not None}
+    return design.replace(values) if values else design
 
 
 def with_draws(design: Design, realizations: int | None, seed: int | None) -> Design:
-    """The design with the draws of the command line, if they are given."""
+    """The design with the draws of the command line, if given."""
     return with_values(design, {"uncertainty.realizations": realizations, "uncertainty.seed": seed})
 
 
@@ -127,5 +133,7 @@ def _use(threads: int) -> None:
 
     most = numba.config.NUMBA_NUM_THREADS
     if threads > most:
-        raise InputError(f"{threads} is more than this machine's {most}", "--threads")
+        raise InputError(
+            f"must be <= {most}, the threads of this machine, not {threads}", "--threads"
+        )
     numba.set_num_threads(threads)

@@ -1,4 +1,4 @@
-"""The verb that turns a design into a report."""
+"""The command that writes the report of a design."""
 
 from __future__ import annotations
 
@@ -19,25 +19,26 @@ def report(
     design: Design,
     options: Options,
     profile: Annotated[
-        Literal["quick", "standard", "full"], typer.Option("--profile", help="How much to compute.")
+        Literal["quick", "standard", "full"],
+        typer.Option("--profile", help="Set how much to compute."),
     ] = "quick",
     sections: Annotated[
         str | None,
         typer.Option("--sections", metavar="NAME,NAME", help="Write only these sections."),
     ] = None,
     title: Annotated[
-        str | None, typer.Option("--title", help="Title instead of the design's own.")
+        str | None, typer.Option("--title", help="Set the title of the report.")
     ] = None,
     formats: Annotated[
         list[str] | None,
-        typer.Option("--format", metavar="html|pdf|md", help="What to write; repeatable."),
+        typer.Option("--format", metavar="html|pdf|md", help="Write this format; repeatable."),
     ] = None,
 ) -> None:
     """Full report: verdict, figures, accuracy audit."""
-    from drillctl.reporting import report as made
+    from drillctl.reporting import report as write_report
 
     with console.progress() as bar, running.library_output_on_stderr():
-        found = made(
+        result = write_report(
             design,
             options.out,
             profile=profile,
@@ -47,19 +48,19 @@ def report(
             system=options.units,
             progress=bar,
         )
-    for problem in found.problems:
+    for problem in result.problems:
         console.note(f"warning: {problem}")
-    for reason in found.unwritten.values():
+    for reason in result.unwritten.values():
         console.note(f"warning: {reason}")
     if options.json:
-        console.emit(found.summary())
-        console.note(f"results: {found.folder}")
+        console.emit(result.summary())
+        console.note(f"results: {result.folder}")
     else:
-        console.line(f"the current setting {found.content['verdict']['current_setting']}")
-        for path in found.files.values():
+        console.line(f"the current setting {result.content['verdict']['current_setting']}")
+        for path in result.files.values():
             console.line(f"report: {path}")
-        console.line(f"results: {found.folder}")
-    if found.interrupted:
+        console.line(f"results: {result.folder}")
+    if result.interrupted:
         raise typer.Exit(130)
-    if found.problems or found.unwritten:
+    if result.problems or result.unwritten:
         raise typer.Exit(1)

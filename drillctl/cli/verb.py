@@ -1,4 +1,4 @@
-"""One command for every study: claim a folder, show again or compute, write, draw, print."""
+"""The generic command of a study: claim a folder, show again or compute, write, draw, print."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DPI = 150
 
 
 def command(study: Study) -> Callable[..., None]:
-    """The function that typer reads: a study's options, then those of every command."""
+    """The function that typer reads: options of the study, then those of every command."""
     shared = dict(inspect.signature(common_options, eval_str=True).parameters)
     shared["units"] = shared["units"].replace(default=study.system)
     own = [_parameter(option) for option in study.options]
@@ -108,7 +108,7 @@ def _refuse_nothing_to_resume(options: dict[str, Any], out: Path | None) -> None
 
 
 def _write(study: Study, result: Any, folder: RunFolder, common: Common) -> None:
-    """Data, tables, pictures and further files of a result."""
+    """Write data, tables, figures and further files of a result."""
     from drillctl.store.tables import write_csv
 
     result.write(folder.path)
@@ -120,14 +120,14 @@ def _write(study: Study, result: Any, folder: RunFolder, common: Common) -> None
 
 
 def draw(figure: Figure, path: Path) -> None:
-    """Write a picture, whole or not at all."""
+    """Write a figure atomically."""
     part = path.with_suffix(".part")
     figure.savefig(part, dpi=DPI, format="png")
     part.replace(path)
 
 
 def _show(study: Study, result: Any, summary: dict[str, Any], common: Common) -> None:
-    """The summary as JSON, or tables and remarks for people."""
+    """Print the summary as JSON, or tables and remarks."""
     if common.json:
         console.emit(summary)
         return
@@ -141,7 +141,7 @@ def _show(study: Study, result: Any, summary: dict[str, Any], common: Common) ->
 
 @contextmanager
 def guarded(folder: RunFolder, study: Study) -> Iterator[None]:
-    """A run in its folder: an impossible one leaves none, an interrupted one may be resumed."""
+    """Discard the folder of an invalid run; keep that of an interrupted one that can resume."""
     try:
         yield
     except InputError:
@@ -149,7 +149,7 @@ def guarded(folder: RunFolder, study: Study) -> Iterator[None]:
         raise
     except KeyboardInterrupt:
         if study.resumes:
-            console.note(f"finished blocks are kept: repeat with --out {folder.path} to resume")
+            console.note(f"finished blocks are kept; to resume, repeat with --out {folder.path}")
         else:
             folder.discard()
         raise

@@ -1,14 +1,13 @@
-"""Results on disk: one folder a run.
+"""Results on disk: one folder per run.
 
     run.json       verb, version, identity, provenance; whether the run is finished
     design.toml    the resolved design
-    blocks/        finished blocks of a map that is not, written atomically
+    blocks/        finished blocks of an unfinished map, written atomically
     data.zarr      the dataset, labelled by parameter path; under uncertainty it grows by blocks
     summary.json   what the command printed
     *.png, *.csv   figures and tables
 
-No pickle anywhere; a folder that holds anything else is never written to. `folder.py` claims
-folders, `kinds/` says of each kind of result what it was asked for and how it is read back.
+No pickle anywhere; a folder with any other content is never written to.
 """
 
 from __future__ import annotations

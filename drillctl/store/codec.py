@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 TREE = "result.json"
 DATA = "data.zarr"
 MARK = "$"
-"""Key of a JSON object that stands for something that JSON has not."""
+"""Key of a JSON object that encodes a type missing in JSON."""
 _PLAIN = Label()
 
 
@@ -47,7 +47,7 @@ class _Variable:
 
 @dataclass
 class _Encoder:
-    """Takes arrays out of a result as it goes through it."""
+    """Encodes a result and collects its arrays."""
 
     variables: dict[str, _Variable] = field(default_factory=dict)
 
@@ -76,14 +76,14 @@ class _Encoder:
         if isinstance(value, (tuple, list)):
             parts = self._parts(value, name, label, owner)
             return parts if isinstance(value, list) else {MARK: "tuple", "is": parts}
-        raise TypeError(f"{type(value).__name__} ({name}) is nothing that a result holds")
+        raise TypeError(f"{type(value).__name__} ({name}) cannot be stored in a result")
 
     def _object(self, value: Any, prefix: str, owner: Any) -> Any:
         cls = type(value)
         inside = {}
         for one, label in labels(cls).items():
             own = label.name.format_map(_Attributes(value)) or one
-            # What names itself by an attribute, such as an axis by its path, stands apart.
+            # A field named by an attribute, such as an axis by its path, takes no prefix.
             name = own if "{" in label.name or not prefix else f"{prefix}.{own}"
             inner = getattr(value, one)
             inside[one] = self.tree(inner, name, label, _Owner(value, owner))
@@ -100,11 +100,11 @@ class _Encoder:
         return self._stacked(found, label.over, [getattr(one, "name", None) for one in value])
 
     def _stacked(self, found: list[tuple[_Encoder, Any]], over: str, names: list[Any]) -> list[Any]:
-        """Like arrays of like objects in one variable along a new dimension; others apart."""
+        """Stack equal shapes in one variable along a new dimension; keep others separate."""
         for key in dict.fromkeys(key for apart, _ in found for key in apart.variables):
             held = [apart.variables.get(key) for apart, _ in found]
             first = next(one for one in held if one is not None)
-            if key in first.dims:  # a coordinate, which the objects share or have of their own
+            if key in first.dims:  # a coordinate, shared or one per object
                 continue
             alike = all(
                 one is not None
@@ -125,7 +125,7 @@ class _Encoder:
         return [self._placed(tree, apart, k) for k, (apart, tree) in enumerate(found)]
 
     def _placed(self, tree: Any, apart: _Encoder, k: int) -> Any:
-        """The tree of one of the stacked objects, its arrays where they are now."""
+        """The tree of one stacked object, with the new places of its arrays."""
         if isinstance(tree, list):
             return [self._placed(one, apart, k) for one in tree]
         if not isinstance(tree, dict):
@@ -227,7 +227,7 @@ def encoded(result: Any) -> tuple[Any, dict[str, _Variable]]:
 
 
 def dataset(result: Any) -> xarray.Dataset:
-    """Every array of a result, labelled, and what is derived from them."""
+    """Every array of a result, labelled, and the derived variables."""
     import xarray
 
     _, variables = encoded(result)
@@ -237,7 +237,7 @@ def dataset(result: Any) -> xarray.Dataset:
 
 
 def write(result: Any, folder: Path, data: xarray.Dataset | None = None) -> None:
-    """Write a result into the folder of its run, each file whole or not at all.
+    """Write a result into the folder of its run, each file atomically.
 
     `data`: instead of the result's own dataset, which must hold every variable of the tree.
     """
@@ -247,7 +247,7 @@ def write(result: Any, folder: Path, data: xarray.Dataset | None = None) -> None
 
 
 def write_dataset(data: xarray.Dataset, folder: Path) -> None:
-    """Write a dataset as `data.zarr`, with its provenance, whole or not at all."""
+    """Write a dataset as `data.zarr`, with its provenance, atomically."""
     part, target = folder / "data.part", folder / DATA
     shutil.rmtree(part, ignore_errors=True)
     data = data.rename({name: stored_name(str(name)) for name in (*data.variables, *data.dims)})
@@ -258,7 +258,7 @@ def write_dataset(data: xarray.Dataset, folder: Path) -> None:
 
 
 def read(folder: Path) -> Any:
-    """The result that was written into a folder.
+    """Read the result of a folder.
 
     Raises
     ------
@@ -311,8 +311,8 @@ def _design(tree: dict[str, Any]) -> Design:
 def _class(path: str) -> Any:
     module, _, name = path.partition(":")
     if not module.startswith("drillctl."):
-        raise ValueError(f"{path} is no class of this package")
+        raise ValueError(f"{path} is not a class of drillctl")
     found = getattr(import_module(module), name)
     if not (dataclasses.is_dataclass(found) or issubclass(found, tuple)):
-        raise ValueError(f"{path} is not data")
+        raise ValueError(f"{path} is neither a dataclass nor a named tuple")
     return found

@@ -1,4 +1,4 @@
-"""What tells a run from the one that a folder was made for, and what may differ."""
+"""Differences between a run and the run that a folder was made for."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from drillctl.errors import InputError, shown
 from drillctl.provenance import provenance
 
 MOST = 3
-"""Keys that are named at most."""
+"""Largest number of keys in a message."""
 LONGEST = 57
-"""Length of a list that is told in full (characters)."""
+"""Longest list printed in full (characters)."""
 
 
 def difference(path: Path, design: Design, grown: tuple[str, ...] = ()) -> str:
@@ -31,12 +31,12 @@ def difference(path: Path, design: Design, grown: tuple[str, ...] = ()) -> str:
     ]  # fmt: skip
     if not keys:
         return ""
-    told = [f"{key} is {_told(held, key)}, here {_told(here, key)}" for key in keys[:MOST]]
+    named = [f"{key} is {_value(held, key)}, here {_value(here, key)}" for key in keys[:MOST]]
     more = f" and {len(keys) - MOST} more" if len(keys) > MOST else ""
-    return f": {'; '.join(told)}{more}"
+    return f": {'; '.join(named)}{more}"
 
 
-def _told(leaves: dict[str, Any], key: str) -> str:
+def _value(leaves: dict[str, Any], key: str) -> str:
     if key not in leaves:
         return "not given"
     value = leaves[key]
@@ -64,15 +64,15 @@ def _leaves(tree: Any, prefix: str = "") -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Growing:
-    """A count of a design that a finished run may be taken on to."""
+    """A count of draws to which a finished run may be extended."""
 
-    count: int  # how many are asked for
-    # the design with another count in its place, the same for all: it identifies the run
+    count: int  # requested
+    # the design with a fixed count in place of the requested one: it identifies the run
     like: Design
 
 
 def growing_realizations(design: Design) -> Growing | None:
-    """What lets a run under uncertainty grow; None for draws of a fixed number.
+    """The extension of a run under uncertainty; None for samplings of fixed size.
 
     Parameters
     ----------
@@ -88,15 +88,15 @@ def growing_realizations(design: Design) -> Growing | None:
 
 
 def refuse_other_machine(held: dict[str, str], where: str, allow_mixed: bool) -> None:
-    """Refuse (`InputError`) to go on with a run of other packages or another processor."""
+    """Refuse (`InputError`) to resume a run of other packages or another processor."""
     here = provenance()
     other = [key for key in here if held.get(key) != here[key]]
     if allow_mixed and other == ["processor"]:
         return
     if other:
-        told = ", ".join(f"{key} {held.get(key)}, here {here[key]}" for key in other)
+        text = ", ".join(f"{key} {held.get(key)}, here {here[key]}" for key in other)
         raise InputError(
-            "holds a run begun with other packages or on another processor; the rest would differ "
-            f"in the last bits: give another folder ({told})",
+            "holds a run started with other packages or on another processor, whose bits would "
+            f"differ; give another folder ({text})",
             where,
         )

@@ -1,4 +1,4 @@
-"""The folder of a run: claimed for one run, taken up again by the very same one alone."""
+"""The folder of a run: claimed by one run, resumed only by the same run."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from drillctl.store.differences import Growing, difference, refuse_other_machine
 from drillctl.store.json_files import read_json, write_json, write_text
 
 RUNS = Path("runs")
-"""Where runs go that were given no folder."""
+"""Parent folder of runs without --out."""
 
 
 def identity(verb: str, design: Design, **settings: Any) -> str:
-    """What makes two runs the same run: verb, resolved design, version, other settings."""
+    """Hash that identifies a run: command, resolved design, version, other settings."""
     text = "\n".join([verb, drillctl.__version__, repr(settings), to_toml(design)])
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -41,7 +41,7 @@ class RunFolder:
     finished : bool
         Whether it held the finished run when it was opened.
     made : bool
-        Whether the folder was not there before.
+        Whether this run created the folder.
     """
 
     path: Path
@@ -62,14 +62,14 @@ class RunFolder:
         shutil.rmtree(self.path / "blocks", ignore_errors=True)
 
     def discard(self) -> None:
-        """Take back what `claim` wrote, for a run that turned out to be impossible."""
+        """Remove what `claim` wrote, for a run that proved invalid."""
         if any((self.path / "blocks").glob("[0-9]*.npz")) or (self.path / "data.zarr").exists():
-            return  # hours of work, perhaps
+            return  # never delete computed blocks
         shutil.rmtree(self.path / "blocks", ignore_errors=True)
         for name in ("design.toml", "run.json"):
             (self.path / name).unlink(missing_ok=True)
         if self.made:
-            with suppress(OSError):  # something else was put in meanwhile
+            with suppress(OSError):  # something else was added meanwhile
                 self.path.rmdir()
 
 
@@ -81,7 +81,7 @@ def claim(
     allow_mixed: bool = False,
     **settings: Any,
 ) -> RunFolder:
-    """Make the folder of a run, or take up one that holds the very same run.
+    """Create the folder of a run, or reuse one that holds the same run.
 
     Parameters
     ----------
@@ -90,18 +90,18 @@ def claim(
     design : Design
         Resolved design; with verb and version it identifies the run.
     folder : str or Path, optional
-        Where to; by default a new folder under `runs`.
+        By default a new folder under `runs`.
     growing : Growing, optional
-        A count that a finished run may be taken on to.
+        Count of draws to which a finished run may be extended.
     allow_mixed : bool
-        Whether an unfinished run may go on on another type of processor.
+        Whether an unfinished run may resume on another type of processor.
     **settings
-        Whatever else the result depends on.
+        Other settings that the result depends on.
 
     Returns
     -------
     RunFolder
-        Unfinished, it is to be run or resumed; finished, its summary can be shown again.
+        If unfinished, run or resume it; if finished, show its summary again.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def claim(
 
 
 def _fresh(verb: str, design: Design) -> Path:
-    """A new folder; made at once, lest another process take the same."""
+    """Create a new folder; at once, so that no other process takes the same name."""
     RUNS.mkdir(parents=True, exist_ok=True)
     for number in itertools.count(1):
         path = RUNS / f"{design.name}-{verb}-{number}"
@@ -151,14 +151,14 @@ def _fresh(verb: str, design: Design) -> Path:
 
 
 def _empty(path: Path) -> bool:
-    """Whether a folder holds nothing, or only what a run leaves that was killed at its birth."""
+    """Whether a folder is empty, or holds only the remains of a run killed at its start."""
     return all(item.name == "run.part" for item in path.iterdir())
 
 
 def _same_run(path: Path, about: dict[str, Any], same: Design, allow_mixed: bool) -> RunFolder:
     where = f"--out {path}"
     if not (path / "run.json").is_file():
-        raise InputError("holds something that is not a run; give an empty or new folder", where)
+        raise InputError("holds other files than a run; give an empty or new folder", where)
     held = about_run(path)
     if held.get("verb") != about["verb"]:
         raise InputError(f"holds a run of {held.get('verb')!r}, not {about['verb']!r}", where)
@@ -174,8 +174,8 @@ def _same_run(path: Path, about: dict[str, Any], same: Design, allow_mixed: bool
     more = about.get("count", 0) - held.get("count", 0)
     if held.get("finished") and more < 0:
         raise InputError(
-            f"holds a run of {held['count']} realizations, {about['count']} are asked for: ask for "
-            "as many or more, or give another folder",
+            f"holds a run of {held['count']} realizations, {about['count']} are requested: request "
+            f"at least {held['count']}, or give another folder",
             where,
         )
     if held.get("finished") and more == 0:
@@ -187,8 +187,8 @@ def _same_run(path: Path, about: dict[str, Any], same: Design, allow_mixed: bool
 
 
 def about_run(path: Path) -> dict[str, Any]:
-    """What `run.json` says, if it is one of ours."""
+    """The content of `run.json`, checked to be that of a run."""
     held = read_json(path / "run.json")
     if not isinstance(held, dict) or not isinstance(held.get("provenance"), dict):
-        raise InputError("holds a run.json that is not of a run", str(path))
+        raise InputError("holds a run.json that drillctl did not write", str(path))
     return held

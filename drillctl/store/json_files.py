@@ -1,4 +1,4 @@
-"""Strict JSON, and files that are written whole or not at all."""
+"""Strict JSON, and files written atomically."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from drillctl.errors import InputError
 
 
 def strict(content: Any) -> Any:
-    """The same with None for every number that is not finite, and plain Python types."""
+    """Convert to plain Python types, with None for numbers that are not finite."""
     if isinstance(content, dict):
         return {str(key): strict(value) for key, value in content.items()}
     if isinstance(content, (list, tuple)):
         return [strict(value) for value in content]
-    if hasattr(content, "tolist"):  # of NumPy, which lists of names need not wait for
+    if hasattr(content, "tolist"):  # NumPy, recognised without importing it
         return strict(content.tolist())
     if isinstance(content, float) and not math.isfinite(content):
         return None
@@ -29,14 +29,14 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write beside the target and move: a reader sees a whole file or none."""
+    """Write to a temporary file and rename it: a reader sees the whole file or none."""
     part = path.with_suffix(".part")
     part.write_text(text, encoding="utf-8")
     part.replace(path)
 
 
 def read_json(path: Path) -> Any:
-    """What a file holds; refused (`InputError`) if it cannot be read."""
+    """Read a JSON file; `InputError` if it cannot be read."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -4,5 +4,5 @@ from __future__ import annotations
 
 
 def stored_name(name: str) -> str:
-    """Name of a variable on disk: zarr takes a slash, as a section's name may hold, for a group."""
+    """Name of a variable on disk: zarr reads a slash, which a section name may hold, as a group."""
     return name.replace("/", "%2F")

@@ -1,4 +1,4 @@
-"""What every result has in common: labelled data, a folder to be saved in.
+"""Base class of results: labelled data, saved to a folder.
 
 A result is a frozen dataclass. Its arrays are labelled where they are declared:
 
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 class Label:
     """Dimensions, unit and meaning of an array or of a dictionary of arrays."""
 
-    # "axes" stands for the paths of the owner's axes; {name} for an attribute of the owner
+    # "axes" means the paths of the axes of the object; {name} an attribute of the object
     dims: tuple[str, ...] = ()
-    unit: str | Callable[[str], str] = "1"  # SI; of a dictionary a function of the key
+    unit: str | Callable[[str], str] = "1"  # SI; for a dictionary a function of the key
     means: str | Callable[[str], str] = ""
-    name: str = ""  # of the variable, if not that of the field
-    flat: bool = False  # whether names inside begin without the name of this field
-    over: str = ""  # dimension along which the arrays of a tuple of like objects are stacked
-    flags: tuple[str, ...] = ()  # meanings of the whole numbers 0, 1, ...
+    name: str = ""  # of the variable; default: that of the field
+    flat: bool = False  # whether names inside omit the name of this field
+    over: str = ""  # dimension along which arrays of a tuple of objects are stacked
+    flags: tuple[str, ...] = ()  # meanings of the integers 0, 1, ...
 
 
 def label(
@@ -52,10 +52,10 @@ def label(
 
 
 class Result:
-    """Base of what studies return: frozen dataclasses with a design and labelled arrays."""
+    """Base class of results: frozen dataclasses with a design and labelled arrays."""
 
     kind: ClassVar[str]
-    """Name of the study that computes it: the command that makes the same folder."""
+    """Name of the study that computes it, which is its command."""
 
     def __init_subclass__(cls) -> None:
         """Document the fields of a result from their labels, for `help` and the reference."""
@@ -82,15 +82,15 @@ class Result:
         return dataset(self)
 
     def derived(self) -> dict[str, Any]:
-        """Further variables of `data` that follow from the fields and are not read back."""
+        """Further variables of `data`, computed from the fields and not read back."""
         return {}
 
     def requested(self) -> tuple[Design, dict[str, Any]]:
-        """The design that gives this result again, and the settings that it does not hold."""
+        """The design and the further settings that reproduce this result."""
         return self.design, {}
 
     def growing(self) -> Growing | None:
-        """The count that a finished run may be extended to; None for a fixed run."""
+        """The count of draws to which a run may be extended; None for a fixed run."""
         return None
 
     def write(self, folder: Path) -> None:
@@ -105,7 +105,7 @@ class Result:
         Parameters
         ----------
         folder : str or Path
-            New, empty, or holding the very same run.
+            New, empty, or holding the same run.
 
         Returns
         -------
@@ -115,7 +115,7 @@ class Result:
         Raises
         ------
         InputError
-            The folder holds something else, or cannot be written.
+            The folder holds other files, or cannot be written.
         """
         from drillctl.store.saving import save
 

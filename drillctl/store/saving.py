@@ -1,4 +1,4 @@
-"""A result into its folder, and back."""
+"""Save a result to a folder, and read it back."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def save(result: Any, folder: str | Path) -> Path:
     result : Sweep, Simulation, Modes, LoopAnalysis, LoopMap, ...
         Anything with `.design`, `.data` and `.summary()`.
     folder : str or Path
-        New, empty, or holding the very same run.
+        New, empty, or holding the same run.
 
     Returns
     -------
@@ -48,8 +48,8 @@ def save(result: Any, folder: str | Path) -> Path:
     Raises
     ------
     InputError
-        The folder holds something else, or cannot be written; or the result is of a bare
-        string and has no design to go with it.
+        The folder holds other files, or cannot be written; or the result was computed from a
+        string without a design.
     """
     if isinstance(result, Result):
         design, settings = result.requested()
@@ -87,10 +87,10 @@ def open(folder: str | Path) -> Any:
 
     path = Path(folder)
     if not (path / "run.json").is_file():
-        raise InputError("is not a saved run: there is no run.json", str(path))
+        raise InputError("is not a saved run: run.json is missing", str(path))
     about = about_run(path)
     if not about.get("finished"):
-        raise InputError("holds a run that is not finished; run the command again", str(path))
+        raise InputError("holds an unfinished run; run the command again", str(path))
     if (path / TREE).is_file():
         return read(path)
     kind = next((one for one in _kinds() if one.verb == about.get("verb")), None)

@@ -1,7 +1,7 @@
-"""Tables of results: one content for the terminal, CSV files and reports.
+"""Tables of results: one object for the terminal, CSV files and reports.
 
-Cells hold SI numbers, text or nothing. People read them in their own units; a CSV file keeps SI,
-and has two further columns for the ends of an interval.
+Cells hold SI numbers, text or None. Terminal and report use the units of the reader; a CSV file
+keeps SI, with two more columns for the ends of an interval.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from drillctl import units
 from drillctl.store.json_files import write_text
 
 NOTHING = "–"
-"""Where there is no number."""
+"""Shown in place of a missing number."""
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -48,22 +48,22 @@ class Column:
     """A column of a table."""
 
     name: str  # head in a CSV file
-    label: str = ""  # head for people, if not the name
+    label: str = ""  # head for a reader; default: the name
     unit: str = ""  # SI
-    digits: int = 4  # significant ones, for people
+    digits: int = 4  # significant, for a reader
     percent: bool = False  # whether a share is shown in percent
-    signed: bool = False  # whether a plus is shown, as of differences
+    signed: bool = False  # whether a plus is shown, as for differences
     interval: bool = False  # whether cells are estimates
-    hidden: bool = False  # whether it stands in the CSV file alone
+    hidden: bool = False  # whether it is in the CSV file only
 
     def head(self, system: units.System) -> str:
-        """The head for people, with its unit."""
+        """The head for a reader, with its unit."""
         unit = "%" if self.percent else displayed_unit(self.unit, system)
         text = self.label or self.name
         return f"{text} ({unit})" if unit else text
 
     def text(self, cell: Cell, system: units.System) -> str:
-        """A cell as people read it."""
+        """The text of a cell for a reader."""
         if isinstance(cell, Estimate):
             return self._estimate(cell, system)
         if isinstance(cell, Quantity):
@@ -97,7 +97,7 @@ class Column:
         return [self.name, f"{self.name}_low", f"{self.name}_high"]
 
     def fields(self, cell: Cell) -> list[Any]:
-        """Fields of a cell in a CSV file; empty where there is no finite number."""
+        """Fields of a cell in a CSV file; empty without a finite number."""
         if not self.interval:
             return [_field(cell)]
         if not isinstance(cell, Estimate):
@@ -113,14 +113,14 @@ class Table:
     title: str  # what it shows
     columns: tuple[Column, ...]
     rows: Iterable[Sequence[Cell]]
-    shown: bool = True  # to people; else in its file alone
+    shown: bool = True  # on terminal and in reports; else in the CSV file only
 
     def heads(self, system: units.System) -> list[str]:
-        """Heads for people."""
+        """Heads for a reader."""
         return [column.head(system) for column in self.columns if not column.hidden]
 
     def texts(self, system: units.System) -> list[list[str]]:
-        """Rows for people."""
+        """Rows for a reader."""
         return [
             [
                 column.text(cell, system)
@@ -132,7 +132,7 @@ class Table:
 
 
 def write_csv(table: Table, folder: Path) -> None:
-    """Write a table as `NAME.csv`, in SI, whole or not at all."""
+    """Write a table as `NAME.csv`, in SI, atomically."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([head for column in table.columns for head in column.heads()])
@@ -173,7 +173,7 @@ def _field(value: Cell) -> Any:
 
 
 def number(value: float | None, digits: int = 4) -> str:
-    """A number with so many significant digits, without needless zeros."""
+    """Format a number with significant digits, without trailing zeros."""
     if value is None or math.isnan(value):
         return NOTHING
     if math.isinf(value):
@@ -192,17 +192,17 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def percent(share: float | None, digits: int = 3) -> str:
-    """A share in percent."""
+    """Format a share in percent."""
     return NOTHING if share is None else f"{number(100.0 * share, digits)} %"
 
 
 def between(low: float | None, high: float | None, digits: int = 4) -> str:
-    """From the least to the largest value."""
+    """Format a range of values."""
     return f"{number(low, digits)} to {number(high, digits)}"
 
 
 def chance(share: float, interval: Iterable[float | None]) -> str:
-    """A probability with its 95 % interval, in percent."""
+    """Format a probability with its 95 % interval, in percent."""
     low, high = interval
     if low is None or high is None:
         return percent(share)
@@ -210,7 +210,7 @@ def chance(share: float, interval: Iterable[float | None]) -> str:
 
 
 def displayed_unit(si_unit: str, system: units.System) -> str:
-    """The unit that people read for one of SI; empty for a pure number."""
+    """The displayed unit for an SI unit; empty for a pure number."""
     if si_unit in ("", "1"):
         return ""
     name = "kJ" if si_unit == "J" else units.displayed(1.0, si_unit, system)[1]
@@ -218,14 +218,14 @@ def displayed_unit(si_unit: str, system: units.System) -> str:
 
 
 def scaled(value: float, si_unit: str, system: units.System) -> float:
-    """A value in the unit that people read."""
+    """Convert an SI value to the displayed unit."""
     if si_unit in ("", "1"):
         return value
     return value / 1e3 if si_unit == "J" else float(units.displayed(value, si_unit, system)[0])
 
 
 def quantity(value: float | None, si_unit: str, system: units.System, digits: int = 4) -> str:
-    """A value in SI as people read it, with its unit."""
+    """Format an SI value with its displayed unit."""
     if value is None:
         return NOTHING
     unit = displayed_unit(si_unit, system)

@@ -538,7 +538,7 @@ def test_traceback_only_with_debug(call):
         (SimulationError("step size fell to zero"), "drillctl: step size fell to zero"),
         (
             ZeroDivisionError("by zero"),
-            "drillctl: ZeroDivisionError: by zero (--debug shows where)",
+            "drillctl: ZeroDivisionError: by zero (--debug prints the traceback)",
         ),
     ],
 )

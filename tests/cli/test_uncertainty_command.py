@@ -216,7 +216,7 @@ def test_more_realizations_add_the_missing_ones_only(call, monkeypatch):
     assert after.summary()["levels"] == whole.summary()["levels"]
     code, _, err = call("uncertainty", PAPER, *SHORT, "--realizations", "12", "--out", "run")
     assert code == 2
-    assert "holds a run of 21 realizations, 12 are asked for" in err
+    assert "holds a run of 21 realizations, 12 are requested" in err
     ran.clear()
     code, _, err = call("uncertainty", PAPER, *SHORT, "--realizations", "21", "--out", "run")
     assert (code, err, ran) == (0, "already done: run\n", [])

@@ -339,7 +339,7 @@ PIPE_KEY = "drillstring.sections.pipe"
         (rig(string=f"{PIPE}elements = 2.5\n"), f"{PIPE_KEY}.elements",
          "2.5 is not a whole number"),
         (rig(string=f"{PIPE}elements = 0x{'F' * 4000}\n"), f"{PIPE_KEY}.elements",
-         "an enormous number is not allowed: at most 1000000000"),
+         "a number of more than 18 digits is not allowed: at most 1000000000"),
         (rig(string=f"{PIPE}tool_joint_factor = 0\n"), f"{PIPE_KEY}.tool_joint_factor",
          "0 is not allowed: it must be greater than 0"),
         (rig(string=f'{PIPE}drag = "-1 N*s/rad"\n'), f"{PIPE_KEY}.drag",
