@@ -1,8 +1,8 @@
 """The command line: one generic command for studies, functions for the rest; no numerics.
 
-`app.py` holds the program and its exit codes, `options.py` the shared options, `verb.py` the command
-of a study. Every command takes a design by path or shipped name. Exit codes: 0 done, 2 invalid
-input, 130 interrupted, 1 anything else.
+`app.py` holds the program and its exit codes, `options.py` the shared options, `verb.py` the
+command of a study. Every command takes a design by path or shipped name. Exit codes: 0 done,
+2 invalid input, 130 interrupted, 1 anything else.
 """
 
 from collections.abc import Callable
