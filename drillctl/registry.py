@@ -6,7 +6,7 @@ low in the house can reach what it does not know.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from typing import Any
 
@@ -35,7 +35,11 @@ WEIGHT_LAWS = (
 """Each module holds `LAWS`, a tuple of `drillctl.rig.weight_on_bit.law.WeightOnBitLaw`."""
 
 STUDIES: tuple[str, ...] = (
+    "drillctl.studies.modes",
+    "drillctl.studies.loop",
+    "drillctl.studies.loop_mapping",
     "drillctl.studies.simulate",
+    "drillctl.studies.cycle",
     "drillctl.studies.map",
     "drillctl.studies.uncertainty",
     "drillctl.studies.three_regions",
@@ -49,6 +53,18 @@ def resolve(place: str) -> Any:
     """What stands at `module:name`."""
     module, _, name = place.partition(":")
     return getattr(import_module(module), name)
+
+
+def at_first_use(package: str, modules: Mapping[str, tuple[str, ...]]) -> Callable[[str], Any]:
+    """The `__getattr__` of a package: each of its names is imported when it is first used."""
+    home = {name: module for module, names in modules.items() for name in names}
+
+    def look_up(name: str) -> Any:
+        if name not in home:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return resolve(f"{package}.{home[name]}:{name}")
+
+    return look_up
 
 
 def gathered(modules: Iterable[str], name: str) -> tuple[Any, ...]:

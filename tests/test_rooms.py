@@ -23,11 +23,10 @@ ROOMS = (
 UPWARD = {
     ("plots", "studies"),
     ("store", "ensemble"),
-    ("store", "linear"),
     ("store", "simulation"),
     ("store", "studies"),
 }
-CIRCLES = {"linear", "store"}  # rooms that hold one
+CIRCLES = {"store"}  # rooms that hold one
 LEAVING = ("printing",)  # folders that are no room
 STRAY: set[str] = set()  # modules beside the rooms that are not of the ground
 

@@ -11,7 +11,6 @@ from drillctl.cli import (
     advantage,
     comparisons,
     files,
-    linear,
     reports,
     tuning,
 )
@@ -25,9 +24,6 @@ VERBS: dict[str, tuple[Callable[..., None], Group]] = {
     "new": (files.new, "Describe a rig"),
     "show": (files.show, "Describe a rig"),
     "validate": (files.validate, "Describe a rig"),
-    "modes": (linear.modes, "Analyse the loop"),
-    "loop": (linear.loop, "Analyse the loop"),
-    "cycle": (linear.cycle, "Analyse the loop"),
     "compare": (comparisons.compare, "Decide"),
     "delay": (comparisons.delay, "Decide"),
     "advantage": (advantage.advantage, "Decide"),

@@ -13,7 +13,7 @@ import typer
 from drillctl.cli import console
 from drillctl.cli.options import Axes, Common, DesignName, Sets, common_options, loaded, with_axes
 from drillctl.errors import InputError
-from drillctl.studies.base import Option, Run, Study, studies
+from drillctl.studies.base import Option, Run, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,16 +29,13 @@ def command(study: Study) -> Callable[..., None]:
     shared = dict(inspect.signature(common_options, eval_str=True).parameters)
     shared["units"] = shared["units"].replace(default=study.system)
     own = [_parameter(option) for option in study.options]
-    if study.axes or study.instead:
+    if study.axes:
         own.insert(0, inspect.Parameter("axis", _KEYWORD, default=None, annotation=Axes))
 
     def verb(**given: Any) -> None:
         common = common_options(**{name: given.pop(name) for name in shared})
-        design = with_axes(loaded(given.pop("design"), given.pop("sets")), given.get("axis"))
-        chosen = study
-        if given.pop("axis", None) and study.instead:
-            chosen = studies()[study.instead]
-        perform(chosen, design, given, common)
+        design = loaded(given.pop("design"), given.pop("sets"))
+        perform(study, with_axes(design, given.pop("axis", None)), given, common)
 
     parameters = [
         inspect.Parameter("design", _KEYWORD, annotation=DesignName),

@@ -35,6 +35,7 @@ from drillctl.linear.loop_analysis import (
     loop,
 )
 from drillctl.linear.loop_margins import Margins, margins
+from drillctl.linear.loop_model import closed_loop
 from drillctl.linear.modal import Mode, Modes, modes
 from drillctl.linear.operating_point import (
     OperatingPoint,
@@ -50,7 +51,7 @@ from drillctl.linear.response import (
 )
 from drillctl.linear.root_loci import RootLocus, root_locus
 from drillctl.linear.slope_margin import slope_margin, slope_margins
-from drillctl.linear.state_space import closed_loop, open_loop, plant
+from drillctl.linear.state_space import open_loop, plant
 from drillctl.linear.tuning import DriveImpedance, drive_impedance
 
 __all__ = [

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.loop_model import with_slope
+from drillctl.linear.loop_model import closed_loop, with_slope
 from drillctl.linear.operating_point import operating_point
 from drillctl.linear.state_space import (
     INPUTS,
     LOOP_OUTPUTS,
     OUTPUTS,
     StateMatrices,
-    closed_loop,
     closed_loop_matrices,
     open_loop_matrices,
     plant_matrices,

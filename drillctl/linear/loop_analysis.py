@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,7 @@ from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
 from drillctl.linear.slope_margin import slope_margin
 from drillctl.rig.weight_on_bit import PATHS
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
+from drillctl.store.result import Result, label
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
@@ -37,50 +33,40 @@ WEIGHTS = np.geomspace(1e-3, 20.0, 201)
 
 
 @dataclass(frozen=True, eq=False)
-class LoopAnalysis:
+class LoopAnalysis(Result):
     """Poles, margins and critical operating points of one design.
 
-    Attributes
-    ----------
-    design : Design
-        The rig.
-    operating_point : OperatingPoint
-        Steady drilling about which the loop is linear.
-    stable : bool
-        Whether the equilibrium is stable: the slope is under its margin. Not read from the poles:
-        of an undamped string the damping of the highest modes is below their rounding.
-    poles : ndarray of complex, shape (states,)
-        Of the loop with the slope of the rock (1/s), by magnitude.
-    slope_margin : float
-        D*: falling slope that the loop tolerates (N m s/rad); NaN where it is not stable even
-        without slope, infinite where it tolerates any.
-    deciding_frequency_hz : float
-        Frequency of the poles that decide it (Hz); 0 for a real pole.
-    continuum_slope_margin : float or None
-        D* of the exact continuum, as far as its lowest modes; None where it has none.
-    margins : Margins or None
-        Broken at the top torque; None for a loop that is not stable.
-    weight_delay_margin : float or None
-        Further delay of a moving weight on bit that the loop bears (s), infinite if any; None
-        without one, or for a loop that is not stable.
-    critical_speed : float or None
-        Speed nearest to the set speed at which stability changes (rad/s).
-    critical_weight_on_bit : float or None
-        Weight nearest to the operating one at which stability changes (N), within the friction
-        table unless the design allows more.
+    Whether the equilibrium is stable is not read from the poles: of an undamped string the
+    damping of the highest modes is below their rounding. The slope margin is NaN where the loop
+    is not stable even without slope, infinite where it tolerates any. The critical weight lies
+    within the friction table unless the design allows more.
     """
 
-    design: Design
-    operating_point: OperatingPoint
-    stable: bool
-    poles: ComplexArray
-    slope_margin: float
-    deciding_frequency_hz: float
-    continuum_slope_margin: float | None
-    margins: Margins | None
-    weight_delay_margin: float | None
-    critical_speed: float | None
-    critical_weight_on_bit: float | None
+    kind: ClassVar[str] = "loop"
+
+    design: Design = label(means="the rig")
+    operating_point: OperatingPoint = label(means="steady drilling about which the loop is linear")
+    stable: bool = label(means="whether the slope of the rock is under its margin")
+    poles: ComplexArray = label("pole", unit="1/s", means="poles of the loop, rock included")
+    slope_margin: float = label(unit="N*m*s/rad", means="falling slope that the loop tolerates, D*")
+    deciding_frequency_hz: float = label(
+        unit="Hz", means="frequency of the poles that decide it, 0 for a real pole"
+    )
+    continuum_slope_margin: float | None = label(
+        unit="N*m*s/rad",
+        means="D* of the exact continuum, of its lowest modes, if it has one",
+    )
+    margins: Margins | None = label(means="at the top torque; None if the loop is not stable")
+    weight_delay_margin: float | None = label(
+        unit="s",
+        means="further delay of a moving weight on bit that a stable loop bears, infinite if any",
+    )
+    critical_speed: float | None = label(
+        unit="rad/s", means="speed nearest to the set speed at which stability changes"
+    )
+    critical_weight_on_bit: float | None = label(
+        unit="N", means="weight nearest to the operating one at which stability changes"
+    )
 
     @property
     def bit_side(self) -> BitSide:
@@ -127,27 +113,9 @@ class LoopAnalysis:
             ],
         }
 
-    @property
-    def data(self) -> xarray.Dataset:
-        """The poles, with the summary's numbers as attributes."""
-        import xarray
-
-        numbers = {
-            "slope": self.operating_point.slope,
-            "slope_margin": self.slope_margin,
-            "deciding_frequency_hz": self.deciding_frequency_hz,
-        }
-        variables = {
-            "pole_real": ("pole", self.poles.real, {"units": "1/s"}),
-            "pole_imag": ("pole", self.poles.imag, {"units": "rad/s"}),
-        }
-        return xarray.Dataset(variables, attrs=numbers)
-
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """The design, of which this is all but the map."""
+        return self.design, {"no_map": True}
 
 
 def loop(design: Design) -> LoopAnalysis:

@@ -11,17 +11,28 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drillctl.design import Design
 from drillctl.linear.ends import BitSide, WeightPath
-from drillctl.linear.state_space import StateMatrices, closed_loop_matrices, plant_matrices
+from drillctl.linear.state_space import (
+    LOOP_OUTPUTS,
+    StateMatrices,
+    closed_loop_matrices,
+    named,
+    plant_matrices,
+    state_names,
+    string_states,
+)
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.top_drive.real_drive import MEMORY, respond
+
+if TYPE_CHECKING:
+    import control
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
@@ -191,6 +202,47 @@ def _seen_only(matrices: StateMatrices) -> StateMatrices:
     if len(kept) == len(a):
         return matrices
     return _seen_only(StateMatrices(a[np.ix_(kept, kept)], b[kept], c[:, kept], d))
+
+
+def closed_loop(design: Design) -> control.StateSpace:
+    """The string closed with its top-drive law, the bit torque left as an input.
+
+    The torque is kp (set_speed - top_speed) + ki integral, Eq. 2 of Monteiro & Trindade
+    (2012). Speeds are absolute; under a constant-torque law, whose level is left out, every
+    signal is the change from steady drilling and `set_speed` acts on nothing.
+
+    Parameters
+    ----------
+    design : Design
+        The rig; its top-drive law gives the gains.
+
+    Returns
+    -------
+    control.StateSpace
+        `closed_loop`. Inputs `set_speed` (rad/s) and `bit_torque` (N m), outputs those of the
+        plant and `top_torque` (N m). States of the plant and, with integral action, `integral`
+        (rad, of the speed error).
+    """
+    inputs = ("set_speed", "bit_torque")
+    if not design.simple_drive:
+        return _whole_loop(design)
+    kp, ki = design.top_drive.gains()
+    return named(
+        closed_loop_matrices(design.string, kp, ki),
+        "closed_loop",
+        inputs,
+        LOOP_OUTPUTS,
+        state_names(design.string.nodes, ki),
+    )
+
+
+def _whole_loop(design: Design) -> control.StateSpace:
+    """The loop of a drive with filters and lags; its states beyond the string are numbered."""
+    matrices = loop_model(design, BitSide(0.0))
+    strings = string_states(design.string.nodes)
+    others = [f"drive_{i}" for i in range(1, len(matrices.a) - len(strings) + 1)]
+    inputs = ("set_speed", "bit_torque")
+    return named(matrices, "closed_loop", inputs, LOOP_OUTPUTS, [*strings, *others])
 
 
 def model_poles(design: Design, bit: BitSide) -> ComplexArray:

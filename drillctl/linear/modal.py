@@ -10,25 +10,22 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.poles import DIAGONAL, Pole, fixed_top_poles, free_free_poles
 from drillctl.linear.transmission import EndMobility
 from drillctl.rig.drillstring import Drillstring, Parts
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
-
-    from drillctl.design import Design
+from drillctl.store.result import Result, label
 
 Array = NDArray[np.float64]
 
+COUNT = 10
+"""Modes of each list unless others are requested."""
 RIGID_TWIST = 1e-12
 """Twist of an element taken as rounding, over the largest angle of the string."""
 
@@ -57,34 +54,28 @@ class Mode:
     frequency_hz: float
     damping_ratio: float | None
     overdamped: bool
-    shape: Array
-    torque_shape: Array
+    shape: Array = label("node")
+    torque_shape: Array = label("element")
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class Modes(Result):
     """Modes of a string with its top free and with its top held.
 
-    Attributes
-    ----------
-    free_free : tuple of Mode
-        Both ends free, inertias of top drive and BHA included; the rigid body first, then by
-        rising frequency.
-    fixed_top : tuple of Mode
-        The top drive held still; by rising frequency.
-    node_depth : ndarray, shape (nodes,)
-        Measured depth of the nodes (m); all zero for a lumped string.
-    element_depth : ndarray, shape (elements,)
-        Depth of the middle of the elements (m).
-    design : Design or None
-        The rig they belong to; None for the modes of a bare string.
+    With both ends free, inertias of top drive and BHA included, the rigid body comes first, then
+    by rising frequency. All depths of a lumped string are zero.
     """
 
-    free_free: tuple[Mode, ...]
-    fixed_top: tuple[Mode, ...]
-    node_depth: Array
-    element_depth: Array
-    design: Design | None = None
+    kind: ClassVar[str] = "modes"
+
+    free_free: tuple[Mode, ...] = label(over="free_free_mode", means="both ends free")
+    fixed_top: tuple[Mode, ...] = label(over="fixed_top_mode", means="the top drive held still")
+    node_depth: Array = label("node", unit="m", means="measured depth of the nodes")
+    element_depth: Array = label("element", unit="m", means="depth of the middle of the elements")
+    design: Design | None = label(  # type: ignore[assignment]
+        default=None, means="the rig; None for a bare string"
+    )
+    count: int = label(default=COUNT, means="most entries requested of each list")
 
     def summary(self) -> dict[str, list[dict[str, Any]]]:
         """Frequencies (Hz) and damping ratios as strict JSON values.
@@ -100,27 +91,25 @@ class Modes:
             "fixed_top": [_entry(mode) for mode in self.fixed_top],
         }
 
-    @property
-    def data(self) -> xarray.Dataset:
-        """Frequencies, damping ratios (NaN where there is none) and shapes, with units."""
-        import xarray
+    def derived(self) -> dict[str, Any]:
+        """Frequencies and damping ratios, NaN where there is none."""
+        made: dict[str, Any] = {}
+        for support in ("free_free", "fixed_top"):
+            dim, found = f"{support}_mode", getattr(self, support)
+            ratios = [math.nan if m.damping_ratio is None else m.damping_ratio for m in found]
+            hertz = [m.frequency_hz for m in found]
+            made[f"{support}_frequency"] = (dim, hertz, {"units": "Hz"})
+            made[f"{support}_damping_ratio"] = (dim, ratios, {"units": "1"})
+        return made
 
-        coords = {
-            "node_depth": ("node", self.node_depth, {"units": "m"}),
-            "element_depth": ("element", self.element_depth, {"units": "m"}),
-        }
-        variables = _variables("free_free", self.free_free)
-        variables |= _variables("fixed_top", self.fixed_top)
-        return xarray.Dataset(variables, coords)
-
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """The rig, and the count if it is not the usual one."""
+        if self.design is None:
+            raise InputError("modes of a bare string have no design to be saved with", "save")
+        return self.design, {} if self.count == COUNT else {"count": self.count}
 
 
-def modes(subject: Design | Drillstring, count: int = 10) -> Modes:
+def modes(subject: Design | Drillstring, count: int = COUNT) -> Modes:
     """Modes of a string, without control and without bit-rock contact.
 
     Parameters
@@ -150,6 +139,7 @@ def modes(subject: Design | Drillstring, count: int = 10) -> Modes:
         node_depth=depth,
         element_depth=0.5 * (depth[:-1] + depth[1:]),
         design=None if isinstance(subject, Drillstring) else subject,
+        count=count,
     )
 
 
@@ -189,24 +179,6 @@ def _entry(mode: Mode) -> dict[str, Any]:
         "damping_ratio": mode.damping_ratio,
     }
     return entry | {"overdamped": True} if mode.overdamped else entry
-
-
-def _variables(support: str, found: tuple[Mode, ...]) -> dict[str, Any]:
-    """Variables of a dataset for one boundary condition."""
-    mode = f"{support}_mode"
-    ratios = [math.nan if m.damping_ratio is None else m.damping_ratio for m in found]
-    plain = {"units": "1"}
-    return {
-        f"{support}_frequency": (mode, [m.frequency_hz for m in found], {"units": "Hz"}),
-        f"{support}_damping_ratio": (mode, ratios, plain),
-        f"{support}_overdamped": (mode, [m.overdamped for m in found]),
-        f"{support}_shape": ((mode, "node"), np.array([m.shape for m in found]), plain),
-        f"{support}_torque_shape": (
-            (mode, "element"),
-            np.array([m.torque_shape for m in found]),
-            plain,
-        ),
-    }
 
 
 ComplexArray = NDArray[np.complexfloating[Any, Any]]

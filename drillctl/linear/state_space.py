@@ -116,8 +116,8 @@ def plant(string: Drillstring) -> control.StateSpace:
         damper of the first element, positive when the top leads), `twist` (rad, top minus
         bit). States `twist_1`... (rad) and `speed_0`... (rad/s).
     """
-    return _named(
-        plant_matrices(string), "drillstring", INPUTS, OUTPUTS, _string_states(string.nodes)
+    return named(
+        plant_matrices(string), "drillstring", INPUTS, OUTPUTS, string_states(string.nodes)
     )
 
 
@@ -145,7 +145,7 @@ def open_loop(design: Design) -> control.StateSpace:
         )
     kp, ki = design.top_drive.gains()
     inputs = ("speed_error", "bit_torque")
-    return _named(
+    return named(
         open_loop_matrices(design.string, kp, ki),
         "open_loop",
         inputs,
@@ -154,67 +154,25 @@ def open_loop(design: Design) -> control.StateSpace:
     )
 
 
-def closed_loop(design: Design) -> control.StateSpace:
-    """The string closed with its top-drive law, the bit torque left as an input.
-
-    The torque is kp (set_speed - top_speed) + ki integral, Eq. 2 of Monteiro & Trindade
-    (2012). Speeds are absolute; under a constant-torque law, whose level is left out, every
-    signal is the change from steady drilling and `set_speed` acts on nothing.
-
-    Parameters
-    ----------
-    design : Design
-        The rig; its top-drive law gives the gains.
-
-    Returns
-    -------
-    control.StateSpace
-        `closed_loop`. Inputs `set_speed` (rad/s) and `bit_torque` (N m), outputs those of the
-        plant and `top_torque` (N m). States of the plant and, with integral action, `integral`
-        (rad, of the speed error).
-    """
-    inputs = ("set_speed", "bit_torque")
-    if not design.simple_drive:
-        return _whole_loop(design)
-    kp, ki = design.top_drive.gains()
-    return _named(
-        closed_loop_matrices(design.string, kp, ki),
-        "closed_loop",
-        inputs,
-        LOOP_OUTPUTS,
-        state_names(design.string.nodes, ki),
-    )
-
-
-def _whole_loop(design: Design) -> control.StateSpace:
-    """The loop of a drive with filters and lags; its states beyond the string are numbered."""
-    from drillctl.linear.ends import BitSide
-    from drillctl.linear.loop_model import loop_model
-
-    matrices = loop_model(design, BitSide(0.0))
-    strings = _string_states(design.string.nodes)
-    others = [f"drive_{i}" for i in range(1, len(matrices.a) - len(strings) + 1)]
-    inputs = ("set_speed", "bit_torque")
-    return _named(matrices, "closed_loop", inputs, LOOP_OUTPUTS, [*strings, *others])
-
-
-def _string_states(nodes: int) -> list[str]:
+def string_states(nodes: int) -> list[str]:
+    """Names of the states of a string."""
     twists = [f"twist_{i}" for i in range(1, nodes)]
     return [*twists, *(f"speed_{i}" for i in range(nodes))]
 
 
 def state_names(nodes: int, ki: float) -> list[str]:
     """Names of a loop's states; without integral action those of the string alone."""
-    return [*_string_states(nodes), *(["integral"] if ki != 0.0 else [])]
+    return [*string_states(nodes), *(["integral"] if ki != 0.0 else [])]
 
 
-def _named(
+def named(
     matrices: StateMatrices,
     name: str,
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
     states: list[str],
 ) -> control.StateSpace:
+    """A system of python-control with named signals."""
     import control
 
     return control.StateSpace(

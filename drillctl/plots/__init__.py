@@ -1,103 +1,92 @@
-"""Figures of what the other rooms compute.
-
-- `modes.py`: `mode_shapes`, angle and torque of the modes along the string.
-- `frequency.py`: `bode`, response of any signals to one other, of one system or several.
-- `mobility.py`: `mobility` at bit and top; `impedance.py`: `drive_impedance` and reflection.
-- `loop_shape.py`: `nyquist`, `nichols` and `sensitivity` of the loop at the top torque.
-- `loop_map.py`: `loop_map`, figures of the loop over two parameters; `gain_boundary.py`: the
-  boundary of the stable gains.
-- `plane.py`: the plane that maps are drawn on; `colour_bars.py`.
-- `root_locus.py`: `root_locus`, poles of the loop against a parameter.
-- `friction.py`: `friction_curves`, bit torque against bit speed at each weight on bit.
-- `map.py`: `stability_map` with regions and audit; `sweep_line` for a single parameter.
-- `comparison.py`: `j1_distributions`, `paired_differences`, `j1_against_weight` of cases;
-  `compared_regions` and `compared_responses` of cases at their own values.
-- `following_weight.py`: `weight_delay`, a weight that follows the bit speed against its delay;
-  `advantage_cases`, `advantage_front`, `advantage_map` and `advantage_delay`, the same against a
-  constant weight.
-- `limit_cycle.py`: `limit_cycle`, one period by each method.
-- `three_regions.py`: `three_regions` over the same two parameters.
-- `regularisation.py`: `regularisation`, what smoothing the friction does to a map.
-- `tune_baselines.py`: `tune_baselines`, tuned gains beside others; `tune_neighbourhood.py`:
-  `tune_neighbourhood`, how far they may drift.
-- `uncertain_regions.py`: `uncertain_regions`, `probability_map` and `region_error` of draws.
-- `uncertain_curves.py`: `area_convergence`, `cell_distributions`, `sensitivity_bars`.
-- `time_response.py`: `time_response`, speeds against time with sticks shaded.
-- `style.py`: colours, sizes and the making of figures, shared by all.
+"""Pictures of what the other rooms compute.
 
 Every function takes `ax`, the axes to draw on, or makes a figure of its own; it returns the
 figure and never shows it. Nothing here touches the state of pyplot. Axes are in the units of
-the rig floor: rpm, kN, kN m, m.
+the rig floor: rpm, kN, kN m, m. What they share is in `style.py`: colours, sizes, planes, bars.
 """
 
-from drillctl.plots.comparison import (
-    compared_regions,
-    compared_responses,
-    j1_against_weight,
-    j1_distributions,
-    paired_differences,
-)
-from drillctl.plots.following_weight import (
-    advantage_cases,
-    advantage_delay,
-    advantage_front,
-    advantage_map,
-    weight_delay,
-)
-from drillctl.plots.friction import friction_curves
-from drillctl.plots.impedance import drive_impedance
-from drillctl.plots.loop_gains import gain_boundary, root_locus
-from drillctl.plots.loop_map import loop_map
-from drillctl.plots.loop_shape import nichols, nyquist, sensitivity
-from drillctl.plots.map import error_estimate, regularisation, stability_map, sweep_line
-from drillctl.plots.modes import bode, mobility, mode_shapes
-from drillctl.plots.three_regions import three_regions
-from drillctl.plots.time_response import limit_cycle, time_response
-from drillctl.plots.tune import tune_baselines, tune_neighbourhood
-from drillctl.plots.uncertainty import (
-    area_convergence,
-    cell_distributions,
-    probability_map,
-    region_error,
-    sensitivity_bars,
-    uncertain_regions,
-)
+from __future__ import annotations
 
-__all__ = [
-    "advantage_cases",
-    "advantage_delay",
-    "advantage_front",
-    "advantage_map",
-    "area_convergence",
-    "bode",
-    "cell_distributions",
-    "compared_regions",
-    "compared_responses",
-    "drive_impedance",
-    "error_estimate",
-    "friction_curves",
-    "gain_boundary",
-    "j1_against_weight",
-    "j1_distributions",
-    "limit_cycle",
-    "loop_map",
-    "mobility",
-    "mode_shapes",
-    "nichols",
-    "nyquist",
-    "paired_differences",
-    "probability_map",
-    "region_error",
-    "regularisation",
-    "root_locus",
-    "sensitivity",
-    "sensitivity_bars",
-    "stability_map",
-    "sweep_line",
-    "three_regions",
-    "time_response",
-    "tune_baselines",
-    "tune_neighbourhood",
-    "uncertain_regions",
-    "weight_delay",
-]
+from typing import TYPE_CHECKING
+
+from drillctl.registry import at_first_use
+
+if TYPE_CHECKING:
+    from drillctl.plots.comparison import compared_regions as compared_regions
+    from drillctl.plots.comparison import compared_responses as compared_responses
+    from drillctl.plots.comparison import j1_against_weight as j1_against_weight
+    from drillctl.plots.comparison import j1_distributions as j1_distributions
+    from drillctl.plots.comparison import paired_differences as paired_differences
+    from drillctl.plots.following_weight import advantage_cases as advantage_cases
+    from drillctl.plots.following_weight import advantage_delay as advantage_delay
+    from drillctl.plots.following_weight import advantage_front as advantage_front
+    from drillctl.plots.following_weight import advantage_map as advantage_map
+    from drillctl.plots.following_weight import weight_delay as weight_delay
+    from drillctl.plots.friction import friction_curves as friction_curves
+    from drillctl.plots.impedance import drive_impedance as drive_impedance
+    from drillctl.plots.loop_gains import gain_boundary as gain_boundary
+    from drillctl.plots.loop_gains import root_locus as root_locus
+    from drillctl.plots.loop_maps import loop_map as loop_map
+    from drillctl.plots.loop_shape import nichols as nichols
+    from drillctl.plots.loop_shape import nyquist as nyquist
+    from drillctl.plots.loop_shape import sensitivity as sensitivity
+    from drillctl.plots.map import error_estimate as error_estimate
+    from drillctl.plots.map import regularisation as regularisation
+    from drillctl.plots.map import stability_map as stability_map
+    from drillctl.plots.map import sweep_line as sweep_line
+    from drillctl.plots.modes import bode as bode
+    from drillctl.plots.modes import mobility as mobility
+    from drillctl.plots.modes import mode_shapes as mode_shapes
+    from drillctl.plots.regions import three_regions as three_regions
+    from drillctl.plots.time_response import limit_cycle as limit_cycle
+    from drillctl.plots.time_response import time_response as time_response
+    from drillctl.plots.tune import tune_baselines as tune_baselines
+    from drillctl.plots.tune import tune_neighbourhood as tune_neighbourhood
+    from drillctl.plots.uncertainty import area_convergence as area_convergence
+    from drillctl.plots.uncertainty import cell_distributions as cell_distributions
+    from drillctl.plots.uncertainty import probability_map as probability_map
+    from drillctl.plots.uncertainty import region_error as region_error
+    from drillctl.plots.uncertainty import sensitivity_bars as sensitivity_bars
+    from drillctl.plots.uncertainty import uncertain_regions as uncertain_regions
+
+_MODULES = {
+    "comparison": (
+        "compared_regions",
+        "compared_responses",
+        "j1_against_weight",
+        "j1_distributions",
+        "paired_differences",
+    ),
+    "following_weight": (
+        "advantage_cases",
+        "advantage_delay",
+        "advantage_front",
+        "advantage_map",
+        "weight_delay",
+    ),
+    "friction": ("friction_curves",),
+    "impedance": ("drive_impedance",),
+    "loop_gains": ("gain_boundary", "root_locus"),
+    "loop_maps": ("loop_map",),
+    "loop_shape": ("nichols", "nyquist", "sensitivity"),
+    "map": ("error_estimate", "regularisation", "stability_map", "sweep_line"),
+    "modes": ("bode", "mobility", "mode_shapes"),
+    "regions": ("three_regions",),
+    "time_response": ("limit_cycle", "time_response"),
+    "tune": ("tune_baselines", "tune_neighbourhood"),
+    "uncertainty": (
+        "area_convergence",
+        "cell_distributions",
+        "probability_map",
+        "region_error",
+        "sensitivity_bars",
+        "uncertain_regions",
+    ),
+}
+
+__all__ = [name for names in _MODULES.values() for name in names]
+__getattr__ = at_first_use(__name__, _MODULES)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -14,7 +14,7 @@ import drillctl
 from drillctl.design import Design
 from drillctl.reporting import cells
 from drillctl.studies import base
-from drillctl.studies.applies import fitting_map, in_batch, over_two_axes
+from drillctl.studies.applies import fitting_map, in_batch
 from drillctl.studies.base import Requested, Run, Study, studies
 
 if TYPE_CHECKING:
@@ -178,15 +178,6 @@ def _at_setting(asked: Requested) -> Design:
     return design.replace(values)
 
 
-def _moded(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    return drillctl.modes(design)
-
-
-def _looped(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    progress.begin("analysing the loop", 1)
-    return drillctl.loop(design)
-
-
 def _no_cases(asked: Requested) -> str:
     if not asked.design.tables.compare.cases:
         return "the design names no cases to compare ([compare])"
@@ -222,20 +213,11 @@ def _compared(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return drillctl.compare(design, progress=progress)
 
 
-def _loop_map(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    from drillctl import studies
-
-    return studies.loop_map(design, quantities=("slope_margin",), progress=progress)
-
-
 ALL = (
-    Recipe("modes", "the modes", "modes", _moded, settings={"count": 10}),
-    Recipe("loop", "the loop", "loop", _looped),
     Recipe("setting", "the draws at the current setting", "uncertainty", _setting, in_batch,
            _at_setting, settings={"axes": []}, told=_told_of_setting),
     Recipe("cells", "the responses over the map", "report-cells", _cells, fitting_map,
            needs=("map",), write=False, told=dict),
-    Recipe("slope-margin", "the slope margin over the map", "loop-map", _loop_map, over_two_axes),
     Recipe("compare", "the comparison", "compare", _compared, _both(_no_cases, in_batch)),
     Recipe("tune", "the tuning of the gains", "tune", _by_name("tune"),
            _both(_not_tuned, in_batch)),
@@ -244,8 +226,7 @@ ALL = (
 )  # fmt: skip
 """Every study that is no object yet, in the order in which they are done."""
 _ORDER = {
-    "modes": 0, "loop": 10, "setting": 30, "cells": 50, "slope-margin": 80,
-    "compare": 100, "tune": 110, "advantage": 120,
+    "setting": 30, "cells": 50, "compare": 100, "tune": 110, "advantage": 120,
 }  # fmt: skip
 
 

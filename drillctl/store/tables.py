@@ -226,7 +226,7 @@ def scaled(value: float, si_unit: str, system: units.System) -> float:
 
 def quantity(value: float | None, si_unit: str, system: units.System, digits: int = 4) -> str:
     """Format an SI value with its displayed unit."""
-    if value is None:
+    if value is None or math.isnan(value):
         return NOTHING
     unit = displayed_unit(si_unit, system)
     return f"{number(scaled(value, si_unit, system), digits)} {unit}".rstrip()

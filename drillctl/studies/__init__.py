@@ -23,11 +23,10 @@ if TYPE_CHECKING:
     from drillctl.studies.delay.compute import weight_delay as weight_delay
     from drillctl.studies.doctor.compute import Doctor as Doctor
     from drillctl.studies.doctor.compute import doctor as doctor
-    from drillctl.studies.loop_maps import LoopMap as LoopMap
-    from drillctl.studies.loop_maps import loop_map as loop_map
+    from drillctl.studies.loop_mapping.compute import LoopMap as LoopMap
+    from drillctl.studies.loop_mapping.compute import loop_map as loop_map
     from drillctl.studies.map.outputs import responses as responses
     from drillctl.studies.tables import write_comparison as write_comparison
-    from drillctl.studies.tables import write_loop_table as write_loop_table
     from drillctl.studies.tables import write_weight_delay as write_weight_delay
     from drillctl.studies.uncertainty.result import Uncertainty as Uncertainty
 
@@ -36,14 +35,14 @@ _HOME = {
     "Comparison": "drillctl.studies.compare.compute",
     "Doctor": "drillctl.studies.doctor.compute",
     "Draws": "drillctl.ensemble.parameters",
-    "LoopMap": "drillctl.studies.loop_maps",
+    "LoopMap": "drillctl.studies.loop_mapping.compute",
     "Region": "drillctl.ensemble.regions",
     "Sweep": "drillctl.ensemble.sweeps",
     "Uncertainty": "drillctl.studies.uncertainty.result",
     "WeightDelay": "drillctl.studies.delay.compute",
     "doctor": "drillctl.studies.doctor.compute",
     "draw": "drillctl.ensemble.parameters",
-    "loop_map": "drillctl.studies.loop_maps",
+    "loop_map": "drillctl.studies.loop_mapping.compute",
     "region": "drillctl.ensemble.regions",
     "responses": "drillctl.studies.map.outputs",
     "stability_map": "drillctl.ensemble.sweeps",
@@ -51,7 +50,6 @@ _HOME = {
     "uncertain_parameters": "drillctl.ensemble.parameters",
     "weight_delay": "drillctl.studies.delay.compute",
     "write_comparison": "drillctl.studies.tables",
-    "write_loop_table": "drillctl.studies.tables",
     "write_weight_delay": "drillctl.studies.tables",
 }
 

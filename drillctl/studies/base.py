@@ -131,7 +131,10 @@ class Section:
     title: str
     reads: tuple[str, ...]  # recipes
     order: int  # place among the sections
-    # blocks from what was gathered; by default remarks, pictures and tables of the first recipe
+    # tables and pictures in their order; by default remarks, pictures and tables of all recipes
+    shows: tuple[str, ...] = ()
+    text: str = ""  # last paragraph
+    # blocks from what was gathered, for what cannot be said so
     build: Callable[[Any], tuple[Any, ...]] | None = None
 
 
@@ -158,7 +161,6 @@ class Study:
     compute: Callable[[Design, Run], Any]
     options: tuple[Option, ...] = ()
     axes: bool = False  # whether `--axis` sets the axes of the map
-    instead: str = ""  # study that takes over where `--axis` is given
     command: bool = True  # whether it is a command of its own
     python: str = ""  # name in `drillctl`, if any
     call: str = ""  # "module:function" that it stands for

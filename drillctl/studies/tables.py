@@ -6,26 +6,9 @@ import csv
 from pathlib import Path
 
 from drillctl.ensemble.cases import QUANTILES
-from drillctl.ensemble.grid import over_axes
 from drillctl.simulation.measures import STATUSES
-from drillctl.store.tables import texts, write_columns
 from drillctl.studies.compare.compute import MEASURES, Comparison
 from drillctl.studies.delay.compute import WeightDelay
-from drillctl.studies.loop_maps import LoopMap
-
-
-def write_loop_table(result: LoopMap, folder: Path) -> None:
-    """Write `loop-map.csv`, a row a cell; SI units, empty where a figure is undefined.
-
-    Parameters
-    ----------
-    result : LoopMap
-        What was computed.
-    folder : Path
-        Where to.
-    """
-    columns = {name: texts(values) for name, values in result.values.items()}
-    write_columns(folder / "loop-map.csv", over_axes(result.axes) | columns)
 
 
 def write_comparison(result: Comparison, folder: Path) -> None:

@@ -333,8 +333,8 @@ def test_data_carries_units():
     data = of(count=3).data
     assert data.free_free_frequency.attrs["units"] == "Hz"
     assert data.node_depth.attrs["units"] == "m"
-    assert data.free_free_shape.shape == (3, 31)
-    assert data.fixed_top_torque_shape.shape == (3, 30)
+    assert data["free_free.shape"].shape == (3, 31)
+    assert data["fixed_top.torque_shape"].shape == (3, 30)
     assert np.isnan(data.free_free_damping_ratio[0])
     assert float(data.fixed_top_frequency[0]) == pytest.approx(0.127538, abs=6e-7)
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import drillctl
 from drillctl.errors import InputError
-from drillctl.plots.three_regions import OUTLINE, three_regions
+from drillctl.plots.regions import OUTLINE, three_regions
 from drillctl.studies import Axis
 from drillctl.studies.three_regions.compute import FIELDS, MASKS, ThreeRegions
 

@@ -15,9 +15,6 @@ from drillctl.reporting.sections import (
     advantage,
     audit,
     comparison,
-    loop,
-    modes,
-    operating_point,
     responses,
     rig,
     stability,
@@ -25,7 +22,7 @@ from drillctl.reporting.sections import (
     tuning,
     uncertainty,
 )
-from drillctl.studies.base import Study, studies
+from drillctl.studies.base import Section, studies
 
 
 class Kind(NamedTuple):
@@ -41,9 +38,6 @@ KINDS = (
     Kind("summary", "Summary and verdict",
          ("simulate", "loop", "setting", "map", "cells", "uncertainty", "tune"), summary.build),
     Kind("rig", "The rig", (), rig.build),
-    Kind("operating-point", "Operating point and friction", ("loop",), operating_point.build),
-    Kind("modes", "Modes of the string", ("modes",), modes.build),
-    Kind("loop", "The linear loop", ("loop", "slope-margin"), loop.build),
     Kind("map", "J1 over the map", ("map", "cells"), stability.build),
     Kind("responses", "Time responses", ("simulate", "cells", "best", "bad"), responses.build),
     Kind("uncertainty", "Uncertainty", ("uncertainty", "setting"), uncertainty.build),
@@ -64,15 +58,28 @@ _ORDER = {
 }  # fmt: skip
 
 
-def _generic(name: str, study: Study) -> Callable[[Gathered], tuple[Block, ...]]:
-    """Remarks, pictures and tables of a study, for a section that says no more."""
+def _generic(section: Section) -> Callable[[Gathered], tuple[Block, ...]]:
+    """Remarks, pictures and tables of a section's studies, or those that it names."""
+    owners = {recipe.name: study for study in studies().values() for recipe in study.recipes}
 
     def build(gathered: Gathered) -> tuple[Block, ...]:
-        result, system = gathered.need(name).result, gathered.words.system
-        blocks: list[Block] = [Text(remark) for remark in study.remarks(result, system)]
-        blocks += [figure(picture, name, system) for picture in study.pictures(result)]
-        blocks += [block(table, system) for table in study.tables(result) if table.shown]
-        return tuple(blocks)
+        system = gathered.words.system
+        gathered.need(section.reads[0])
+        said: list[Block] = []
+        parts: list[tuple[str, Block]] = []
+        for name in section.reads:
+            found = gathered.have(name)
+            if found is None:
+                continue
+            study, result = owners[name], found.result
+            said += [Text(remark) for remark in study.remarks(result, system)]
+            parts += [(p.name, figure(p, name, system)) for p in study.pictures(result)]
+            parts += [(t.name, block(t, system)) for t in study.tables(result) if t.shown]
+        if section.shows:
+            said = []
+            parts = [one for wanted in section.shows for one in parts if one[0] == wanted]
+        last = (Text(section.text),) if section.text else ()
+        return (*said, *(part for _, part in parts), *last)
 
     return build
 
@@ -82,7 +89,7 @@ def _sections() -> dict[str, Kind]:
     placed = [(_ORDER[kind.name], kind) for kind in KINDS]
     for study in studies().values():
         for one in study.sections:
-            build = one.build or _generic(one.reads[0], study)
+            build = one.build or _generic(one)
             placed.append((one.order, Kind(one.name, one.title, one.reads, build)))
     return {kind.name: kind for _, kind in sorted(placed, key=lambda pair: pair[0])}
 

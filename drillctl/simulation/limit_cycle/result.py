@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,7 @@ from drillctl.simulation.limit_cycle.describing import (
 )
 from drillctl.simulation.limit_cycle.returns import Returns, judge, long_run
 from drillctl.simulation.limit_cycle.shooting import Orbit
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
+from drillctl.store.result import Result, label
 
 Array = NDArray[np.float64]
 
@@ -35,30 +31,26 @@ PERIODS = 40
 FEWEST_PERIODS = 16
 """Fewest of them: half are thrown away, and some are needed to see whether they repeat."""
 
+TOLERANCE = 1e-8
+"""Of the reference solver in the long simulation."""
+
 
 @dataclass(frozen=True, eq=False)
-class LimitCycle:
-    """What a design does in the long run, by three methods.
+class LimitCycle(Result):
+    """What a design does in the long run, by three methods."""
 
-    Attributes
-    ----------
-    design : Design
-        What was computed.
-    status : str
-        One of `returns.STATUSES`.
-    harmonic : tuple of HarmonicCycle
-        By harmonic balance, lowest frequency first.
-    orbit : Orbit or None
-        The exact periodic motion; None unless the status is `periodic`.
-    simulated : Returns
-        The long simulation.
-    """
+    kind: ClassVar[str] = "cycle"
 
-    design: Design
-    status: str
-    harmonic: tuple[HarmonicCycle, ...]
-    orbit: Orbit | None
-    simulated: Returns
+    design: Design = label(means="what was computed")
+    status: str = label(means="one of `returns.STATUSES`")
+    harmonic: tuple[HarmonicCycle, ...] = label(means="by harmonic balance, lowest frequency first")
+    orbit: Orbit | None = label(
+        flat=True, means="the exact periodic motion; None unless the status is `periodic`"
+    )
+    simulated: Returns = label(flat=True, means="the long simulation")
+    settings: dict[str, Any] = label(
+        default_factory=dict, means="what was requested that is not the usual"
+    )
 
     @property
     def predicted(self) -> HarmonicCycle | None:
@@ -75,53 +67,20 @@ class LimitCycle:
             "simulated": self.simulated.summary(),
         }
 
-    @property
-    def data(self) -> xarray.Dataset:
-        """One cycle as a labelled dataset, from the moment the bit speeds up through its mean.
-
-        Over `time` the orbit and the harmonic prediction, or the latter alone; over
-        `simulated_time` the last simulated cycle.
-        """
-        import xarray
-
-        run = self.simulated
-        variables: dict[str, Any] = {
-            "simulated_bit_speed": _speed("simulated_time", run.bit_speed, "simulated bit speed"),
-            "simulated_top_speed": _speed("simulated_time", run.top_speed, "simulated top speed"),
-        }
-        time = run.time
-        if self.orbit is not None:
-            time = self.orbit.time
-            variables["bit_speed"] = _speed("time", self.orbit.bit_speed, "bit speed of the orbit")
-            variables["top_speed"] = _speed("time", self.orbit.top_speed, "top speed of the orbit")
-        if self.predicted is not None:
-            turning = self.predicted.bit_speed(time)
-            variables["harmonic_bit_speed"] = _speed("time", turning, "bit speed, one harmonic")
-        variables |= {
-            "return_time": ("return", run.times, {"units": "s"}),
-            "return_point": (("return", "coordinate"), run.points, {"units": "rad, rad/s"}),
-            "return_peak": ("interval", run.peaks, {"units": "rad/s"}),
-            "return_stuck": ("interval", run.stuck, {"units": "s"}),
-            "swing": ("window", run.swing, {"units": "rad/s"}),
-        }
-        if self.orbit is not None:
-            variables["orbit_point"] = ("coordinate", self.orbit.point, {"units": "rad, rad/s"})
-            variables["multiplier"] = ("multiplier", self.orbit.multipliers, {"units": "1"})
-        coordinates = {
+    def derived(self) -> dict[str, Any]:
+        """The harmonic prediction over the time of the orbit, or of the last simulated cycle."""
+        if self.predicted is None:
+            return {}
+        time = self.simulated.time if self.orbit is None else self.orbit.time
+        about = {"units": "rad/s", "long_name": "bit speed, one harmonic"}
+        return {
             "time": ("time", time, {"units": "s"}),
-            "simulated_time": ("simulated_time", run.time, {"units": "s"}),
+            "harmonic_bit_speed": ("time", self.predicted.bit_speed(time), about),
         }
-        return xarray.Dataset(variables, coordinates, {"status": self.status})
 
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
-
-
-def _speed(over: str, values: Array, name: str) -> tuple[str, Array, dict[str, str]]:
-    return over, values, {"units": "rad/s", "long_name": name}
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """The rig, and what else was requested."""
+        return self.design, self.settings
 
 
 def limit_cycle(
@@ -129,7 +88,7 @@ def limit_cycle(
     periods: int = PERIODS,
     start: Kind | None = "wound_up",
     modes: int = MODES,
-    tolerance: float = 1e-8,
+    tolerance: float = TOLERANCE,
 ) -> LimitCycle:
     """The stick-slip cycle of a design: by one harmonic, exactly, and by a long simulation.
 
@@ -165,7 +124,10 @@ def limit_cycle(
     harmonic = harmonic_cycles(design, modes)
     simulated = long_run(design, expected_period(design, harmonic), periods, start, tolerance)
     status, orbit = judge(design, simulated)
-    return LimitCycle(design, status, harmonic, orbit, simulated)
+    usual = {"periods": PERIODS, "start": "wound_up", "modes": MODES, "tolerance": TOLERANCE}
+    chosen = {"periods": periods, "start": start, "modes": modes, "tolerance": tolerance}
+    settings = {name: value for name, value in chosen.items() if value != usual[name]}
+    return LimitCycle(design, status, harmonic, orbit, simulated, settings)
 
 
 def _refuse_memory(design: Design) -> None:

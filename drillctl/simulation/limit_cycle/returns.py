@@ -23,6 +23,7 @@ from drillctl.simulation.lanes import Kind
 from drillctl.simulation.limit_cycle.flow import Flow
 from drillctl.simulation.limit_cycle.shooting import Orbit, find_orbit
 from drillctl.simulation.reference import Motion, Piece, solve
+from drillctl.store.result import label
 
 Array = NDArray[np.float64]
 
@@ -78,14 +79,18 @@ class Returns:
 
     duration: float
     mean_speed: float
-    swing: Array
-    times: Array
-    points: Array
-    peaks: Array
-    stuck: Array
-    time: Array
-    bit_speed: Array
-    top_speed: Array
+    swing: Array = label("window", unit="rad/s")
+    times: Array = label("return", unit="s", name="return_time")
+    points: Array = label("return", "coordinate", unit="rad, rad/s", name="return_point")
+    peaks: Array = label("interval", unit="rad/s", name="return_peak")
+    stuck: Array = label("interval", unit="s", name="return_stuck")
+    time: Array = label("simulated_time", unit="s", name="simulated_time")
+    bit_speed: Array = label(
+        "simulated_time", unit="rad/s", name="simulated_bit_speed", means="simulated bit speed"
+    )
+    top_speed: Array = label(
+        "simulated_time", unit="rad/s", name="simulated_top_speed", means="simulated top speed"
+    )
 
     @property
     def periods(self) -> Array:

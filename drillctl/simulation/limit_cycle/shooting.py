@@ -23,6 +23,7 @@ from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.simulation.limit_cycle.describing import HarmonicCycle, mean_torque_and_slope
 from drillctl.simulation.limit_cycle.flow import LATER, Flow, Leg
+from drillctl.store.result import label
 
 Array = NDArray[np.float64]
 
@@ -71,13 +72,13 @@ class Orbit:
     min_bit_speed: float
     mean_bit_speed: float
     stuck_time: float
-    multipliers: NDArray[np.complex128]
-    residual: float
-    iterations: int
-    point: Array
-    time: Array
-    bit_speed: Array
-    top_speed: Array
+    multipliers: NDArray[np.complex128] = label("number", name="multiplier")
+    residual: float = label()
+    iterations: int = label()
+    point: Array = label("coordinate", unit="rad, rad/s", name="orbit_point")
+    time: Array = label("time", unit="s")
+    bit_speed: Array = label("time", unit="rad/s", means="bit speed of the orbit")
+    top_speed: Array = label("time", unit="rad/s", means="top speed of the orbit")
 
     @property
     def stable(self) -> bool:

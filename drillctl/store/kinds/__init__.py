@@ -3,16 +3,10 @@
 from drillctl.store.kinds import (
     advantage,
     comparisons,
-    linear,
-    maps,
-    runs,
     tuning,
 )
 
 KINDS = (
-    *linear.KINDS,
-    *runs.KINDS,
-    *maps.KINDS,
     *comparisons.KINDS,
     *advantage.KINDS,
     *tuning.KINDS,

@@ -5,13 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from drillctl.ensemble.grid import Axis
-from drillctl.ensemble.grid import other_axes as asked_axes
 from drillctl.store.names import stored_name
 
 if TYPE_CHECKING:
     import xarray
-
-__all__ = ["asked_axes", "axis_of"]
 
 
 def axis_of(path: str, data: xarray.Dataset, name: str | None = None) -> Axis:

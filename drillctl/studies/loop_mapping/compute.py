@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.ensemble.grid import Axis, Group, axes_of, groups, shape_of
+from drillctl.ensemble.grid import Axis, Group, axes_of, groups, other_axes, shape_of, span
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_margins import peak_sensitivities
 from drillctl.linear.loop_model import many_loop_poles
 from drillctl.progress import SILENT, Progress
 from drillctl.rig.drillstring.frequencies import natural_frequencies
+from drillctl.store.result import Result, label
 from drillctl.studies.three_regions.compute import gains_of, slopes_tolerated, steady_drilling
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
 
 Array = NDArray[np.float64]
 
@@ -38,27 +34,22 @@ QUANTITIES = {
 
 
 @dataclass(frozen=True, eq=False)
-class LoopMap:
-    """Loop figures over a grid of parameters.
+class LoopMap(Result):
+    """Quantities of the loop over a grid of parameters.
 
-    Attributes
-    ----------
-    design : Design
-        What was varied.
-    axes : tuple of Axis
-        Parameters and their values.
-    values : dict of ndarray, shape of the grid
-        By the names of `QUANTITIES`. `low_damping` is negative where one of these modes grows;
-        `peak_sensitivity` is NaN where the loop is not stable, and all are where there is no
-        steady drilling.
-    total_seconds : float
-        From call to return (s).
+    `low_damping` is negative where one of these modes grows; `peak_sensitivity` is NaN where the
+    loop is not stable, and all are where there is no steady drilling.
     """
 
-    design: Design
-    axes: tuple[Axis, ...]
-    values: dict[str, Array]
-    total_seconds: float
+    kind: ClassVar[str] = "loop-map"
+
+    design: Design = label(means="what was varied")
+    axes: tuple[Axis, ...] = label(means="parameters and their values")
+    values: dict[str, Array] = label(
+        "axes", flat=True, unit=lambda name: QUANTITIES[name][0],
+        means=lambda name: QUANTITIES[name][1],
+    )  # fmt: skip
+    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def stable(self) -> NDArray[np.bool_]:
@@ -75,27 +66,15 @@ class LoopMap:
         at = {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)}
         return float(found[where]), at
 
-    @property
-    def data(self) -> xarray.Dataset:
-        """The maps, labelled by parameter path, with units."""
-        import xarray
-
-        paths = [a.path for a in self.axes]
-        coords = {a.path: (a.path, a.values, {"units": a.unit}) for a in self.axes}
-        variables: dict[str, Any] = {
-            name: (paths, values, dict(zip(("units", "long_name"), QUANTITIES[name], strict=True)))
-            for name, values in self.values.items()
-        }
-        return xarray.Dataset(variables, coords)
+    def unit(self, quantity: str) -> str:
+        """Unit of a quantity, SI."""
+        return QUANTITIES[quantity][0]
 
     def summary(self) -> dict[str, Any]:
         """Axes, stable cells, largest slope margin; strict JSON values, SI."""
         best = self.best
         return {
-            "axes": {
-                a.path: {"min": float(a.values[0]), "max": float(a.values[-1]), "points": len(a)}
-                for a in self.axes
-            },
+            "axes": span(self.axes),
             "stable_cells": int(self.stable.sum()),
             "cells": int(self.stable.size),
             "largest_slope_margin": None
@@ -104,11 +83,10 @@ class LoopMap:
             "total_seconds": self.total_seconds,
         }
 
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """Axes and quantities that the design does not give."""
+        some = {} if len(self.values) == len(QUANTITIES) else {"quantities": list(self.values)}
+        return self.design, some | other_axes(self)
 
 
 def loop_map(

@@ -21,7 +21,7 @@ from drillctl.plots.loop_gains import DIAMOND, GAINS, rings_of, shown_gains
 from drillctl.plots.style import beyond, colours, legend_under, plain_ticks, plane
 
 if TYPE_CHECKING:
-    from drillctl.studies.loop_maps import LoopMap
+    from drillctl.studies.loop_mapping.compute import LoopMap
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def loop_map(
     result : LoopMap
         Over two parameters.
     quantity : str
-        What of it: one of `drillctl.studies.loop_maps.QUANTITIES` that was mapped.
+        What of it: one of `drillctl.studies.loop_mapping.compute.QUANTITIES` that was mapped.
     ax : Axes, optional
         Axes to draw on.
     boundary : GainBoundary, optional
@@ -143,9 +143,7 @@ def _colour(
     figure: Figure, ax: Axes, result: LoopMap, quantity: str, x: Array, y: Array,
     system: units.System,
 ) -> None:  # fmt: skip
-    from drillctl.studies.loop_maps import QUANTITIES
-
-    values, unit = units.displayed(result.values[quantity], QUANTITIES[quantity][0], system)
+    values, unit = units.displayed(result.values[quantity], result.unit(quantity), system)
     look = _look(quantity, values)
     ax.set_facecolor(EMPTY)
     mesh = ax.pcolormesh(

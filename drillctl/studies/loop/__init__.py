@@ -1,0 +1,163 @@
+"""What a control engineer wants to know of a loop before any simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from drillctl.studies.base import Option, Picture, Recipe, Run, Section, Study
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from drillctl import units
+    from drillctl.design import Design
+    from drillctl.linear.loop_analysis import LoopAnalysis
+    from drillctl.store.tables import Table
+
+SHOWN = 10
+"""Oscillating poles in the table."""
+SLOPE = "N*m*s/rad"
+
+
+def computed(design: Design, run: Run) -> LoopAnalysis:
+    """The loop, with the map over the axes of the design unless it is left out."""
+    from drillctl.linear.loop_analysis import loop
+    from drillctl.studies.loop.compute import mapped_loop
+
+    run.progress.begin("analysing the loop", 1)
+    return loop(design) if run.options["no_map"] else mapped_loop(design, run.progress)
+
+
+def tables(result: LoopAnalysis) -> Iterator[Table]:
+    """Steady drilling, margins, oscillating poles; the map, if there is one."""
+    from drillctl.store.tables import Column, Table
+    from drillctl.studies.loop_mapping import tables as of_map
+
+    pair = (Column("quantity"), Column("value"), Column("unit", hidden=True))
+    yield Table("operating-point", "steady drilling", pair, _operating_point(result))
+    yield Table("margins", "margins of the loop about steady drilling", pair, _margins(result))
+    columns = (
+        Column("pair"), Column("frequency", unit="Hz", digits=6),
+        Column("damping_ratio", "damping", percent=True),
+    )  # fmt: skip
+    poles = [[k, *one] for k, one in enumerate(result.oscillations[:SHOWN], start=1)]
+    yield Table("closed-loop-modes", "oscillations of the loop, lowest first", columns, poles)
+    if getattr(result, "map", None) is not None:
+        yield from of_map(result.map)  # type: ignore[attr-defined]
+
+
+def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
+    from drillctl.store.tables import Quantity
+
+    requested, found = result.design.tables.operating_point, result.operating_point
+    rows = (
+        ("set speed", requested.speed, "rad/s"),
+        ("weight on bit", requested.weight_on_bit, "N"),
+        ("speed of steady drilling", found.speed, "rad/s"),
+        ("bit torque at that speed", found.bit_torque, "N*m"),
+        ("falling slope of the rock, −dT/dω", found.slope, SLOPE),
+        ("falling slope that the loop tolerates, D*", result.slope_margin, SLOPE),
+        ("nearest speed at which stability changes", result.critical_speed, "rad/s"),
+        ("nearest weight at which stability changes", result.critical_weight_on_bit, "N"),
+    )
+    return [[name, Quantity(value, unit), unit] for name, value, unit in rows]
+
+
+def _margins(result: LoopAnalysis) -> list[list[Any]]:
+    from drillctl.store.tables import Quantity
+
+    rows: list[tuple[str, float | None, str]] = [
+        ("largest real part of the poles", result.spectral_abscissa, "1/s"),
+        ("falling slope of the rock, −dT/dω", result.operating_point.slope, SLOPE),
+        ("slope margin D*", result.slope_margin, SLOPE),
+        ("frequency that decides it", result.deciding_frequency_hz, "Hz"),
+        ("slope margin of the exact continuum", result.continuum_slope_margin, SLOPE),
+    ]
+    found = result.margins
+    if found is not None:
+        rows += [
+            ("disk margin: gain", found.gain_db, "dB"),
+            ("disk margin: phase", found.phase_deg, "deg"),
+            ("largest sensitivity", found.peak_sensitivity, "1"),
+            ("frequency of the largest sensitivity", found.peak_sensitivity_hz, "Hz"),
+            ("delay at the top torque that is tolerated", found.delay, "s"),
+            ("frequency that decides it", found.delay_hz, "Hz"),
+        ]
+    if result.weight_delay_margin is not None:
+        rows.append(("further delay of the moving weight that is tolerated",
+                     result.weight_delay_margin, "s"))  # fmt: skip
+    stable: list[Any] = ["stable", "yes" if result.stable else "no", ""]
+    return [stable, *([name, Quantity(value, unit), unit] for name, value, unit in rows)]
+
+
+def pictures(result: LoopAnalysis) -> Iterator[Picture]:
+    """Frequency responses, gains and impedance; the slope margin over the map."""
+    from drillctl.studies.loop.pictures import loop_pictures
+    from drillctl.studies.loop_mapping import pictures as of_map
+
+    yield from loop_pictures(result)
+    if getattr(result, "map", None) is not None:
+        yield from of_map(result.map)  # type: ignore[attr-defined]
+
+
+def remarks(result: LoopAnalysis, system: units.System) -> Iterator[str]:
+    """Why there may be no margins."""
+    if result.margins is None:
+        yield "The loop is not stable: it has no margins at the top torque."
+
+
+def notes(result: LoopAnalysis) -> Iterator[str]:
+    """Why there is no map, or not all of it."""
+    from drillctl.studies.loop.compute import MOST_NODES, MappedLoop, large
+
+    if not isinstance(result, MappedLoop):
+        return
+    if result.no_map:
+        yield f"no map: {result.no_map}"
+    elif result.map is not None and large(result.design):
+        yield (
+            f"map of the slope margin alone, no root locus: {result.design.string.nodes} nodes; up "
+            f"to {MOST_NODES} the poles are computed for every cell"
+        )
+
+
+def files(result: LoopAnalysis, folder: Path) -> None:
+    """The linear models for MATLAB and NumPy."""
+    from drillctl.linear.export import write_matrices
+
+    for name in ("model.mat", "model.npz"):
+        write_matrices(result.design, folder / name)
+
+
+STUDY = Study(
+    name="loop",
+    help="Analyse stability and margins, map the slope margin",
+    group="Analyse the loop",
+    compute=computed,
+    options=(Option("no_map", bool, "Leave out the map over the axes of [map]", False),),
+    axes=True,
+    python="loop",
+    call="drillctl.linear.loop_analysis:loop",
+    tables=tables,
+    pictures=pictures,
+    remarks=remarks,
+    notes=notes,
+    files=files,
+    recipes=(Recipe("loop", "the loop", options={"no_map": True}, order=10),),
+    sections=(
+        Section(
+            "operating-point", "Operating point and friction", ("loop", "modes"), order=20,
+            shows=("operating-point", "friction"),
+            text="Friction is set-valued here: a bit at rest bears any torque up to the static "
+            "one. A falling slope feeds torsional oscillation; the loop tolerates a slope up to "
+            "its margin.",
+        ),
+        Section(
+            "loop", "The linear loop", ("loop", "slope-margin"), order=40,
+            shows=("margins", "closed-loop-modes", "mobility", "closed-loop", "nyquist",
+                   "nichols", "sensitivity", "boundary", "root-locus", "impedance",
+                   "slope-margin"),
+        ),
+    ),
+)  # fmt: skip

@@ -1,0 +1,138 @@
+"""The pictures of a loop: which responses are computed for which of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl import plots
+from drillctl.linear.boundary import WINDOW, Window, gain_boundary
+from drillctl.linear.ends import ends_of
+from drillctl.linear.loop_analysis import LoopAnalysis
+from drillctl.linear.loop_margins import pole_grid
+from drillctl.linear.response import FrequencyResponse, frequency_response, telling_frequencies
+from drillctl.linear.root_loci import root_locus
+from drillctl.linear.tuning import drive_impedance, stick_slip_frequency
+from drillctl.studies.base import Picture
+from drillctl.studies.loop.compute import large
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from drillctl.design import Design
+
+Array = NDArray[np.float64]
+
+
+def loop_pictures(result: LoopAnalysis) -> Iterator[Picture]:
+    """Every picture that applies to a loop."""
+    design, bit = result.design, result.bit_side
+    yield Picture(
+        "mobility",
+        "Mobility at bit and top: speed per torque, of the string alone and in the loop.",
+        "Bode plot of the mobility at bit and top; sharp peaks of the string alone are flattened "
+        "in the loop near its first mode.",
+        lambda system: _mobility(design),
+    )
+    if any(design.top_drive.gains()):
+        if bit.path is None or bit.path.observer is None:
+            yield from _of_loop(result)
+        if design.simple_drive and bit.path is None:
+            yield from _over_gains(design, bit.slope)
+    if design.string.parts.sections[0].inertia > 0.0:
+        yield Picture(
+            "impedance",
+            "Impedance of the drive and what it reflects; vertical line: the stick-slip frequency.",
+            "Drive impedance and reflection coefficient over frequency, the stick-slip frequency "
+            "marked.",
+            lambda system: _impedance(design),
+        )
+
+
+def _mobility(design: Design) -> Figure:
+    frequencies = telling_frequencies(design.string)
+    strings = [frequency_response(design, frequencies)]
+    if design.string.parts.modal_damping == 0.0:
+        strings.append(frequency_response(design, frequencies, model="wave"))
+    closed = frequency_response(design, frequencies, "closed_loop")
+    return plots.mobility([*strings, closed])
+
+
+def _impedance(design: Design) -> Figure:
+    mark = stick_slip_frequency(design.string) / (2.0 * math.pi)
+    return plots.drive_impedance(drive_impedance(design), marks={"stick-slip": mark})
+
+
+def _of_loop(result: LoopAnalysis) -> Iterator[Picture]:
+    """Bode plot from the set speed, and what shows the margins at the top."""
+    design, bit = result.design, result.bit_side
+
+    @cache
+    def opened() -> FrequencyResponse:
+        grid = pole_grid(ends_of(design.string), result.poles) / (2.0 * math.pi)
+        return frequency_response(design, grid, "open_loop", slope=bit.slope, path=bit.path)
+
+    def closed() -> FrequencyResponse:
+        grid = telling_frequencies(design.string)
+        return frequency_response(design, grid, "closed_loop", slope=bit.slope, path=bit.path)
+
+    yield Picture(
+        "closed-loop",
+        "Bode plot from the set speed to the speeds of top and bit.",
+        "Magnitude and phase from the set speed to top speed and bit speed.",
+        lambda system: plots.bode(closed()),
+    )
+    yield Picture(
+        "nyquist",
+        "Nyquist plot of the loop broken at the top torque, the slope of the rock included.",
+        "Nyquist curve with the disk that it stays out of around the critical point.",
+        lambda system: plots.nyquist(opened(), analysis=result),
+    )
+    yield Picture(
+        "nichols",
+        "Nichols chart of the same loop.",
+        "Magnitude against phase of the loop, with curves of constant sensitivity.",
+        lambda system: plots.nichols(opened(), analysis=result),
+    )
+    yield Picture(
+        "sensitivity",
+        "Sensitivities at the top torque.",
+        "Magnitude of sensitivity and complementary sensitivity over frequency.",
+        lambda system: plots.sensitivity(opened(), analysis=result),
+    )
+
+
+def _over_gains(design: Design, slope: float) -> Iterator[Picture]:
+    """Boundary of the stable gains, and root locus over the proportional gain."""
+    yield Picture(
+        "boundary",
+        "Gains at which steady drilling is stable.",
+        "Boundary of the stable gains in the plane of Kp and Ki, with the current gains.",
+        lambda system: plots.gain_boundary(
+            gain_boundary(design, _window(design), slope), system=system
+        ),
+        paper=True,
+    )
+    if not large(design) and design.tables.controller.law == "pi":
+        kp, _ = design.top_drive.gains()
+        values = np.linspace(0.25, 2.0, 141) * (kp or 500.0)
+        yield Picture(
+            "root-locus",
+            "Poles of the loop as the proportional gain grows.",
+            "Tracks of the poles in the complex plane over the proportional gain.",
+            lambda system: plots.root_locus(root_locus(design, "controller.kp", values),
+                                            system=system),
+            paper=True,
+        )  # fmt: skip
+
+
+def _window(design: Design) -> Window:
+    """Gains to look at: the usual ones, or so many that the design's own lie well inside."""
+    kp, ki = design.top_drive.gains()
+    (p0, p1), (i0, i1) = WINDOW
+    return (p0, max(p1, 1.6 * kp)), (i0, max(i1, 1.6 * ki))

@@ -1,0 +1,84 @@
+"""Stability, slope margin, damping and sensitivity of the loop over two parameters."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from drillctl.studies.applies import over_two_axes
+from drillctl.studies.base import Option, Picture, Recipe, Run, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from drillctl import units
+    from drillctl.design import Design
+    from drillctl.store.tables import Table
+    from drillctl.studies.loop_mapping.compute import LoopMap
+
+
+def computed(design: Design, run: Run) -> LoopMap:
+    """The map of the quantities that are requested, all by default."""
+    from drillctl.studies.loop_mapping.compute import QUANTITIES, loop_map
+
+    chosen = run.options["quantities"] or tuple(QUANTITIES)
+    return loop_map(design, quantities=chosen, progress=run.progress)
+
+
+def tables(result: LoopMap) -> Iterator[Table]:
+    """A row a cell."""
+    from drillctl.store.tables import Column, Table
+
+    columns = (
+        *(Column(axis.path, unit=axis.unit) for axis in result.axes),
+        *(Column(name, unit=result.unit(name)) for name in result.values),
+    )
+    points = itertools.product(*(axis.values.tolist() for axis in result.axes))
+    values = zip(*(one.ravel().tolist() for one in result.values.values()), strict=True)
+    rows = ((*point, *cells) for point, cells in zip(points, values, strict=True))
+    yield Table("loop-map", "loop over the parameters", columns, rows, shown=False)
+
+
+def pictures(result: LoopMap) -> Iterator[Picture]:
+    """The slope margin."""
+    if len(result.axes) != 2:
+        return
+    best = result.best
+    largest = "" if best is None else f" The largest is {best[0]:.4g} N m s."
+    yield Picture(
+        "slope-margin", "Slope margin over the map: the falling slope that the loop tolerates.",
+        f"Map of the slope margin; {int(result.stable.sum())} of {result.stable.size} cells are "
+        f"locally stable.{largest}",
+        lambda system: slope_margin(result, system),
+        paper=True,
+    )  # fmt: skip
+
+
+def slope_margin(result: LoopMap, system: units.System) -> Figure:
+    """The slope margin, with the boundary of stable gains on a map over both gains."""
+    from drillctl import plots
+    from drillctl.linear.boundary import gain_boundary
+
+    design, axes, boundary = result.design, result.axes, None
+    if [axis.path for axis in axes] == ["controller.kp", "controller.ki"] and design.simple_drive:
+        kp, ki = ((float(axis.values[0]), float(axis.values[-1])) for axis in axes)
+        boundary = gain_boundary(design, window=(kp, ki))
+    return plots.loop_map(result, boundary=boundary, system=system)
+
+
+STUDY = Study(
+    name="loop-map",
+    help="Map quantities of the loop over two parameters",
+    group="Analyse the loop",
+    compute=computed,
+    options=(Option("quantities", tuple, "Quantities to map, all by default"),),
+    axes=True,
+    command=False,
+    tables=tables,
+    pictures=pictures,
+    recipes=(
+        Recipe("slope-margin", "the slope margin over the map", over_two_axes,
+               options={"quantities": ("slope_margin",)}, order=80),
+    ),
+)  # fmt: skip
