@@ -127,7 +127,7 @@ def test_a_failed_study_is_told_first_and_the_rest_is_there(tmp_path, monkeypatc
     def fail(*args: object, **kwargs: object) -> None:
         raise SimulationError("the machine went away")
 
-    monkeypatch.setattr(studies, "three_regions", fail)
+    monkeypatch.setattr("drillctl.studies.three_regions.compute.three_regions", fail)
     made = drillctl.report(
         small_design(), tmp_path / "r", TINY, sections=("regions", "modes"), formats=("html", "md")
     )
