@@ -1,14 +1,14 @@
-"""Reports that can be handed over: a design's studies as HTML, PDF or Markdown.
+"""Reports of a design as HTML, PDF or Markdown.
 
-A thin reader of results: it computes nothing itself beyond calling the studies.
+Reads results and calls studies; computes nothing itself.
 
-- `making.py`: `report`, from a design to files; `profiles.py`: how much is computed.
-- `studies.py`: what is asked of each study; `gather.py`: reads or does them in their folders.
-- `cells.py`: what the cells of a map hold, for a reader who points at them.
-- `sections/`: a file a section, studies in, blocks out; `blocks.py`: what they are made of.
-- `verdict.py`: does the current setting pass; `rig_drawing.py`; `words.py`: numbers in words.
-- `document.py`: all sections; `html.py` with `templates/`, `markdown.py`, `pdf.py`: written as.
-- `pictures.py`: figures as files; `folder.py`: everything that lies beside the report.
+- `making.py`: `report`, from a design to files.
+- `recipes.py`: profiles, and how each study is run; `gather.py`: reads or runs them.
+- `cells.py`: values and time responses of the cells of a map.
+- `sections/`: one file per section, studies in, blocks out; `blocks.py`: the blocks.
+- `rig_drawing.py`: the drawing of the rig; `words.py`: numbers and units as text.
+- `html.py` with `templates/`, `markdown.py`: the document as a file; `html.py` also prints the PDF.
+- `pictures.py`: figures as files.
 """
 
 from drillctl.reporting.making import FORMATS, Report, report

@@ -1,4 +1,4 @@
-"""What a section is made of, whatever it is written as."""
+"""Blocks of a section, independent of the output format."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ class Text:
     """A paragraph."""
 
     text: str  # plain; nothing in it is markup
-    # {'plain', 'note', 'open', 'warning'}: How it stands out
     kind: Literal["plain", "note", "open", "warning"] = "plain"
 
 
@@ -31,15 +30,15 @@ class Table:
     name: str  # of its CSV file
     caption: str  # what it shows
     heads: tuple[str, ...]  # with units in brackets
-    rows: tuple[tuple[str, ...], ...]  # as many words each as there are heads
+    rows: tuple[tuple[str, ...], ...]  # as long as the heads
 
 
 @dataclass(frozen=True)
 class Check:
     """A question with its answer."""
 
-    question: str  # what is asked
-    answer: bool | None  # none where it is not decided
+    question: str
+    answer: bool | None  # None: undecided
     detail: str  # the numbers
 
     @property
@@ -53,8 +52,8 @@ class Checks:
     """Questions with their answers."""
 
     name: str  # of its CSV file
-    caption: str  # what they decide
-    checks: tuple[Check, ...]  # in the order to be read
+    caption: str
+    checks: tuple[Check, ...]  # in reading order
 
 
 @dataclass(frozen=True)
@@ -63,19 +62,19 @@ class Figure:
 
     name: str  # of its files
     caption: str  # what it shows
-    alt: str  # the same for those who do not see it, with what it says
+    alt: str  # text alternative
     draw: Callable[[], Drawn] = field(repr=False, compare=False)  # makes the figure
-    # studies that it shows: the picture is kept as long as they are the same
+    # studies that it shows: the file is reused while they are unchanged
     of: tuple[str, ...] = ()
-    paper: bool = False  # whether it needs light paper, as maps with dark contours do
+    paper: bool = False  # whether it needs a light background, like maps with dark contours
 
 
 @dataclass(frozen=True)
 class InteractiveMap:
-    """A picture of a map whose cells tell their values and show their time responses."""
+    """A figure of a map with values and time responses of its cells."""
 
-    figure: Figure  # the picture; whole without scripts
-    # gives what the cells hold, as plain data (see `report.cells`)
+    figure: Figure  # complete without scripts
+    # values of the cells as plain data (see `cells`)
     cells: Callable[[], dict[str, object]] = field(repr=False, compare=False)
 
 
@@ -95,22 +94,22 @@ Block = Text | Table | Checks | Figure | InteractiveMap | Code
 class Section:
     """A part of a report."""
 
-    name: str  # by which it is asked for; its anchor
+    name: str  # value of --sections; anchor
     title: str  # its heading
-    blocks: tuple[Block, ...]  # in the order to be read
+    blocks: tuple[Block, ...]  # in reading order
 
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report, before it is written as anything."""
+    """A report, before it is written in a format."""
 
     # of the report
     title: str
     subtitle: str
-    facts: tuple[tuple[str, str], ...]  # where it comes from: design, profile, version, seed
-    problems: tuple[str, ...]  # why it is not complete; the first thing that is read
-    sections: tuple[Section, ...]  # in the order to be read
-    left_out: tuple[tuple[str, str], ...]  # titles of other sections and why they are not here
+    facts: tuple[tuple[str, str], ...]  # design, profile, version, seed
+    problems: tuple[str, ...]  # why it is not complete; shown first
+    sections: tuple[Section, ...]  # in reading order
+    left_out: tuple[tuple[str, str], ...]  # titles of omitted sections, with reasons
 
 
 def figure(picture: Picture, name: str, system: units.System) -> Figure:

@@ -1,4 +1,4 @@
-"""What the cells of a map hold for a reader: J1, status, and time responses of some of them."""
+"""Cells of the interactive map: J1, status, and time responses of some of them."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ Index = NDArray[np.int64]
 
 FILE = "cells.json"
 MOST = 200
-"""Cells whose time responses are kept."""
+"""Most cells with stored time responses."""
 SAMPLES = 300
 """Intervals of a time response."""
 PART = 10
-"""Speeds are kept in whole parts of an rpm."""
+"""Speeds are stored in units of 1 / PART rpm."""
 
 
 def traced(design: Design, folder: Path, progress: Progress) -> dict[str, Any]:
-    """Write what the cells of the map beside hold."""
+    """Write values and time responses of the cells of the map."""
     result = store.open(folder.parent / "map")
     own = _own(design, result.axes)
     best, bad = _best(result), _bad(result)
@@ -67,7 +67,7 @@ def traced(design: Design, folder: Path, progress: Progress) -> dict[str, Any]:
 
 
 def shown(folder: Path, result: Sweep, words: Words) -> dict[str, object]:
-    """What `traced` wrote, with axes in the units of a reader."""
+    """Read what `traced` wrote, with axes in the units of the reader."""
     held: dict[str, object] = json.loads((folder / FILE).read_text(encoding="utf-8"))
     held["axes"] = [
         {
@@ -85,7 +85,7 @@ def _short(value: float) -> float | None:
 
 
 def _whole(speeds: Array) -> list[list[int | None]]:
-    """Speeds (rad/s) in whole parts of an rpm; None where a run broke down."""
+    """Speeds (rad/s) as integers in units of 1 / PART rpm; None for a failed run."""
     parts = speeds * (PART / units.RPM)
     return [[int(v) if np.isfinite(v) else None for v in np.round(row)] for row in parts]
 
@@ -96,7 +96,7 @@ def _at(axes: tuple[Axis, ...], cell: int) -> dict[str, float]:
 
 
 def _own(design: Design, axes: tuple[Axis, ...]) -> int | None:
-    """The cell nearest to the design's own values; None where they are outside the map."""
+    """The cell nearest to the design's own values; None outside the map."""
     at = []
     for axis in axes:
         value = parameter(design, axis.path).value
@@ -125,7 +125,7 @@ def _bad(result: Sweep) -> int | None:
 
 
 def _lattice(shape: tuple[int, ...]) -> Index:
-    """Every so-many-th cell along each axis, its ends included, `MOST` at most."""
+    """Cells at even intervals along each axis, ends included, at most `MOST`."""
     counts = list(shape)
     while np.prod(counts) > MOST:
         longest = int(np.argmax(counts))

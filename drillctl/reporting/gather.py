@@ -1,4 +1,4 @@
-"""The studies of a report in the folders below it: read if they are there, done if not."""
+"""The studies of a report in their folders: read if finished, else run."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from drillctl.store.json_files import read_json
 from drillctl.store.result import Result
 from drillctl.studies.base import Requested
 
-State = Literal["done", "failed", "interrupted", "left_out", "not_asked"]
+State = Literal["done", "failed", "interrupted", "left_out", "not_requested"]
 
 
 class NotThereError(DrillctlError):
-    """A section needs a study that is not there."""
+    """A study that a section needs is missing."""
 
     def __init__(self, why: str) -> None:
         self.why = why
@@ -38,13 +38,13 @@ class Study:
     # of its folder, and in messages
     name: str
     title: str
-    state: State  # {'done', 'failed', 'interrupted', 'left_out', 'not_asked'}: What became of it
+    state: State
     why: str  # reason, if it is not done
     folder: Path  # where it is
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """What it told."""
+        """Its `summary.json`."""
         found: dict[str, Any] = read_json(self.folder / "summary.json")
         return found
 
@@ -55,42 +55,42 @@ class Study:
 
     @property
     def key(self) -> str:
-        """What tells it from another run: identity, count of draws."""
+        """Identifies the run: identity, count of draws."""
         about = read_json(self.folder / "run.json")
         return f"{about['identity']}{about.get('count', '')}"
 
 
 @dataclass(frozen=True)
 class Gathered:
-    """A design with its studies, of which the sections are made."""
+    """A design with its studies, the input of the sections."""
 
-    design: Design  # as the profile cuts it
-    asked: Design  # as it was given
-    profile: Profile  # what was spent
+    design: Design  # reduced by the profile
+    asked: Design  # as given
+    profile: Profile  # of the report
     words: Words  # units of the reader
     studies: dict[str, Study] = field(repr=False)  # by name
 
     def need(self, name: str) -> Study:
-        """A study that is done."""
+        """A finished study; `NotThereError` if there is none."""
         study = self.studies[name]
         if study.state != "done":
             raise NotThereError(study.why)
         return study
 
     def have(self, name: str) -> Study | None:
-        """A study if it is done."""
+        """A finished study, or None."""
         study = self.studies[name]
         return study if study.state == "done" else None
 
     def key(self, names: Iterable[str]) -> str:
-        """What tells a picture of some studies from another one."""
+        """Hash that identifies a figure of some studies."""
         parts = [drillctl.__version__, self.words.system, store.identity("report", self.design)]
         parts += [self.studies[name].key for name in names]
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What failed or was interrupted, and why."""
+        """Failed or interrupted studies, with reasons."""
         return tuple(
             f"{one.title[0].upper()}{one.title[1:]} {_PARTIAL[one.state]}: {one.why}"
             for one in self.studies.values()
@@ -98,8 +98,8 @@ class Gathered:
         )
 
 
-_PARTIAL = {"failed": "failed", "interrupted": "is not finished"}
-INTERRUPTED = "the report was interrupted; the same command with the same folder goes on from there"
+_PARTIAL = {"failed": "failed", "interrupted": "was interrupted"}
+INTERRUPTED = "the report was interrupted; repeat the command with the same folder to resume"
 
 
 def gather(
@@ -110,7 +110,7 @@ def gather(
     words: Words,
     progress: Progress = SILENT,
 ) -> Gathered:
-    """Read or do the studies of a report."""
+    """Read or run the studies of a report."""
     cut = profile.applied(design)
     names = _with_needs(wanted)
     found: dict[str, Study] = {}
@@ -118,8 +118,8 @@ def gather(
     for recipe in RECIPES.values():
         place = folder / recipe.name
         if recipe.name not in names:
-            why = "it was not asked for"
-            found[recipe.name] = Study(recipe.name, recipe.title, "not_asked", why, place)
+            why = "it was not requested"
+            found[recipe.name] = Study(recipe.name, recipe.title, "not_requested", why, place)
         elif interrupted and not _finished(place):
             found[recipe.name] = Study(recipe.name, recipe.title, "interrupted", INTERRUPTED, place)
         else:
@@ -148,7 +148,7 @@ def _finished(place: Path) -> bool:
 
 
 def _study(recipe: Recipe, asked: Requested, place: Path, progress: Progress) -> Study:
-    """One study, whatever becomes of it."""
+    """Read or run one study; errors become its state."""
 
     def ended(state: State, why: str = "") -> Study:
         return Study(recipe.name, recipe.title, state, why, place)
@@ -157,7 +157,7 @@ def _study(recipe: Recipe, asked: Requested, place: Path, progress: Progress) ->
     if lacking:
         state = lacking[0].state
         why = f"{lacking[0].title} is missing: {lacking[0].why}"
-        return ended("left_out" if state in ("failed", "not_asked") else state, why)
+        return ended("left_out" if state in ("failed", "not_requested") else state, why)
     if why := recipe.missing(asked):
         return ended("left_out", why)
     try:
@@ -176,7 +176,7 @@ def _study(recipe: Recipe, asked: Requested, place: Path, progress: Progress) ->
             result.write(run.path)
         elif recipe.write:
             store.write_data(result, run.path)
-        run.finish(recipe.told(result))
+        run.finish(recipe.summary(result))
     except KeyboardInterrupt:
         return ended("interrupted", INTERRUPTED)
     except (DrillctlError, ArithmeticError, MemoryError, ValueError) as error:

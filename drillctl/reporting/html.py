@@ -1,7 +1,4 @@
-"""A report as one HTML file that needs nothing beside it.
-
-A report as PDF, printed by a browser without a window.
-"""
+"""A report as one self-contained HTML file, and as PDF printed by a headless browser."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ from typing import Any
 
 from drillctl.errors import DrillctlError
 from drillctl.reporting.blocks import Document, Figure
-from drillctl.reporting.pictures import Album, themed
+from drillctl.reporting.pictures import FigureFiles, themed
 
 _UNIT = re.compile(
     r"(?<=[\d∞]) (?=%|(?:s|Hz|ms|rpm|kN|klbf|ft|m|N|kg|dB|in|mm|kJ)\b)"
@@ -26,14 +23,14 @@ _UNIT = re.compile(
 _NUMBER = re.compile(r"^[−-]?[\d.]+( × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?( [%°]| s| Hz| ms)?$|^–$|^∞$")
 
 SHORT = 26
-"""Longest text (characters) of a cell that stays on one line."""
+"""Longest text (characters) of a cell kept on one line."""
 
 
-def page(document: Document, album: Album) -> str:
+def page(document: Document, files: FigureFiles) -> str:
     """The whole document."""
 
     def drawn(figure: Figure) -> dict[str, Any]:
-        picture = album.picture(figure)
+        picture = files.picture(figure)
         svg = picture.svg if figure.paper else themed(picture.svg)
         data = base64.b64encode(svg.encode()).decode()
         left, top, width, height = (f"{100.0 * share:.4f}%" for share in picture.box)
@@ -64,17 +61,17 @@ def _environment() -> Any:
 
 
 def _figures(rows: tuple[tuple[str, ...], ...], column: int) -> bool:
-    """Whether a column holds numbers alone, which are set to the right."""
+    """Whether a column holds only numbers, which are right-aligned."""
     return column > 0 and all(_NUMBER.match(row[column]) for row in rows)
 
 
 def _kept(text: str) -> str:
-    """Text whose numbers are not parted from their units at the end of a line."""
+    """Join numbers and units by non-breaking spaces."""
     return _UNIT.sub("\u00a0", text)
 
 
 def _short(rows: tuple[tuple[str, ...], ...], column: int) -> bool:
-    """Whether the cells of a column are better left on one line."""
+    """Whether all cells of a column are short enough for one line."""
     return all(len(row[column]) <= SHORT for row in rows)
 
 
@@ -82,9 +79,9 @@ BROWSERS = (
     "chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome",
     "microsoft-edge",
 )  # fmt: skip
-"""Commands that print, in the order in which they are looked for."""
+"""Browsers that print, in order of preference."""
 CHOICE = "DRILLCTL_BROWSER"
-"""Variable of the environment that names another one."""
+"""Environment variable that names another command."""
 PATIENCE = 120.0
 """Longest time for printing (s)."""
 OPTIONS = (
@@ -95,26 +92,25 @@ OPTIONS = (
 
 
 def browser() -> str | None:
-    """The command of a browser that prints, if there is one."""
-    asked = os.environ.get(CHOICE)
-    if asked is not None:
-        return shutil.which(asked)
+    """The command of a browser, or None."""
+    chosen = os.environ.get(CHOICE)
+    if chosen is not None:
+        return shutil.which(chosen)
     return next((found for name in BROWSERS if (found := shutil.which(name))), None)
 
 
 def printed(page: Path, target: Path) -> Path:
-    """Print a page."""
+    """Print a page as PDF."""
     command = browser()
     if command is None:
         raise DrillctlError(
-            "no PDF: it is printed by Chromium, which was not found; install it ('apt install "
-            f"chromium', or Chrome or Edge), or name its command in {CHOICE}; any browser prints "
-            "report.html to PDF as well"
+            "no PDF: Chromium is not installed; install it ('apt install chromium', or Chrome or "
+            f"Edge), set {CHOICE} to its command, or print report.html from any browser"
         )
     target.unlink(missing_ok=True)
     with tempfile.TemporaryDirectory(prefix="drillctl-") as profile:
         options = [*OPTIONS, f"--user-data-dir={profile}", f"--print-to-pdf={target.resolve()}"]
-        if hasattr(os, "geteuid") and os.geteuid() == 0:  # its sandbox refuses the superuser
+        if hasattr(os, "geteuid") and os.geteuid() == 0:  # the sandbox does not start as root
             options.append("--no-sandbox")
         try:
             done = subprocess.run(
@@ -124,6 +120,6 @@ def printed(page: Path, target: Path) -> Path:
         except (OSError, subprocess.TimeoutExpired) as error:
             raise DrillctlError(f"no PDF: {command} failed: {error}") from None
     if not target.is_file():
-        last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-        raise DrillctlError(f"no PDF: {command} wrote none: {last}")
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        raise DrillctlError(f"no PDF: {command} wrote no file: {last}")
     return target

@@ -1,9 +1,4 @@
-"""What lies in the folder of a report: the documents, pictures, tables as CSV.
-
-From studies to a document: its sections, what is left out, what went wrong.
-
-One call from a design to a report on disk.
-"""
+"""From a design to a report on disk: studies, document, figures, tables as CSV."""
 
 from __future__ import annotations
 
@@ -23,10 +18,10 @@ from drillctl.reporting import html, markdown
 from drillctl.reporting import html as pdf
 from drillctl.reporting.blocks import Checks, Document, Section, Table
 from drillctl.reporting.gather import INTERRUPTED, Gathered, NotThereError, gather
-from drillctl.reporting.pictures import Album
+from drillctl.reporting.pictures import FigureFiles
 from drillctl.reporting.recipes import PROFILES, Profile
 from drillctl.reporting.sections import SECTIONS
-from drillctl.reporting.sections.summary import summary as told_verdict
+from drillctl.reporting.sections.summary import summary as verdict_summary
 from drillctl.reporting.sections.summary import verdict
 from drillctl.reporting.words import Words
 from drillctl.store.json_files import write_json, write_text
@@ -40,7 +35,7 @@ NAMES = {"html": "report.html", "pdf": "report.pdf", "md": "report.md"}
 
 
 def write(
-    document: Document, album: Album, folder: Path, formats: tuple[str, ...]
+    document: Document, files: FigureFiles, folder: Path, formats: tuple[str, ...]
 ) -> tuple[dict[str, Path], dict[str, str]]:
     """Write a document in some formats, and its tables."""
     written: dict[str, Path] = {}
@@ -48,11 +43,11 @@ def write(
     _write_tables(document, folder / "tables")
     if "html" in formats or "pdf" in formats:
         page = folder / NAMES["html"]
-        write_text(page, html.page(document, album))
+        write_text(page, html.page(document, files))
         written["html"] = page
     if "md" in formats:
         path = folder / NAMES["md"]
-        write_text(path, markdown.page(document, album))
+        write_text(path, markdown.page(document, files))
         written["md"] = path
     if "pdf" in formats:
         try:
@@ -63,7 +58,7 @@ def write(
 
 
 def unfinished(folder: Path, content: dict[str, Any]) -> None:
-    """Write what is known of a report that is not complete; its run goes on when asked again."""
+    """Write the summary of an incomplete report; its run stays unfinished and can resume."""
     write_json(folder / "summary.json", content)
 
 
@@ -88,7 +83,7 @@ def _write_csv(path: Path, heads: tuple[str, ...], rows: tuple[tuple[str, ...], 
 
 
 def _plain(cell: str) -> str:
-    """A number as a spreadsheet reads it; a formula as text."""
+    """Format a cell for a spreadsheet: plain numbers, formulas as text."""
     minus = cell.replace("−", "-")
     try:
         float(minus)
@@ -98,7 +93,7 @@ def _plain(cell: str) -> str:
 
 
 def chosen_sections(asked: Iterable[str] | None) -> tuple[str, ...]:
-    """Names of sections in the order in which they are read; all if none are asked for."""
+    """Names of the requested sections in order; all by default."""
     if asked is None:
         return tuple(SECTIONS)
     names = [name.strip() for name in asked if name.strip()]
@@ -106,12 +101,12 @@ def chosen_sections(asked: Iterable[str] | None) -> tuple[str, ...]:
         if name not in SECTIONS:
             raise InputError(f"no section {name!r}; {nearest(name, SECTIONS)}", "--sections")
     if not names:
-        raise InputError(f"names no section; allowed: {', '.join(SECTIONS)}", "--sections")
+        raise InputError(f"must name a section; allowed: {', '.join(SECTIONS)}", "--sections")
     return tuple(name for name in SECTIONS if name in names)
 
 
 def studies_of(sections: Iterable[str]) -> tuple[str, ...]:
-    """Studies that some sections read."""
+    """Studies that sections read."""
     return tuple(dict.fromkeys(name for one in sections for name in SECTIONS[one].studies))
 
 
@@ -141,13 +136,13 @@ def _facts(gathered: Gathered) -> tuple[tuple[str, str], ...]:
     design, table = gathered.asked, gathered.design.tables.uncertainty
     facts = [
         ("design", design.name),
-        ("profile", f"{gathered.profile.name} ({gathered.profile.told})"),
+        ("profile", f"{gathered.profile.name} ({gathered.profile.meaning})"),
         ("program", f"drillctl {drillctl.__version__}"),
         ("seed", str(table.seed)),
-        ("units", "drillers' (klbf, klbf ft, ft)" if gathered.words.system == "field" else "SI"),
+        ("units", "field (klbf, klbf ft, ft)" if gathered.words.system == "field" else "SI"),
     ]
     if design.tables.status:
-        facts.append(("status of the rig", design.tables.status))
+        facts.append(("status of the model", design.tables.status))
     return tuple(facts)
 
 
@@ -161,8 +156,8 @@ class Report:
 
     folder: Path  # where it is
     files: dict[str, Path]  # files by format: `html`, `pdf`, `md`
-    problems: tuple[str, ...]  # what failed or was not finished; empty for a complete report
-    interrupted: bool  # whether it was interrupted; the same call goes on
+    problems: tuple[str, ...]  # failed or unfinished parts; empty for a complete report
+    interrupted: bool  # whether it was interrupted; the same call resumes
     unwritten: dict[str, str]  # formats that could not be written, with the reason
     content: dict[str, Any]  # what `summary.json` holds
 
@@ -181,15 +176,15 @@ def report(
     system: units.System = "field",
     progress: Progress = SILENT,
 ) -> Report:
-    """Write the report of a design; studies that are in its folder are read, not done again.
+    """Write the report of a design; finished studies in its folder are read, not run again.
 
     Parameters
     ----------
     design : Design
         Any.
     folder : str or Path, optional
-        New, empty, or holding the report of the very same design and profile; by default a new
-        folder under `runs`.
+        New, empty, or holding the report of the same design and profile; by default a new folder
+        under `runs`.
     profile : str or Profile
         How much is computed: `quick`, `standard` or `full`.
     sections : iterable of str, optional
@@ -201,18 +196,18 @@ def report(
     system : {'si', 'field'}
         Units of tables and pictures.
     progress : Progress
-        Told of what is being done.
+        Receives tasks and finished parts.
 
     Returns
     -------
     Report
-        A study that fails is told in it and in the first lines of what is written. If no format
-        that was asked for could be written, an exception is raised instead.
+        Lists a study that fails, as do the first lines of the document. If none of the formats
+        can be written, an exception is raised.
 
     Raises
     ------
     InputError
-        No profile, section or format of that name, or the folder holds something else.
+        Unknown profile, section or format, or the folder holds other files.
     """
     spent, wanted = _profile(profile), chosen_sections(sections)
     kinds = _formats(formats)
@@ -223,10 +218,10 @@ def report(
     interrupted = any(one.why == INTERRUPTED for one in gathered.studies.values())
     progress.begin("writing the report", 1)
     document = compose(gathered, wanted, title)
-    album = Album(run.path / "figures", gathered)
-    problems = (*gathered.problems, *album.collect(document))
+    files = FigureFiles(run.path / "figures", gathered)
+    problems = (*gathered.problems, *files.collect(document))
     document = replace(document, problems=problems)
-    written, unwritten = write(document, album, run.path, kinds)
+    written, unwritten = write(document, files, run.path, kinds)
     if not written:
         raise DrillctlError("; ".join(unwritten.values()))
     content = _content(gathered, document, written, unwritten)
@@ -266,7 +261,7 @@ def _content(
         "profile": gathered.profile.name,
         "complete": not document.problems,
         "problems": list(document.problems),
-        "verdict": told_verdict(verdict(gathered)),
+        "verdict": verdict_summary(verdict(gathered)),
         "sections": [section.name for section in document.sections],
         "left_out": dict(document.left_out),
         "files": {kind: path.name for kind, path in written.items()},

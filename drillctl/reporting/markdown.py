@@ -1,4 +1,4 @@
-"""A report as Markdown, its pictures beside it as PNG."""
+"""A report as Markdown, with figures as PNG files."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from drillctl.reporting.blocks import (
     Table,
     Text,
 )
-from drillctl.reporting.pictures import Album
+from drillctl.reporting.pictures import FigureFiles
 
 _MARKS = re.compile(r"([\\`*_{}\[\]#|~])")
 
 
-def page(document: Document, album: Album) -> str:
+def page(document: Document, files: FigureFiles) -> str:
     """The whole document."""
     lines = [f"# {_text(document.title)}", ""]
     if document.problems:
@@ -32,7 +32,7 @@ def page(document: Document, album: Album) -> str:
     for section in document.sections:
         lines += [f"## {_text(section.title)}", ""]
         for block in section.blocks:
-            lines += [_block(block, album), ""]
+            lines += [_block(block, files), ""]
     if document.left_out:
         lines += ["## Not in this report", ""]
         lines += [f"- {_text(name)}: {_text(why)}" for name, why in document.left_out] + [""]
@@ -40,27 +40,27 @@ def page(document: Document, album: Album) -> str:
 
 
 def _text(text: str) -> str:
-    """Text in which nothing is markup, on one line."""
+    """Escape markup, on one line."""
     return _MARKS.sub(r"\\\1", escape(" ".join(text.split()), quote=False))
 
 
 @singledispatch
-def _block(block: Block, album: Album) -> str:
+def _block(block: Block, files: FigureFiles) -> str:
     raise TypeError(type(block).__name__)
 
 
 @_block.register
-def _(block: Text, album: Album) -> str:
+def _(block: Text, files: FigureFiles) -> str:
     return _text(block.text) if block.kind == "plain" else f"> {_text(block.text)}"
 
 
 @_block.register
-def _(block: Table, album: Album) -> str:
+def _(block: Table, files: FigureFiles) -> str:
     return _table(block.caption, block.heads, block.rows)
 
 
 @_block.register
-def _(block: Checks, album: Album) -> str:
+def _(block: Checks, files: FigureFiles) -> str:
     rows = tuple((one.question, one.word, one.detail) for one in block.checks)
     return _table(block.caption, ("question", "answer", "detail"), rows)
 
@@ -74,18 +74,18 @@ def _table(caption: str, heads: tuple[str, ...], rows: tuple[tuple[str, ...], ..
 
 
 @_block.register
-def _(block: Figure, album: Album) -> str:
-    album.picture(block)
+def _(block: Figure, files: FigureFiles) -> str:
+    files.picture(block)
     return f"![{_text(block.alt)}](figures/{block.name}.png)\n\n*{_text(block.caption)}*"
 
 
 @_block.register
-def _(block: InteractiveMap, album: Album) -> str:
-    return _block(block.figure, album)
+def _(block: InteractiveMap, files: FigureFiles) -> str:
+    return _block(block.figure, files)
 
 
 @_block.register
-def _(block: Code, album: Album) -> str:
+def _(block: Code, files: FigureFiles) -> str:
     fence = "```"
     while fence in block.text:
         fence += "`"

@@ -1,4 +1,4 @@
-"""Pictures of a report as files, kept as long as what they show is the same."""
+"""Figures of a report as files, reused while the results that they show are unchanged."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
 DPI = 110
-"""Of pictures as PNG, and of what is a bitmap within an SVG."""
+"""Of PNG files, and of bitmaps within an SVG."""
 MOST_SHAPES = 500
-"""Shapes of one kind that an SVG holds as such; more of them make it slow and large."""
+"""Most shapes of one kind in an SVG; more are rasterised, as they make it slow and large."""
 INDEX = "index.json"
 _PATHS = re.compile(r' d="([^"]*)"', re.DOTALL)
 _DIGITS = re.compile(r"(\.\d\d)\d+")
@@ -28,7 +28,7 @@ _METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture on disk."""
+    """A figure on disk."""
 
     name: str  # of its files
     # size (points)
@@ -49,8 +49,8 @@ class Picture:
         return self.folder / f"{self.name}.png"
 
 
-class Album:
-    """The pictures of a report in their folder."""
+class FigureFiles:
+    """The figures of a report in their folder."""
 
     def __init__(self, folder: Path, gathered: Gathered) -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -60,11 +60,11 @@ class Album:
         if (folder / INDEX).is_file():
             try:
                 self._index = dict(read_json(folder / INDEX))
-            except InputError:  # pictures are drawn anew
+            except InputError:  # an unreadable index: draw all figures again
                 self._index = {}
 
     def collect(self, document: Document) -> tuple[str, ...]:
-        """Draw every picture of a document that is not there; tells which could not be drawn."""
+        """Draw the missing figures of a document; return the errors."""
         for section in document.sections:
             for block in section.blocks:
                 if isinstance(block, Figure):
@@ -74,7 +74,7 @@ class Album:
         return tuple(self._problems)
 
     def picture(self, figure: Figure) -> Picture:
-        """The picture of a figure, drawn if it is not there."""
+        """The file of a figure, drawn if it is missing."""
         key = self._gathered.key(figure.of)
         held = self._index.get(figure.name, {})
         there = all((self._folder / f"{figure.name}.{kind}").is_file() for kind in ("svg", "png"))
@@ -83,7 +83,7 @@ class Album:
         try:
             made = self._draw(figure)
         except (DrillctlError, ArithmeticError, ValueError, LookupError) as error:
-            self._problems.append(f"The picture {figure.name} could not be drawn: {error}")
+            self._problems.append(f"Figure {figure.name} could not be drawn: {error}")
             return self._draw(replace(figure, draw=_blank))
         about = {k: v for k, v in asdict(made).items() if k not in ("name", "folder")}
         self._index[figure.name] = about | {"key": key}
@@ -102,7 +102,7 @@ class Album:
                 crowd.set_rasterized(crowd.get_rasterized() or len(crowd.get_paths()) > MOST_SHAPES)
         svg = self._folder / f"{figure.name}.svg"
         part = svg.with_suffix(".part")
-        # A fixed salt: the same picture is the same file.
+        # A fixed salt: the same figure gives the same file.
         with rc_context({"svg.hashsalt": figure.name, "svg.fonttype": "path"}):
             drawn.savefig(part, format="svg", dpi=DPI, metadata={"Date": None})
         write_text(svg, _small(part.read_text(encoding="utf-8")))
@@ -118,20 +118,20 @@ class Album:
 
 
 def _blank() -> Drawn:
-    """In the place of a picture that could not be drawn."""
+    """Placeholder for a figure that could not be drawn."""
     made, ax = axes_or_new(None, 6.0, 2.0)
     ax.set_axis_off()
-    ax.text(0.5, 0.5, "could not be drawn: see the first lines", ha="center", va="center")
+    ax.text(0.5, 0.5, "could not be drawn: see the top of the report", ha="center", va="center")
     return made
 
 
 def _small(svg: str) -> str:
-    """Without metadata, and with curves to a hundredth of a point."""
+    """Remove metadata, and round curves to a hundredth of a point."""
     svg = _METADATA.sub("", svg)
     return _PATHS.sub(lambda found: _DIGITS.sub(r"\1", found[0]), svg)
 
 
-# Ink, paper, grid and the palette of `plots.style`, by what they are on dark ground.
+# Colours of `plots.style` on light and on dark background.
 _INKS = {
     "#000000": ("ink", "#1a1a1a", "#e8e6e3"),
     "#ffffff": ("paper", "#ffffff", "#16191d"),
@@ -146,7 +146,7 @@ _COLOURS = re.compile("|".join(_INKS), re.IGNORECASE)
 
 
 def themed(svg: str) -> str:
-    """A picture that turns light on dark ground where the reader's screen is dark."""
+    """Add a dark colour scheme to an SVG."""
     svg = _COLOURS.sub(lambda found: f"var(--{_INKS[found[0].lower()][0]})", svg)
     light = "".join(f"--{name}:{colour};" for name, colour, _ in _INKS.values())
     dark = "".join(f"--{name}:{colour};" for name, _, colour in _INKS.values())

@@ -1,7 +1,4 @@
-"""How much is computed for a report: a look, the design as it stands, or everything.
-
-The studies that a report is made of: what each asks for, and when it does not apply.
-"""
+"""Profiles of a report (quick, standard, full), and how each of its studies is run."""
 
 from __future__ import annotations
 
@@ -24,26 +21,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Profile:
-    """What a report spends on its studies."""
+    """How much a report computes."""
 
-    name: str  # by which it is asked for
-    told: str  # one line of what it means, for people
+    name: str  # value of --profile
+    meaning: str  # one line for a reader
     points: int | None  # most points along an axis of the map; None for those of the design
-    # cells of the map that are simulated again with the reference solver; None for as many as the
-    # design says
+    # cells audited with the reference solver; None for the number of the design
     audited: int | None
-    realizations: int | None  # most draws over the map; None for those of the design
+    realizations: int | None  # most draws over the map; None for the number of the design
     lanes: int  # most lanes over the map and all draws
     setting: int  # draws at the design's own setting alone
-    # lanes under uncertainty that are simulated again; None for as many as cells
+    # lanes audited under uncertainty; None for as many as cells
     drawn_audit: int | None
-    sensitivity: bool  # whether Sobol indices are computed where the design asks for them
+    sensitivity: bool  # whether Sobol indices requested by the design are computed
     # whether the cases of the design are compared, and its gains tuned
     compared: bool
     tuned: bool
 
     def applied(self, design: Design) -> Design:
-        """The design with its map and draws cut down to what the profile spends."""
+        """The design with map and draws reduced to the limits of the profile."""
         values: dict[str, Any] = {}
         if self.points is not None and any(a.points > self.points for a in design.tables.map.axes):
             values["map.axes"] = [
@@ -64,7 +60,7 @@ class Profile:
         return changed
 
     def _draws(self, design: Design) -> int:
-        """So many that neither their own bound nor that of the lanes is passed."""
+        """Number of draws within the limits of draws and lanes."""
         table = design.tables.uncertainty
         cells = 1
         for axis in (*design.tables.map.axes, *table.axes):
@@ -76,23 +72,23 @@ class Profile:
         if table.sampling == "monte-carlo" or draws == table.realizations:
             return draws
         each = max(1, draws // table.replicates)
-        if table.sampling == "sobol":  # whose points come in powers of two
+        if table.sampling == "sobol":  # Sobol points come in powers of two
             each = 1 << (each.bit_length() - 1)
         return each * table.replicates
 
 
 QUICK = Profile(
-    name="quick", told="a look: a map of 21 x 21 cells, 200 draws, no comparison, no tuning",
+    name="quick", meaning="a map of 21 x 21 cells, 200 draws, no comparison, no tuning",
     points=21, audited=4, realizations=200, lanes=1_000_000, setting=2000, drawn_audit=0,
     sensitivity=False, compared=False, tuned=False,
 )  # fmt: skip
 STANDARD = Profile(
-    name="standard", told="the design's own map; its draws up to four million lanes",
+    name="standard", meaning="map and draws of the design, up to four million lanes",
     points=None, audited=None, realizations=None, lanes=4_000_000, setting=10_000,
     drawn_audit=None, sensitivity=True, compared=False, tuned=False,
 )  # fmt: skip
 FULL = Profile(
-    name="full", told="everything the design asks for, comparison and tuning included",
+    name="full", meaning="all studies of the design, with comparison and tuning",
     points=None, audited=None, realizations=None, lanes=1_000_000_000, setting=10_000,
     drawn_audit=None, sensitivity=True, compared=True, tuned=True,
 )  # fmt: skip
@@ -117,23 +113,23 @@ class Recipe(NamedTuple):
     """One study of a report."""
 
     name: str  # of its folder
-    title: str  # what it is called in messages
-    verb: str  # command that would make the same folder
+    title: str  # in messages
+    verb: str  # command that writes the same folder
     # the result, from its design, its folder and the progress
     compute: Callable[[Design, RunFolder, Progress], Any]
     missing: Callable[[Requested], str] = _applies  # why it does not apply; empty where it does
     variant: Callable[[Requested], Design] = _as_asked  # the design that is studied
-    needs: tuple[str, ...] = ()  # studies that must be done before
-    # what the result depends on beside its design
+    needs: tuple[str, ...] = ()  # studies that must finish before
+    # further settings of the result
     settings: Mapping[str, Any] = MappingProxyType({})
-    growing: bool = False  # whether more draws may be added later
+    growing: bool = False  # whether draws may be added later
     grows: Callable[[Design], Any] | None = None
-    write: bool = True  # whether the result is one that the store writes
-    told: Callable[[Any], dict[str, Any]] = _summary  # the summary of a result
+    write: bool = True  # whether the store writes the result
+    summary: Callable[[Any], dict[str, Any]] = _summary  # of a result
 
 
 def level_of(design: Design) -> float:
-    """The level of J1 (s) that a setting is judged by."""
+    """The level of J1 (s) of the verdict."""
     return design.tables.tune.level
 
 
@@ -149,7 +145,7 @@ def _setting(design: Design, folder: RunFolder, progress: Progress) -> Any:
     return drillctl.uncertainty(design, axes=(), audit_cells=0, progress=progress)
 
 
-def _told_of_setting(result: Any) -> dict[str, Any]:
+def _setting_summary(result: Any) -> dict[str, Any]:
     level = level_of(result.design)
     share = result.probability(level)
     low, high = share.interval
@@ -165,10 +161,10 @@ def _told_of_setting(result: Any) -> dict[str, Any]:
 
 
 def _at_setting(asked: Requested) -> Design:
-    """The design with more draws at its own gains, and its level among those that are counted."""
+    """The design with more draws at its own gains, and the level of the verdict."""
     design, level = asked.design, level_of(asked.design)
     levels = sorted({*design.tables.map.levels, level})
-    # Nothing that a map under uncertainty has beyond its draws.
+    # Only the draws of the map under uncertainty.
     values: dict[str, Any] = {
         "map.levels": levels, "uncertainty.sampling": "monte-carlo",
         "uncertainty.realizations": asked.profile.setting, "uncertainty.sensitivity": None,
@@ -180,7 +176,7 @@ def _at_setting(asked: Requested) -> Design:
 
 def _no_cases(asked: Requested) -> str:
     if not asked.design.tables.compare.cases:
-        return "the design names no cases to compare ([compare])"
+        return "the design has no cases to compare ([compare])"
     if not asked.profile.compared:
         return "cases are compared with --profile full"
     return ""
@@ -196,9 +192,9 @@ def _not_tuned(asked: Requested) -> str:
 
 def _not_weighed(asked: Requested) -> str:
     if not asked.profile.compared or not hasattr(drillctl, "advantage"):
-        return "the benefit of a moving weight on bit was not studied"
+        return "dynamic weight on bit is compared with --profile full"
     if "advantage" not in asked.design.tree:
-        return "the design does not ask for it ([advantage])"
+        return "the design has no [advantage] table"
     return ""
 
 
@@ -215,14 +211,14 @@ def _compared(design: Design, folder: RunFolder, progress: Progress) -> Any:
 
 ALL = (
     Recipe("setting", "the draws at the current setting", "uncertainty", _setting, in_batch,
-           _at_setting, settings={"axes": []}, told=_told_of_setting),
+           _at_setting, settings={"axes": []}, summary=_setting_summary),
     Recipe("cells", "the responses over the map", "report-cells", _cells, fitting_map,
-           needs=("map",), write=False, told=dict),
+           needs=("map",), write=False, summary=dict),
     Recipe("compare", "the comparison", "compare", _compared, _both(_no_cases, in_batch)),
     Recipe("tune", "the tuning of the gains", "tune", _by_name("tune"),
            _both(_not_tuned, in_batch)),
-    Recipe("advantage", "the benefit of a moving weight", "advantage", _by_name("advantage"),
-           _both(_not_weighed, in_batch)),
+    Recipe("advantage", "the advantage of dynamic weight on bit", "advantage",
+           _by_name("advantage"), _both(_not_weighed, in_batch)),
 )  # fmt: skip
 """Every study that is no object yet, in the order in which they are done."""
 _ORDER = {
@@ -238,12 +234,12 @@ def _of(study: Study, recipe: base.Recipe) -> Recipe:
 
     return Recipe(
         recipe.name, recipe.title, study.name, compute, recipe.missing, recipe.variant,
-        recipe.needs, study.settings(options), told=recipe.summary, grows=study.growing,
+        recipe.needs, study.settings(options), summary=recipe.summary, grows=study.growing,
     )  # fmt: skip
 
 
 def _recipes() -> dict[str, Recipe]:
-    """Every study of a report by name, in the order in which they are done."""
+    """Every study of a report by name, in order of execution."""
     placed = [(_ORDER[recipe.name], recipe) for recipe in ALL]
     placed += [
         (one.order, _of(study, one)) for study in studies().values() for one in study.recipes

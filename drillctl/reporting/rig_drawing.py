@@ -15,11 +15,11 @@ from drillctl.reporting.words import Words, number
 from drillctl.rig.drillstring import PIPES
 
 LUMPED = 0.12
-"""Height of a lumped spring, which has no length, as a share of the drawing."""
+"""Height of a lumped spring as a share of the drawing."""
 WIDEST = 0.16
 """Half the width of the widest section, as a share of the drawing's width."""
 LEAST = 0.055
-"""Least share of the height for a section, so that its name fits beside it."""
+"""Smallest share of the height for a section, so that its name fits."""
 
 
 class _Part(NamedTuple):
@@ -51,7 +51,7 @@ def rig_drawing(design: Design, words: Words) -> Figure:
 
 
 def _parts(design: Design) -> list[_Part]:
-    """Sections between 0 and 1, by length, each with room for its name."""
+    """Sections between 0 and 1, by length, each high enough for its name."""
     tables = design.tables.drillstring.sections
     lengths = [table.length or 0.0 for table in tables]
     total = sum(lengths) or 1.0
@@ -79,7 +79,7 @@ def _section(ax: Axes, part: _Part, order: int, words: Words) -> None:
     table = part.table
     if table.stiffness is not None:
         _spring(ax, part)
-        told = f"{table.name}: spring {number(table.stiffness)} N m/rad"
+        text = f"{table.name}: spring {number(table.stiffness)} N m/rad"
     else:
         colour = style.COLOURS[order % len(style.COLOURS)]
         ax.add_patch(
@@ -88,14 +88,14 @@ def _section(ax: Axes, part: _Part, order: int, words: Words) -> None:
                 alpha=0.35, edgecolor=colour, linewidth=1.4,
             )
         )  # fmt: skip
-        told = f"{table.name}: {words.quantity(table.length, 'm')}"
+        text = f"{table.name}: {words.quantity(table.length, 'm')}"
         if table.pipe is not None:
-            told += f", {table.pipe}"
+            text += f", {table.pipe}"
         elif table.outer_diameter is not None:
-            told += f", {words.diameter(table.outer_diameter)} x "
-            told += words.diameter(table.inner_diameter)
+            text += f", {words.diameter(table.outer_diameter)} x "
+            text += words.diameter(table.inner_diameter)
     middle = 0.5 * (part.top + part.bottom)
-    ax.text(WIDEST + 0.06, middle, told, va="center", fontsize=style.SMALL)
+    ax.text(WIDEST + 0.06, middle, text, va="center", fontsize=style.SMALL)
 
 
 def _spring(ax: Axes, part: _Part) -> None:
@@ -108,8 +108,8 @@ def _spring(ax: Axes, part: _Part) -> None:
 def _ends(ax: Axes, design: Design, words: Words) -> None:
     tables = design.tables
     ax.add_patch(Rectangle((-0.24, -0.09), 0.48, 0.085, facecolor=style.SKY, edgecolor="black"))
-    told = f"top drive: {number(tables.top_drive.inertia)} kg m²\n{tables.controller.law}"
-    ax.text(0.28, -0.05, told, va="center", fontsize=style.SMALL)
+    text = f"top drive: {number(tables.top_drive.inertia)} kg m²\n{tables.controller.law}"
+    ax.text(0.28, -0.05, text, va="center", fontsize=style.SMALL)
     ax.add_patch(Rectangle((-0.1, 1.0), 0.2, 0.035, facecolor="#888888", edgecolor="black"))
     bit = [(-0.1, 1.035), (0.1, 1.035), (0.05, 1.075), (-0.05, 1.075)]
     ax.add_patch(Polygon(bit, facecolor=style.ORANGE, edgecolor="black"))
@@ -118,5 +118,5 @@ def _ends(ax: Axes, design: Design, words: Words) -> None:
                   alpha=0.7)
     )  # fmt: skip
     weight = words.quantity(tables.operating_point.weight_on_bit, "N")
-    told = f"BHA: {number(tables.bha.inertia)} kg m², {weight} on bit"
-    ax.text(WIDEST + 0.06, 1.045, told, va="center", fontsize=style.SMALL)
+    text = f"BHA: {number(tables.bha.inertia)} kg m², {weight} on bit"
+    ax.text(WIDEST + 0.06, 1.045, text, va="center", fontsize=style.SMALL)

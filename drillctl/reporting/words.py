@@ -1,4 +1,4 @@
-"""Numbers and names as people read them."""
+"""Numbers and names as text for a reader."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ _INCH = 0.0254
 class Words:
     """Quantities in a system of units."""
 
-    system: units.System  # {'si', 'field'}: Whose units
+    system: units.System  # {'si', 'field'}
 
     def quantity(self, value: float | None, si_unit: str, digits: int = 4) -> str:
-        """A value in SI with the unit that people read."""
+        """Format an SI value with its displayed unit."""
         if value is None:
             return NOTHING
         return f"{number(self.scaled(value, si_unit), digits)} {self.unit(si_unit)}".rstrip()
 
     def unit(self, si_unit: str) -> str:
-        """The unit that people read for one of SI."""
+        """The displayed unit for an SI unit."""
         return displayed_unit(si_unit, self.system)
 
     def scaled(self, value: float, si_unit: str) -> float:
-        """A value in the unit that people read."""
+        """Convert an SI value to the displayed unit."""
         return scaled(value, si_unit, self.system)
 
     def measure(self, one: Measure) -> str:
@@ -49,7 +49,7 @@ class Words:
         return one.label if one.unit == "1" else f"{one.label} ({self.unit(one.unit)})"
 
     def diameter(self, value: float | None) -> str:
-        """A diameter (m) in mm, or in."""
+        """Format a diameter (m) in mm or inches."""
         if value is None:
             return NOTHING
         if self.system == "field":
@@ -61,7 +61,7 @@ class Words:
         return f"{name_of(path)} {self.quantity(value, parameter(design, path).si_unit)}"
 
     def place(self, design: Design, at: dict[str, float]) -> str:
-        """Parameters by path (SI), in a line."""
+        """Format parameters by path (SI) on one line."""
         return ", ".join(self.named(design, path, value) for path, value in at.items())
 
     def head(self, design: Design, path: str) -> str:
@@ -71,5 +71,5 @@ class Words:
 
 
 def name_of(path: str) -> str:
-    """What a parameter is called; its path where it has no usual name."""
+    """The usual name of a parameter, else its path."""
     return NAMES.get(path, path)

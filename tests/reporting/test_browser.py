@@ -197,7 +197,7 @@ def test_it_is_whole_without_scripts(browser, small):
     assert seen.page.locator("section").count() >= 10
     assert seen.page.locator(".stage img").is_visible()
     assert not seen.page.locator(".over").is_visible()
-    assert not seen.page.locator(".told").is_visible()
+    assert not seen.page.locator(".response-text").is_visible()
     seen.context.close()
 
 

@@ -69,7 +69,7 @@ def test_saved_studies_and_pictures_are_read_not_done_again(small, monkeypatch):
 
     monkeypatch.setattr("drillctl.store.write_data", refuse)
     monkeypatch.setattr("drillctl.reporting.cells.traced", refuse)
-    monkeypatch.setattr("drillctl.reporting.pictures.Album._draw", refuse)
+    monkeypatch.setattr("drillctl.reporting.pictures.FigureFiles._draw", refuse)
     before = small.files["html"].read_text(encoding="utf-8")
     again = drillctl.report(small_design(), small.folder, TINY, formats=("html", "md"))
     assert again.content == small.content
@@ -111,7 +111,7 @@ def test_its_own_title(tmp_path):
             ["--sections", "summary,modess"],
             "--sections: no section 'modess'; did you mean 'modes'?",
         ),
-        (["--sections", ","], "--sections: names no section"),
+        (["--sections", ","], "--sections: must name a section"),
         (["--format", "docx"], "--format: no format 'docx'"),
         (["--profile", "fast"], "fast"),
     ],
@@ -259,7 +259,7 @@ def test_the_verdict_needs_every_answer(small):
     told = verdict(found)
     assert len(told.checks) == 3
     answers = [check.answer for check in told.checks]
-    expected = "does not pass" if False in answers else "is not decided"
+    expected = "does not pass" if False in answers else "is undecided"
     assert told.word == ("passes" if all(answers) else expected)
 
 

@@ -41,7 +41,7 @@ SUMMARY = {
 
 def gathered(folder: Path, name: str, state: str) -> Gathered:
     write_json(folder / "summary.json", SUMMARY)
-    study = Study(name, "the tuning", state, "it was not asked for", folder)  # type: ignore[arg-type]
+    study = Study(name, "the tuning", state, "it was not requested", folder)  # type: ignore[arg-type]
     design = small_design()
     return Gathered(design, design, TINY, Words("si"), {name: study})
 
@@ -59,5 +59,5 @@ def test_it_tells_what_was_saved(tmp_path):
 
 
 def test_without_it_the_reason_is_told(tmp_path):
-    with pytest.raises(NotThereError, match="it was not asked for"):
+    with pytest.raises(NotThereError, match="it was not requested"):
         tuning.build(gathered(tmp_path, "tune", "left_out"))

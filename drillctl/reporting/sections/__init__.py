@@ -1,7 +1,7 @@
-"""Sections of a report, each in a file of its own: studies in, blocks out.
+"""Sections of a report, one file each: studies in, blocks out.
 
-A section takes what `gather` found and returns its blocks; it raises `NotThereError` with the
-reason where it does not apply.
+A section takes the result of `gather` and returns its blocks; it raises `NotThereError` with the
+reason if it does not apply.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from drillctl.studies.base import Section, studies
 class Kind(NamedTuple):
     """A kind of section."""
 
-    name: str  # by which it is asked for
+    name: str  # value of --sections
     title: str  # its heading
-    studies: tuple[str, ...]  # what it reads
+    studies: tuple[str, ...]  # that it reads
     build: Callable[[Gathered], tuple[Block, ...]]  # its blocks
 
 
@@ -43,9 +43,9 @@ KINDS = (
     Kind("uncertainty", "Uncertainty", ("uncertainty", "setting"), uncertainty.build),
     Kind("sensitivity", "Sensitivity", ("uncertainty",), uncertainty.build_sensitivity),
     Kind("tuning", "Tuned gains and their certificate", ("tune",), tuning.build),
-    Kind("comparison", "Cases compared", ("compare",), comparison.build),
-    Kind("advantage", "What a moving weight on bit is worth", ("advantage",), advantage.build),
-    Kind("audit", "Audit",
+    Kind("comparison", "Comparison of cases", ("compare",), comparison.build),
+    Kind("advantage", "Advantage of dynamic weight on bit", ("advantage",), advantage.build),
+    Kind("audit", "Accuracy audit",
          ("simulate", "map", "uncertainty", "doctor", "mesh-1", "mesh-2", "mesh-4", "step-2",
           "step-4"), audit.build),
     Kind("glossary", "Glossary", (), rig.build_glossary),
@@ -59,7 +59,7 @@ _ORDER = {
 
 
 def _generic(section: Section) -> Callable[[Gathered], tuple[Block, ...]]:
-    """Remarks, pictures and tables of a section's studies, or those that it names."""
+    """Remarks, figures and tables of the studies of a section, or those that it names."""
     owners = {recipe.name: study for study in studies().values() for recipe in study.recipes}
 
     def build(gathered: Gathered) -> tuple[Block, ...]:
@@ -85,7 +85,7 @@ def _generic(section: Section) -> Callable[[Gathered], tuple[Block, ...]]:
 
 
 def _sections() -> dict[str, Kind]:
-    """Every section by name, in the order in which they are read."""
+    """Every section by name, in reading order."""
     placed = [(_ORDER[kind.name], kind) for kind in KINDS]
     for study in studies().values():
         for one in study.sections:

@@ -1,4 +1,4 @@
-"""What a moving weight on bit is worth, each policy at its robust optimum."""
+"""Advantage of dynamic weight on bit, each policy at its robust optimum."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ if TYPE_CHECKING:
 
 PICTURES = (
     ("advantage-cases", "Policies at the fresh draws, each at its robust optimum.",
-     "Spread of J1 of every policy at each of the terms.",
+     "Spread of J1 of every policy under each condition.",
      lambda result, system: plots.advantage_cases(result)),
     ("advantage-front", "Robust J1 against the mean weight on bit.",
      "Objective of every policy against its mean weight, over nominal weights.",
      lambda result, system: plots.advantage_front(result, system=system)),
     ("advantage-map", "Advantage over weights and set speeds.",
-     "Maps of the objective of the constant weight less that of the weight that follows.",
+     "Maps of the objective with constant weight minus that with dynamic weight.",
      lambda result, system: plots.advantage_map(result, system=system)),
     ("advantage-delays", "Advantage against the delay of the path.",
-     "Advantage over the delay, with kept gains and with gains tuned at each delay.",
+     "Advantage over the delay, with fixed gains and with gains tuned at each delay.",
      lambda result, system: plots.advantage_delay(result)),
 )  # fmt: skip
-"""Name, caption, text and function of each picture of `drillctl advantage`."""
+"""Name, caption, text alternative and function of each figure of `drillctl advantage`."""
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
-    """Cases with paired differences, areas, crossing delays and pictures."""
+    """Cases with paired differences, areas, crossing delays and figures."""
     study = gathered.need("advantage")
     found, system = study.summary, gathered.words.system
     blocks: list[Block] = [
         Text(
-            "Constant weight with PI, and PI with a weight that follows the bit speed, each tuned "
-            f"to the {found['objective']} of J1 and measured at the same {found['realizations']} "
+            "PI with constant weight, and PI with dynamic weight on bit, each tuned "
+            f"for the {found['objective']} of J1 and evaluated at the same {found['realizations']} "
             f"fresh draws, seed {found['seed']}."
         ),
         _cases(gathered, found),
@@ -73,7 +73,7 @@ def _cases(gathered: Gathered, found: dict[str, Any]) -> Table:
             words.quantity(weight, "N"), number(case["means"]["rop_proxy"]),
         ))  # fmt: skip
     heads = ("case", "gains", f"{found['objective']} of J1 (s)",
-             "less constant (s), 95 % interval", "mean weight", "ROP proxy")  # fmt: skip
+             "minus constant (s), 95 % interval", "mean weight", "ROP proxy")  # fmt: skip
     return Table("advantage", "Policies at their robust optima", heads, tuple(rows))
 
 
@@ -84,8 +84,8 @@ def _areas(found: dict[str, Any]) -> Table:
         for policy, regions in found.items()
         for level, one in regions["levels"].items()
     ]  # fmt: skip
-    heads = ("policy", "region", "without draws", "P ≥ 0.95", "P ≥ 0.05")
-    return Table("advantage-areas", "Share of the window of the drive's gains", heads, tuple(rows))
+    heads = ("policy", "region", "nominal", "P ≥ 0.95", "P ≥ 0.05")
+    return Table("advantage-areas", "Share of the window of gains of the drive", heads, tuple(rows))
 
 
 def _share(value: float) -> str:
@@ -96,11 +96,11 @@ def _delays(found: dict[str, Any]) -> Table:
     delays, share = found["delay"], 100.0 * found["material"]
     rows = (
         ("gains of the ideal path: no advantage from", _crossing(delays["kept"]["zero"])),
-        (f"gains tuned at each delay: under {share:g} % from",
+        (f"gains tuned at each delay: below {share:g} % from",
          _crossing(delays["anew"]["material"])),
     )  # fmt: skip
     heads = ("gains", "delay (s), 95 % interval")
-    return Table("advantage-ends", "The delay at which the advantage ends", heads, rows)
+    return Table("advantage-ends", "Delay at which the advantage ends", heads, rows)
 
 
 def _crossing(found: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""How far the numbers can be trusted, for this very design; the design in full."""
+"""Accuracy of the numbers of this report; the design in full."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from drillctl.reporting.gather import Gathered
 from drillctl.reporting.words import NOTHING, number, percent
 
 BALANCED = 1e-6
-"""Relative residual of the energy under which a run balances."""
+"""Largest relative residual of a balanced run."""
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
     """Checks, convergence, errors, versions, design."""
     blocks: list[Block] = [
-        Checks("audit", "Checks of this report's own numbers", tuple(_checks(gathered)))
+        Checks("audit", "Checks of the numbers of this report", tuple(_checks(gathered)))
     ]
     for table in (_energy(gathered), _convergence(gathered), _engine(gathered)):
         if table is not None:
@@ -28,7 +28,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
         blocks.append(
             Figure(
                 "errors", "Estimated relative error of J1 over a sample of the map.",
-                "Estimated errors of a sample of the map's cells against their J1.",
+                "Estimated errors of a sample of cells against their J1.",
                 lambda: plots.error_estimate(study.result), ("doctor",),
             )
         )  # fmt: skip
@@ -41,27 +41,27 @@ def _checks(gathered: Gathered) -> list[Check]:
     run = gathered.have("simulate")
     if run is not None and run.summary["energy"] is not None:
         residual = run.summary["energy"]["relative_residual"]
-        told = f"relative residual {number(residual, 2)}"
-        checks.append(Check("Does the energy of the run balance?", residual < BALANCED, told))
+        text = f"relative residual {number(residual, 2)}"
+        checks.append(Check("Does the energy of the run balance?", residual < BALANCED, text))
     for name, what, cells in (("map", "the map", "cells"), ("uncertainty", "the draws", "lanes")):
         study = gathered.have(name)
         if study is not None and study.summary["audit"]["cells"]:
             audit = study.summary["audit"]
             worst = audit["worst_relative_difference"]
-            told = f"{audit['cells']} {cells}, worst relative difference in J1 {number(worst, 2)}"
+            text = f"{audit['cells']} {cells}, worst relative difference in J1 {number(worst, 2)}"
             question = f"Does the reference solver agree with {what}?"
-            checks.append(Check(question, audit["verdict"] == "ok", told))
+            checks.append(Check(question, audit["verdict"] == "ok", text))
     doctor = gathered.have("doctor")
     if doctor is not None and doctor.summary["refused"] is None:
         found = doctor.summary
-        told = f"median {number(found['estimate']['median'], 2)}, "
-        told += f"99th percentile {number(found['estimate']['p99'], 2)} over "
-        told += f"{found['estimate']['lanes']} cells"
+        text = f"median {number(found['estimate']['median'], 2)}, "
+        text += f"99th percentile {number(found['estimate']['p99'], 2)} over "
+        text += f"{found['estimate']['lanes']} cells"
         if found["advice"]:
-            told += f"; better: {found['advice']}"
+            text += f"; better: {found['advice']}"
         accuracy = gathered.design.tables.simulation.accuracy
         question = f"Is the accuracy {accuracy!r} reached?"
-        checks.append(Check(question, found["verdict"] in ("ok", "check"), told))
+        checks.append(Check(question, found["verdict"] in ("ok", "check"), text))
     return checks
 
 
@@ -72,8 +72,9 @@ def _energy(gathered: Gathered) -> Table | None:
     energy = study.summary["energy"]
     rows = tuple(
         (name, number(energy[key] / 1e3, 6))
-        for name, key in (("work of the drive", "drive"), ("work taken by the bit", "bit"),
-                          ("taken by damping", "damping"), ("change of what is stored", "stored"))
+        for name, key in (("work of the drive", "drive"), ("work on the rock", "bit"),
+                          ("dissipated by damping", "damping"),
+                          ("change of stored energy", "stored"))
     )  # fmt: skip
     return Table("energy", "Energy of the reference run at the current setting",
                  ("term", "energy (kJ)"), rows)  # fmt: skip
@@ -88,24 +89,24 @@ def _convergence(gathered: Gathered) -> Table | None:
     if reference is not None and reference.summary["engine"] == "reference":
         rows.append(_row("reference solver", reference.summary, base.summary))
     rows.append(_row("batch engine, as used", base.summary, base.summary))
-    for name, told in (
+    for name, text in (
         ("step-2", "half the step"), ("step-4", "a quarter of the step"),
         ("mesh-2", "twice the elements"), ("mesh-4", "four times the elements"),
     ):  # fmt: skip
         study = gathered.have(name)
         if study is not None:
-            rows.append(_row(f"batch engine, {told}", study.summary, base.summary))
-    caption = "Convergence of the run at the current setting, in step and mesh"
-    heads = ("run", "step (ms)", "modes", "J1 (s)", "relative to the run as used")
+            rows.append(_row(f"batch engine, {text}", study.summary, base.summary))
+    caption = "Convergence of the run at the current setting with step and mesh"
+    heads = ("run", "step (ms)", "modes", "J1 (s)", "difference from the run as used")
     return Table("convergence-of-this-run", caption, heads, tuple(rows))
 
 
-def _row(told: str, found: dict[str, Any], base: dict[str, Any]) -> tuple[str, ...]:
+def _row(text: str, found: dict[str, Any], base: dict[str, Any]) -> tuple[str, ...]:
     j1, own = found["measures"]["j1"], base["measures"]["j1"]
     apart = NOTHING if not own or j1 is None or found is base else percent(j1 / own - 1.0, 2)
     step = NOTHING if found["step"] is None else number(1e3 * found["step"])
     modes = NOTHING if found["modes"] is None else str(found["modes"])
-    return told, step, modes, number(j1, 7), apart
+    return text, step, modes, number(j1, 7), apart
 
 
 def _engine(gathered: Gathered) -> Table | None:
@@ -118,7 +119,7 @@ def _engine(gathered: Gathered) -> Table | None:
         ("modes", str(found["scheme"]["modes"])),
         ("median of the estimated errors", number(found["estimate"]["median"], 2)),
         ("99th percentile", number(found["estimate"]["p99"], 2)),
-        ("order seen", number(found["estimate"]["order"], 2)),
+        ("observed order", number(found["estimate"]["order"], 2)),
     ]
     return Table("engine", "The batch engine over the map (errors of J1, relative)",
                  ("quantity", "value"), tuple(rows))  # fmt: skip
@@ -127,6 +128,6 @@ def _engine(gathered: Gathered) -> Table | None:
 def _versions(gathered: Gathered) -> Table:
     table = gathered.design.tables.uncertainty
     rows = [*provenance().items(), ("seed of the draws", str(table.seed))]
-    rows.append(("profile", f"{gathered.profile.name}: {gathered.profile.told}"))
-    return Table("versions", "Where it was computed, and from what seed", ("what", "which"),
+    rows.append(("profile", f"{gathered.profile.name}: {gathered.profile.meaning}"))
+    return Table("versions", "Versions, machine and seed", ("item", "value"),
                  tuple(rows))  # fmt: skip

@@ -20,7 +20,7 @@ SHOWN = [
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
-    """Means, shares, differences and pictures."""
+    """Means, shares, differences and figures."""
     study = gathered.need("compare")
     found, system = study.summary, gathered.words.system
     cases = found["cases"]
@@ -40,7 +40,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
         blocks.append(Figure(name, caption, alt, lambda: draw(study.result), of, paper))
 
     names = ", ".join(cases)
-    added("compared-distributions", "J1 of each case over the draws.",
+    added("compared-distributions", "Distribution of J1 over the draws, by case.",
           f"Distribution functions of J1 of {names}.", plots.j1_distributions)  # fmt: skip
     if len(cases) > 1:
         added("paired-differences", "Paired differences to the first case, with intervals.",
@@ -49,7 +49,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     added("compared-weight", "J1 against the mean weight on bit.",
           "J1 of each case against its mean weight on bit.",
           lambda result: plots.j1_against_weight(result, system=system))  # fmt: skip
-    added("compared-responses", "Responses of the cases at their own values.",
+    added("compared-responses", "Time responses of the cases at their nominal values.",
           f"Speeds of bit and top of {names}.",
           lambda result: plots.compared_responses(result, system=system))  # fmt: skip
     if any(case["regions"] and any(r["cells"] is not None for r in case["regions"].values())
@@ -81,7 +81,7 @@ def _shares(cases: dict[str, Any]) -> Table:
         for name, case in cases.items()
     )  # fmt: skip
     heads = ("case", *(f"P(J1 ≤ {x} s)" for x in levels))
-    return Table("shares", "Share of the draws at or under each level (95 % interval)", heads, rows)
+    return Table("shares", "Share of the draws at or below each level (95 % interval)", heads, rows)
 
 
 def _differences(gathered: Gathered, paired: dict[str, Any]) -> Table:
@@ -92,12 +92,12 @@ def _differences(gathered: Gathered, paired: dict[str, Any]) -> Table:
     for name, measures in paired.items():
         row = [name]
         for one in SHOWN:
-            told = measures[one.name]
-            if told["difference"] is None:
+            difference = measures[one.name]
+            if difference["difference"] is None:
                 row.append(NOTHING)
                 continue
-            value = words.scaled(told["difference"], one.unit)
-            ends = told["interval_95"]
+            value = words.scaled(difference["difference"], one.unit)
+            ends = difference["interval_95"]
             text = number(value, 3)
             if ends is not None:
                 low, high = (words.scaled(end, one.unit) for end in ends)

@@ -8,7 +8,7 @@ from drillctl.reporting.gather import Gathered, NotThereError, Study
 from drillctl.reporting.words import NOTHING, Words, number
 from drillctl.simulation.measures import MEASURES, Measure
 
-NAMES = {"simulate": "current", "best": "best of the map", "bad": "a bad one"}
+NAMES = {"simulate": "current", "best": "best of the map", "bad": "a bad cell"}
 SHOWN = (
     "j1", "stuck_time", "sticks", "stick_slip_index", "settling_time", "peak_bit_speed",
     "peak_pipe_torque", "peak_top_torque", "mean_weight_on_bit", "rop_proxy", "work_per_turn",
@@ -16,7 +16,7 @@ SHOWN = (
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
-    """Runs beside each other, and their measures."""
+    """Runs in one figure, and their measures."""
     runs = {name: study for name in NAMES if (study := gathered.have(name)) is not None}
     if not runs:
         raise NotThereError(gathered.studies["simulate"].why)
@@ -32,7 +32,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     figure = Figure(
         "responses",
         "Speeds of bit and top drive at the current, the best and a bad setting, in this order; "
-        "grey where the bit stands still.",
+        "grey: bit at rest.",
         _alt(runs),
         lambda: plots.time_response([one.result for one in runs.values()], paths=paths),
         tuple(runs),
@@ -46,7 +46,7 @@ def _value(study: Study, one: Measure, words: Words) -> str:
 
 
 def _places(gathered: Gathered, runs: dict[str, Study]) -> list[list[str]]:
-    """Where the runs are on the map."""
+    """Axis values of the runs."""
     study = gathered.have("cells")
     if study is None:
         return []
@@ -67,9 +67,9 @@ def _places(gathered: Gathered, runs: dict[str, Study]) -> list[list[str]]:
 
 
 def _alt(runs: dict[str, Study]) -> str:
-    told = [
+    text = [
         f"{NAMES[name]}: {study.summary['status'].replace('_', ' ')}, "
         f"J1 {number(study.summary['measures']['j1'])} s"
         for name, study in runs.items()
     ]
-    return f"Time responses of bit and top speed. {'; '.join(told)}."
+    return f"Time responses of bit and top speed. {'; '.join(text)}."

@@ -1,7 +1,4 @@
-"""The rig: a drawing by depth, and its parts in a table.
-
-Every symbol and word of a report, with its unit.
-"""
+"""The rig: a drawing by depth and tables of its parts; the glossary."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from drillctl.rig.drillstring import PIPES
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
-    """Drawing, sections, bodies; where it is from."""
+    """Drawing, sections, bodies, source."""
     design, words = gathered.design, gathered.words
     parts = design.string.parts.sections
     tables = design.tables.drillstring.sections
@@ -39,13 +36,13 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     )  # fmt: skip
     blocks: list[Block] = [
         Figure(
-            "rig", "The rig, sections by depth; widths not to the scale of depth.",
+            "rig", "The rig: sections by depth; widths are not to scale.",
             _alt(gathered), lambda: rig_drawing(design, words),
         ),
         Table("sections", "Sections from top to bottom", heads, rows),
         Table("bodies", "Bodies at the ends", ("body", "inertia (kg m²)",
               "damping to ground (N m s/rad)"), bodies),
-        Text(f"Source: {design.tables.source}" if design.tables.source else "No source is given."),
+        Text(f"Source: {design.tables.source}" if design.tables.source else "No source given."),
     ]  # fmt: skip
     if design.tables.notes:
         blocks.append(Text(f"Notes: {design.tables.notes}"))
@@ -81,42 +78,42 @@ def entries(words: Words) -> tuple[tuple[str, str, str], ...]:
     slope, length = words.unit("N*m*s/rad"), words.unit("m")
     return (
         ("J1", "integral of |bit speed − set speed| / set speed over the run; small is good", "s"),
-        ("level", "value of J1 that regions and probabilities are told for", "s"),
+        ("level", "value of J1 that bounds a region", "s"),
         ("region", "cells of the map with J1 at or under a level", "cells, %"),
         ("Kp", "proportional gain of the top drive: torque per speed error", "N m s"),
         ("Ki", "integral gain: torque per integral of the speed error", "N m"),
-        ("ω", "speed; set speed: what the drive is asked to hold", speed),
+        ("ω", "speed; set speed: the speed that the drive controls to", speed),
         ("WOB", "weight on bit", force),
         ("bit torque", "of the rock on the bit, positive when it brakes", torque),
         ("top torque", "of the drive", torque),
         ("pipe torque", "in the uppermost element, positive when the top leads", torque),
-        ("twist", "top angle less bit angle", "rad"),
+        ("twist", "top angle minus bit angle", "rad"),
         ("D = −dT/dω", "falling slope of the bit torque at the operating speed", slope),
         ("D*", "slope margin: the falling slope at which steady drilling becomes unstable", slope),
-        ("S", "sensitivity at the top torque; its peak tells how near to instability", "1"),
-        ("disk margin", "change of gain and phase at the top torque that the loop bears at once",
-         "dB, °"),
+        ("S", "sensitivity at the top torque; a high peak means little margin", "1"),
+        ("disk margin", "simultaneous change of gain and phase at the top torque that the loop "
+         "tolerates", "dB, °"),
         ("ζ", "impedance of the pipe, J √(G ρ): torque per speed of a travelling wave", slope),
-        ("reflection", "share of a wave's amplitude that the drive sends back down", "1"),
+        ("reflection", "share of the amplitude of a wave that the drive reflects", "1"),
         ("a1, a2, β", "friction: torque = [a1 + (a2 − a1) exp(−β |ω|)] x weight on bit",
          "m, m, s/rad"),
-        ("set-valued", "a bit at rest bears any torque up to the static one", ""),
+        ("set-valued", "a bit at rest takes any torque up to the static one", ""),
         ("stick-slip index", "(max − min) / (2 mean) of the bit speed over the last 20 s", "1"),
-        ("settling time", "after which the bit stays within 2 % of the set speed", "s"),
+        ("settling time", "time after which the bit speed stays within 2 % of the set speed", "s"),
         ("ROP proxy", "mean of weight x |bit speed|, over nominal weight x set speed", "1"),
         ("work per turn", "work on the rock over the turns of the bit", "J"),
         ("cell", "one point of a map", ""),
-        ("draw, realization", "one set of values of what is uncertain", ""),
-        ("P(J1 ≤ level)", "share of the draws that keep to the level", "%"),
-        ("95 % interval", "of a number that was estimated: Clopper-Pearson for shares, bootstrap "
-         "for areas and means", ""),
+        ("draw, realization", "one set of values of the uncertain parameters", ""),
+        ("P(J1 ≤ level)", "share of the draws at or below the level", "%"),
+        ("95 % interval", "of an estimate: Clopper-Pearson for shares, bootstrap for areas and "
+         "means", ""),
         ("q95, cvar95", "95 % quantile of J1; mean of the worst 5 %", "s"),
-        ("Sobol index", "share of the variance of J1 that a parameter explains alone (first) or in "
-         "company (total)", "1"),
-        ("status", "how a run ends: ok (settled), sticking, stalled, not settled, censored "
+        ("Sobol index", "share of the variance of J1 that a parameter explains alone (first) or "
+         "with interactions (total)", "1"),
+        ("status", "end of a run: ok (settled), sticking, stalled, not settled, censored "
          "(stopped early), failed", ""),
-        ("reconstructed", "not printed in the source; found to reproduce its statements", ""),
-        ("reference solver", "locates every stick and slip; slow and exact", ""),
+        ("reconstructed", "not printed in the source; chosen to reproduce its statements", ""),
+        ("reference solver", "locates every stick and release; slow and accurate", ""),
         ("batch engine", "fixed step, thousands of runs at once; audited by the reference solver",
          ""),
         ("depth", "measured along the string", length),
@@ -125,5 +122,5 @@ def entries(words: Words) -> tuple[tuple[str, str, str], ...]:
 
 def build_glossary(gathered: Gathered) -> tuple[Block, ...]:
     """One table."""
-    heads = ("symbol or word", "meaning", "unit")
-    return (Table("glossary", "Symbols and words", heads, entries(gathered.words)),)
+    heads = ("symbol or term", "meaning", "unit")
+    return (Table("glossary", "Symbols and terms", heads, entries(gathered.words)),)

@@ -1,4 +1,4 @@
-"""J1 over the map: picture with values and responses, regions, audit."""
+"""J1 over the map: figure with values and responses, regions, audit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drillctl.studies.map import STUDY
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
-    """The map, its regions and what its cells end as."""
+    """The map, its regions and the status of its cells."""
     study = gathered.need("map")
     found, words = study.summary, gathered.words
     blocks: list[Block] = []
@@ -25,7 +25,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
             )
     if not pictures:
         count = len(found["axes"])
-        blocks.append(Text(f"The map has {count} parameters: its numbers are in the tables."))
+        blocks.append(Text(f"The map has {count} parameters: see the tables."))
     if table := regions_table(gathered):
         blocks.append(table)
     total = sum(found["statuses"].values())
@@ -33,6 +33,6 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
         (name.replace("_", " "), str(cells_), f"{100.0 * cells_ / total:.1f} %")
         for name, cells_ in found["statuses"].items()
     )
-    blocks.append(Table("statuses", "How the runs of the cells end", ("status", "cells", "share"),
+    blocks.append(Table("statuses", "Status at the end of the runs", ("status", "cells", "share"),
                         rows))  # fmt: skip
     return tuple(blocks)

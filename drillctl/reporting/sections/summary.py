@@ -1,7 +1,4 @@
-"""Does the current setting pass? The questions that a report opens with.
-
-The first page: what was found, and whether the current setting passes.
-"""
+"""The first section: the verdict on the current setting, best settings, regions."""
 
 from __future__ import annotations
 
@@ -16,25 +13,25 @@ from drillctl.reporting.words import NOTHING, between, chance, number, percent
 STATUS = {
     "ok": "settles",
     "sticking": "still sticks and slips at the end",
-    "stalled": "stands still at the end",
+    "stalled": "is at rest at the end",
     "not_settled": "turns without sticking, but has not settled at the end",
     "censored": "was stopped early",
-    "failed": "gives no finite answer",
+    "failed": "gives no finite result",
 }
-"""What a status says of the bit."""
-PASSES, FAILS, OPEN = "passes", "does not pass", "is not decided"
+"""The motion of the bit by status."""
+PASSES, FAILS, OPEN = "passes", "does not pass", "is undecided"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a report says of the current setting."""
+    """The verdict on the current setting."""
 
-    word: str  # `passes`, `does not pass` or `is not decided`
-    checks: tuple[Check, ...]  # what it follows from
+    word: str  # PASSES, FAILS or OPEN
+    checks: tuple[Check, ...]  # from which it follows
 
 
 def verdict(gathered: Gathered) -> Verdict:
-    """Judge the current setting from the studies that are there."""
+    """Decide the verdict from the finished studies."""
     checks = (_stable(gathered), _keeps_level(gathered), _probable(gathered), _strong(gathered))
     known = tuple(check for check in checks if check is not None)
     answers = [check.answer for check in known]
@@ -53,10 +50,10 @@ def _stable(gathered: Gathered) -> Check | None:
         return None
     found, words = study.summary, gathered.words
     margin = found["slope_margin"]
-    told = "any slope" if margin is None and found["stable"] else words.quantity(
+    tolerated = "any slope" if margin is None and found["stable"] else words.quantity(
         margin, "N*m*s/rad"
     )  # fmt: skip
-    detail = f"falling slope {words.quantity(found['slope'], 'N*m*s/rad')}, tolerated {told}"
+    detail = f"falling slope {words.quantity(found['slope'], 'N*m*s/rad')}, tolerated {tolerated}"
     return Check("Is steady drilling stable to small disturbances?", bool(found["stable"]), detail)
 
 
@@ -67,13 +64,13 @@ def _keeps_level(gathered: Gathered) -> Check | None:
     level = gathered.design.tables.tune.level
     j1, status = study.summary["measures"]["j1"], study.summary["status"]
     if j1 is None:
-        return Check(_level_question(level), False, "the run gives no finite answer")
+        return Check(_level_question(level), False, "the run gives no finite result")
     keeps = j1 <= level and status not in ("sticking", "stalled", "failed")
     return Check(_level_question(level), keeps, f"J1 {number(j1)} s; the bit {STATUS[status]}")
 
 
 def _level_question(level: float) -> str:
-    return f"Does its run keep J1 at or under {number(level)} s, without sticking at the end?"
+    return f"Does the run have J1 ≤ {number(level)} s, without sticking at the end?"
 
 
 def _probable(gathered: Gathered) -> Check | None:
@@ -98,7 +95,7 @@ def _strong(gathered: Gathered) -> Check | None:
     if peak is None:
         return None
     detail = f"peak {gathered.words.quantity(peak, 'N*m')}, {percent(peak / limit)} of yield"
-    return Check("Does the pipe stay under its torsional yield?", peak < limit, detail)
+    return Check("Is the peak torque below the torsional yield of the pipe?", peak < limit, detail)
 
 
 def summary(found: Verdict) -> dict[str, Any]:
@@ -113,11 +110,11 @@ def summary(found: Verdict) -> dict[str, Any]:
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
-    """Verdict, best settings and regions, as far as they are there."""
+    """Verdict, best settings and regions, as far as available."""
     found = verdict(gathered)
     blocks: list[Block] = [Text(_sentence(gathered, found.word), _kind(found.word))]
     if found.checks:
-        caption = "Does the current setting pass? Every answer must be yes."
+        caption = "Checks of the current setting: all must be yes to pass"
         blocks.append(Checks("verdict", caption, found.checks))
     if best := _best(gathered):
         blocks.append(best)
@@ -134,7 +131,7 @@ def _kind(word: str) -> Literal["note", "open", "warning"]:
 
 
 def setting(gathered: Gathered) -> str:
-    """The current setting in words: drive with its numbers, weight, speed."""
+    """The current setting as text: drive with its numbers, weight, speed."""
     design, words = gathered.design, gathered.words
     table = design.tables.controller
     numbers = [
@@ -151,16 +148,16 @@ def setting(gathered: Gathered) -> str:
 
 
 def _sentence(gathered: Gathered, word: str) -> str:
-    """The verdict in a sentence or two."""
+    """The verdict as text."""
     held = f"the current setting ({setting(gathered)})"
     if word == OPEN:
-        text = f"Whether {held} passes is not decided: see the open question below."
+        text = f"Whether {held} passes is undecided: see the open check below."
     else:
         text = f"{held[0].upper()}{held[1:]} {word}."
     study = gathered.have("simulate")
     if study is not None and study.summary["measures"]["j1"] is not None:
         measures = study.summary["measures"]
-        text += f" Its bit {STATUS[study.summary['status']]}; J1 is {number(measures['j1'])} s"
+        text += f" The bit {STATUS[study.summary['status']]}; J1 is {number(measures['j1'])} s"
         text += f" over {number(gathered.design.tables.simulation.duration)} s."
     return text
 
@@ -172,12 +169,12 @@ def _best(gathered: Gathered) -> Table | None:
     if study is not None and study.summary["minimum"] is not None:
         minimum = study.summary["minimum"]
         place = gathered.words.place(gathered.design, minimum["at"])
-        rows.append(("least J1, nothing uncertain", place, f"{number(minimum['j1'])} s", NOTHING))
+        rows.append(("least nominal J1", place, f"{number(minimum['j1'])} s", NOTHING))
     study = gathered.have("uncertainty")
     if study is not None:
-        for name, told in study.summary["best"].items():
-            if told["at"] is not None:
-                rows.append(_best_of_draws(gathered, name, told))
+        for name, best in study.summary["best"].items():
+            if best["at"] is not None:
+                rows.append(_best_of_draws(gathered, name, best))
     study = gathered.have("tune")
     if study is not None and study.summary.get("gains"):
         found = study.summary
@@ -196,14 +193,14 @@ MEANINGS = {
 }
 
 
-def _best_of_draws(gathered: Gathered, name: str, told: dict[str, Any]) -> tuple[str, ...]:
-    place = gathered.words.place(gathered.design, told["at"])
-    value, (low, high) = told["value"], told["interval_95"]
+def _best_of_draws(gathered: Gathered, name: str, best: dict[str, Any]) -> tuple[str, ...]:
+    place = gathered.words.place(gathered.design, best["at"])
+    value, (low, high) = best["value"], best["interval_95"]
     if name.startswith("probability_"):
         level = name.removeprefix("probability_")
         ends = f"{between(100.0 * low, 100.0 * high, 3)} %"
         return f"largest P(J1 ≤ {level} s)", place, percent(value), ends
-    # Runs that were stopped early leave an interval open above.
+    # Runs stopped early leave the upper end of the interval open.
     ends = f"at least {number(low)} s" if high is None else f"{between(low, high)} s"
     return MEANINGS.get(name, name), place, f"{number(value)} s", ends
 
@@ -230,5 +227,5 @@ def regions_table(gathered: Gathered) -> Table | None:
             (f"J1 ≤ {level} s", str(one["cells"]), percent(one["area_fraction"]), *spans)
         )  # fmt: skip
     heads = ("region", "cells", "share of the map", *(words.head(design, path) for path in paths))
-    caption = "Regions of the map: bounds between the centres of their outermost cells"
+    caption = "Regions of the map; bounds are centres of the outermost cells"
     return Table("regions", caption, heads, tuple(rows))

@@ -1,4 +1,4 @@
-"""Tuned gains with their certificate, from what was saved of the search."""
+"""Tuned gains with their certificate."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
 PICTURES = {
-    "tune_baselines": ("Tuned gains beside others, at the same fresh draws.",
-                       "J1 over the fresh draws at the tuned gains and at the others."),
-    "tune_neighbourhood": ("Probability about the tuned gains: how far they may drift.",
-                           "Map of the probability of keeping the level about the tuned gains."),
+    "tune_baselines": ("Tuned gains and other gains at the same fresh draws.",
+                       "J1 over the fresh draws at the tuned gains and at other gains."),
+    "tune_neighbourhood": ("Probability around the tuned gains: their tolerance.",
+                           "Map of P(J1 ≤ level) around the tuned gains."),
 }  # fmt: skip
-"""Caption and text of the pictures of `drillctl tune`."""
+"""Caption and text alternative of the figures of `drillctl tune`."""
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
-    """Gains, objective, certificate, baselines; whatever of it was saved."""
+    """Gains, objective, certificate, baselines, as far as saved."""
     study = gathered.need("tune")
     found = study.summary
     certificate = found.get("certificate") or {}
@@ -53,28 +53,25 @@ def _drawn(draw: Callable[[Any], Drawn], study: Study) -> Drawn:
 
 
 def _gains(gathered: Gathered, found: dict[str, Any], tolerance: dict[str, Any]) -> Table:
-    """Tuned values, and between what each alone may drift."""
+    """Tuned values, and the tolerance of each."""
     words, rows = gathered.words, []
     for path, value in (found.get("gains") or {}).items():
         unit = parameter(gathered.design, path).si_unit
         span = NOTHING
-        told = tolerance.get(path)
-        if isinstance(told, dict) and {"low", "high"} <= set(told):
-            ends = (NOTHING if told[end] is None else words.quantity(told[end], unit)
+        ends_of = tolerance.get(path)
+        if isinstance(ends_of, dict) and {"low", "high"} <= set(ends_of):
+            ends = (NOTHING if ends_of[end] is None else words.quantity(ends_of[end], unit)
                     for end in ("low", "high"))  # fmt: skip
             span = " to ".join(ends)
         rows.append((words.head(gathered.design, path), number(words.scaled(value, unit)), span))
-    heads = ("parameter", "tuned", "each alone may drift")
+    heads = ("parameter", "tuned", "tolerance, one at a time")
     return Table("tuned", "Tuned gains", heads, tuple(rows))
 
 
 def _certificate(found: dict[str, Any]) -> Checks:
     asked = found["required_probability"]
     detail = chance(found["probability"], found["interval_95"])
-    question = (
-        f"Is P(J1 ≤ {number(found['level'])} s) at least {percent(asked)}, on draws that the "
-        "search has not seen?"
-    )
+    question = f"Is P(J1 ≤ {number(found['level'])} s) at least {percent(asked)}, at fresh draws?"
     check = Check(question, bool(found["passed"]), f"{detail}, {found['realizations']} draws")
     return Checks("certificate", "Certificate", (check,))
 
@@ -91,7 +88,7 @@ def _baselines(gathered: Gathered, found: dict[str, Any]) -> Table:
             continue
         share = chance(one["probability"], one["interval_95"])
         rows.append((name, at, share, number(one.get("value"))))
-    heads = ("gains", "at", "probability of keeping the level (95 % interval)", "objective")
+    heads = ("gains", "at", "P(J1 ≤ level), 95 % interval", "objective")
     return Table("baselines", "Other gains at the same fresh draws", heads, tuple(rows))
 
 
@@ -107,7 +104,7 @@ def _gain(gathered: Gathered, path: str, value: Any) -> str:
 def _search(found: dict[str, Any]) -> Table:
     rows = []
     for name, key in (
-        ("objective", "objective"), ("its value over the draws of the search", "value"),
+        ("objective", "objective"), ("value over the draws of the search", "value"),
         ("draws", "realizations"), ("runs", "trajectories"), ("time (s)", "seconds"),
     ):  # fmt: skip
         if found.get(key) is not None:

@@ -1,4 +1,4 @@
-"""Regions by probability, how sure they are, the setting at its own draws; what matters most."""
+"""Regions by probability with intervals, the setting at its own draws, sensitivity."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from drillctl.studies.uncertainty import STUDY, indices
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
-    """Areas, pictures, distributions, failures."""
+    """Areas, figures, distributions, failures."""
     result, system = gathered.need("uncertainty").result, gathered.words.system
     blocks: list[Block] = [Text(remark) for remark in STUDY.remarks(result, system)]
     if (own := gathered.have("setting")) is not None:
         held = own.summary
         blocks.append(
             Text(
-                f"At the current setting, {held['realizations']} draws of its own: P(J1 ≤ "
+                f"At the current setting, with {held['realizations']} draws: P(J1 ≤ "
                 f"{number(held['level'])} s) = {chance(held['probability'], held['interval_95'])}."
             )
         )
@@ -38,7 +38,7 @@ def build_sensitivity(gathered: Gathered) -> tuple[Block, ...]:
     study, system = gathered.need("uncertainty"), gathered.words.system
     if "sensitivity" not in study.summary:
         if gathered.asked.tables.uncertainty.sensitivity is None:
-            raise NotThereError("the design asks for no indices ([uncertainty.sensitivity])")
+            raise NotThereError("the design requests no indices ([uncertainty.sensitivity])")
         raise NotThereError("indices are computed with --profile standard or full")
     *_, picture = STUDY.pictures(study.result)
     return figure(picture, "uncertainty", system), block(indices(study.result), system)

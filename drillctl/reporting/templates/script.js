@@ -33,7 +33,7 @@
       return held.axes.map((axis, k) =>
         `${axis.name} ${brief(axis.values[k ? j : i])} ${axis.unit}`.trim()).join(", ");
     }
-    function told(where) {
+    function described(where) {
       const cell = index(where), j1 = held.j1[cell];
       const status = held.statuses[held.status[cell]].replace("_", " ");
       return `${named(where)}: ${j1 === null ? "no J1" : `J1 ${brief(j1)} s`}, ${status}`;
@@ -65,7 +65,7 @@
         display: "block", left: `${100 * left}%`, bottom: `${100 * bottom}%`,
         width: `${100 * size[0]}%`, height: `${100 * size[1]}%`,
       });
-      values.textContent = told(where);
+      values.textContent = described(where);
     }
     function nearest(where) {
       let best = null, least = Infinity;
@@ -81,14 +81,14 @@
       show(where);
       const row = nearest(where), cell = held.traced[row];
       const from = [Math.floor(cell / counts[1]), cell % counts[1]];
-      const title = cell === index(where) ? `Response at ${told(from)}`
-        : `Response of the nearest cell kept: ${told(from)}`;
+      const title = cell === index(where) ? `Response at ${described(from)}`
+        : `Response of the nearest stored cell: ${described(from)}`;
       draw(trace, held, row, title);
       figure.dataset.shown = String(cell);
     }
 
     over.hidden = false;
-    figure.querySelector(".told").hidden = false;
+    figure.querySelector(".response-text").hidden = false;
     over.tabIndex = 0;
     over.setAttribute("role", "application");
     over.setAttribute("aria-label",
