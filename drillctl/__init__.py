@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from drillctl.studies import doctor as doctor
     from drillctl.studies import stability_map as stability_map
     from drillctl.studies import sweep as sweep
-    from drillctl.studies.advantage import advantage as advantage
+    from drillctl.studies.advantage.compute import advantage as advantage
     from drillctl.studies.compare.compute import compare as compare
     from drillctl.studies.regularisation.compute import regularisation as regularisation
     from drillctl.studies.robust import tune as tune
@@ -56,8 +56,6 @@ _HOME = {
     "load": "drillctl.design",
     "InputError": "drillctl.errors",
     "sweep": "drillctl.studies",
-    "advantage": "drillctl.studies.advantage",
-    "compare": "drillctl.studies.compare.compute",
     "tune": "drillctl.studies.robust",
     "open": "drillctl.store",
     "report": "drillctl.reporting.making",

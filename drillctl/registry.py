@@ -45,6 +45,9 @@ STUDIES: tuple[str, ...] = (
     "drillctl.studies.three_regions",
     "drillctl.studies.regularisation",
     "drillctl.studies.doctor",
+    "drillctl.studies.compare",
+    "drillctl.studies.delay",
+    "drillctl.studies.advantage",
 )
 """Each package holds `STUDY`; its keys in a design file, if any, are in its `settings.py`."""
 

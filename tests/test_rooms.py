@@ -23,7 +23,6 @@ ROOMS = (
 UPWARD = {
     ("plots", "studies"),
     ("store", "ensemble"),
-    ("store", "simulation"),
     ("store", "studies"),
 }
 CIRCLES = {"store"}  # rooms that hold one

@@ -8,8 +8,6 @@ command of a study. Every command takes a design by path or shipped name. Exit c
 from collections.abc import Callable
 
 from drillctl.cli import (
-    advantage,
-    comparisons,
     files,
     reports,
     tuning,
@@ -24,9 +22,6 @@ VERBS: dict[str, tuple[Callable[..., None], Group]] = {
     "new": (files.new, "Describe a rig"),
     "show": (files.show, "Describe a rig"),
     "validate": (files.validate, "Describe a rig"),
-    "compare": (comparisons.compare, "Decide"),
-    "delay": (comparisons.delay, "Decide"),
-    "advantage": (advantage.advantage, "Decide"),
     "tune": (tuning.tune, "Decide"),
     "report": (reports.report, "Hand over"),
 }

@@ -56,7 +56,8 @@ def _parameter(option: Option) -> inspect.Parameter:
     more = {} if option.metavar is None else {"metavar": option.metavar}
     if option.least is not None:
         more["min"] = option.least  # type: ignore[assignment]
-    note = typer.Option(option.flag, help=option.help, **more)  # type: ignore[arg-type]
+    flag = f"{option.flag}/--{option.opposite}" if option.opposite else option.flag
+    note = typer.Option(flag, help=option.help, **more)  # type: ignore[arg-type]
     kind = option.type if option.default is not None else option.type | None
     return inspect.Parameter(
         option.name, _KEYWORD, default=option.default, annotation=Annotated[kind, note]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field, create_model, field_validator, model_validator
 
 from drillctl import registry, units
-from drillctl.design.study_tables import AdvantageTable, CompareTable, TuneTable, WeightDelayTable
+from drillctl.design.study_tables import TuneTable
 from drillctl.design.uncertain_tables import (
     AxisTable,
     DistributionTable,
@@ -337,10 +337,7 @@ class OwnTables(Table):
 def settings_of_studies() -> dict[str, type[Table]]:
     """Tables of the studies by key: `KEY` and `Settings` of the `settings.py` beside each."""
     found: dict[str, type[Table]] = {
-        "compare": CompareTable,
-        "weight_delay": WeightDelayTable,
         "tune": TuneTable,
-        "advantage": AdvantageTable,
     }
     for study in registry.STUDIES:
         if find_spec(f"{study}.settings") is not None:

@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.measures import MEASURES, STATUSES
+from drillctl.store.result import label
+from drillctl.store.tables import Estimate, open_estimate
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -32,29 +34,6 @@ QUANTILES = {"p05": 0.05, "p50": 0.5, "p95": 0.95}
 """Of the distribution of a measure over the draws."""
 
 
-class Estimate(NamedTuple):
-    """A number computed from draws, with its 95 % interval."""
-
-    value: float | None  # None where no draw defines it or it is not finite
-    interval: Interval | None  # None where it is unknown, as from fewer than two draws
-    draws: int | None = None  # draws, or pairs of draws, that it is the mean of
-
-    @property
-    def ends(self) -> tuple[float | None, float | None]:
-        """Lower and upper end of the interval."""
-        return self.interval or (None, None)
-
-    @property
-    def excludes_zero(self) -> bool:
-        """Whether the interval lies on one side of zero."""
-        return self.interval is not None and self.interval[0] * self.interval[1] > 0.0
-
-    def summary(self, name: str = "value", prefix: str = "") -> dict[str, Any]:
-        """As strict JSON values: the value by a name, and its interval."""
-        interval = None if self.interval is None else list(self.interval)
-        return {name: self.value, f"{prefix}interval_95": interval}
-
-
 class Share(NamedTuple):
     """Share of the draws in which something holds."""
 
@@ -71,6 +50,11 @@ class Share(NamedTuple):
         """Clopper-Pearson interval of the probability that the share estimates."""
         return share_interval(self.hits, self.total)
 
+    @property
+    def estimate(self) -> Estimate:
+        """The share with its interval."""
+        return Estimate(self.value, self.interval, self.total)
+
     def summary(self, name: str) -> dict[str, Any]:
         """As strict JSON values: the share by a name, and its interval."""
         return {name: self.value, "interval_95": list(self.interval)}
@@ -83,6 +67,21 @@ class Crossing(NamedTuple):
     interval: tuple[float | None, float | None]  # None for an end beyond the axis
     within: float | None = None  # share of the resamples in which it does
 
+    @property
+    def estimate(self) -> Estimate:
+        """The place with its interval."""
+        return open_estimate(self.at, self.interval)
+
+    def words(self, longest: str) -> str:
+        """For people, on an axis of times (s) that ends at `longest`."""
+        if self.at is None:
+            share = (
+                "" if self.within is None else f" (before in {self.within:.1%} of the resamples)"
+            )
+            return f"beyond {longest}{share}"
+        low, high = (f"beyond {longest}" if end is None else f"{end:.3f}" for end in self.interval)
+        return f"{self.at:.3f} s (95 % interval {low} to {high})"
+
     def summary(self, name: str) -> dict[str, Any]:
         """As strict JSON values: the place by a name, and its interval."""
         found = {name: self.at, "interval_95": list(self.interval)}
@@ -94,11 +93,14 @@ class Runs:
     """Runs at common draws: of one case, or of several along the first dimensions."""
 
     # shape (..., draws): by name of the measure (SI); NaN where undefined
-    measures: dict[str, Array]
-    status: NDArray[np.int8]  # shape (..., draws): index into `simulation.measures.STATUSES`
-    # scheme of the batch engine; None where it differs from draw to draw
-    step: float | None
-    modes: int | None
+    measures: dict[str, Array] = label(
+        "realization", unit=lambda name: MEASURES[name].unit,
+        means=lambda name: MEASURES[name].label, flat=True,
+    )  # fmt: skip
+    # shape (..., draws): index into `simulation.measures.STATUSES`
+    status: NDArray[np.int8] = label("realization", flags=STATUSES)
+    step: float | None = label(unit="s", means="of the batch engine; None where draws differ")
+    modes: int | None = label(means="of the batch engine; None where draws differ")
 
     def at(self, *place: int) -> Runs:
         """Those at a place along the first dimensions."""

@@ -44,6 +44,10 @@ class Failures:
     count: int  # how many draws
     example: str  # what was said of the first of them
 
+    def sentence(self, draws: int) -> str:
+        """For people, of so many draws."""
+        return f"{self.count} of {draws} draws failed; {self.reason}: {self.example}"
+
 
 @dataclass(frozen=True, eq=False)
 class DrawnLanes:

@@ -211,7 +211,7 @@ def advantage_front(
         )  # fmt: skip
     axes.set_ylim(bottom=0.0)
     speed, rpm = units.displayed(float(result.front.speeds[0]), "rad/s", system)
-    dress(axes, f"mean weight on bit after the start ({unit})", f"{_objective(result)} (s)",
+    dress(axes, f"mean weight on bit after the start ({unit})", f"{result.objective} (s)",
           heading(result, f"Robust J1 against mean weight on bit, at {speed:g} {rpm}"))  # fmt: skip
     axes.legend(fontsize=SMALL, frameon=False)
     if ax is None:
@@ -267,7 +267,7 @@ def advantage_map(
             formatted.set_major_formatter("{x:.4g}")
     if mesh is not None:
         bar = figure.colorbar(mesh, ax=panels)
-        bar.set_label(f"advantage in the {_objective(result)} (s)", fontsize=SMALL)
+        bar.set_label(f"advantage in the {result.objective} (s)", fontsize=SMALL)
     if ax is None:
         title = heading(result, "J1 that a weight which follows the bit speed saves")
         figure.suptitle(title, fontsize=TITLE, x=0.01, ha="left")
@@ -314,7 +314,7 @@ def advantage_delay(result: Advantage, ax: Axes | None = None) -> Figure:
     axes.set_xlim(0.0, max(float(found.delays[-1]), 1e-3) * 1.02)
     if np.isfinite(found.constant):  # harm goes far below: what matters is where it begins
         axes.set_ylim(bottom=max(axes.get_ylim()[0], -HARM * found.constant))
-    dress(axes, "delay of the bit speed (s)", f"advantage in the {_objective(result)} (s)",
+    dress(axes, "delay of the bit speed (s)", f"advantage in the {result.objective} (s)",
           heading(result, "J1 saved against the delay of the bit speed"))  # fmt: skip
     legend_under(axes, 1, drop=0.13)
     if ax is None:
@@ -362,19 +362,9 @@ def advantage_cases(result: Advantage, ax: Axes | None = None) -> Figure:
     axes.set_xlim(left=0.0)
     dress(axes, "J1 (s)", "", heading(result, "J1 of each policy at its robust optimum"))
     if ax is None:
-        more = f"Bars: 5 to 95 % of the draws; line: median; diamond: {_objective(result)}."
+        more = f"Bars: 5 to 95 % of the draws; line: median; diamond: {result.objective}."
         figure.supxlabel(_draws(result, more), fontsize=SMALL)
     return figure
-
-
-def _objective(result: Advantage) -> str:
-    table = result.design.tables.tune
-    return {
-        "mean": "mean of J1",
-        "quantile": f"{table.quantile:.0%} quantile of J1",
-        "cvar": f"mean of J1 beyond its {table.quantile:.0%} quantile",
-        "worst": "worst J1",
-    }[table.objective]
 
 
 def _vanishes(found: Crossing, level: float) -> str:

@@ -174,27 +174,11 @@ def _at_setting(asked: Requested) -> Design:
     return design.replace(values)
 
 
-def _no_cases(asked: Requested) -> str:
-    if not asked.design.tables.compare.cases:
-        return "the design has no cases to compare ([compare])"
-    if not asked.profile.compared:
-        return "cases are compared with --profile full"
-    return ""
-
-
 def _not_tuned(asked: Requested) -> str:
     if not asked.profile.tuned:
         return "gains are tuned with --profile full"
     if not hasattr(drillctl, "tune"):
         return "this version does not tune gains"
-    return ""
-
-
-def _not_weighed(asked: Requested) -> str:
-    if not asked.profile.compared or not hasattr(drillctl, "advantage"):
-        return "dynamic weight on bit is compared with --profile full"
-    if "advantage" not in asked.design.tree:
-        return "the design has no [advantage] table"
     return ""
 
 
@@ -205,24 +189,17 @@ def _by_name(verb: str) -> Callable[[Design, RunFolder, Progress], Any]:
     return compute
 
 
-def _compared(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    return drillctl.compare(design, progress=progress)
-
-
 ALL = (
     Recipe("setting", "the draws at the current setting", "uncertainty", _setting, in_batch,
            _at_setting, settings={"axes": []}, summary=_setting_summary),
     Recipe("cells", "the responses over the map", "report-cells", _cells, fitting_map,
            needs=("map",), write=False, summary=dict),
-    Recipe("compare", "the comparison", "compare", _compared, _both(_no_cases, in_batch)),
     Recipe("tune", "the tuning of the gains", "tune", _by_name("tune"),
            _both(_not_tuned, in_batch)),
-    Recipe("advantage", "the advantage of dynamic weight on bit", "advantage",
-           _by_name("advantage"), _both(_not_weighed, in_batch)),
 )  # fmt: skip
 """Every study that is no object yet, in the order in which they are done."""
 _ORDER = {
-    "setting": 30, "cells": 50, "compare": 100, "tune": 110, "advantage": 120,
+    "setting": 30, "cells": 50, "tune": 110,
 }  # fmt: skip
 
 

@@ -67,12 +67,12 @@ class _Encoder:
             return {MARK: "design", "is": to_toml(value), **about}
         if isinstance(value, dict):
             pairs = [
-                [key, self.tree(v, _joined(name, key, label), _of_key(label, key), owner)]
+                [key, self.tree(v, _joined(name, key), _of_key(label, key), owner)]
                 for key, v in value.items()
             ]
             return {MARK: "dict", "is": pairs}
         if dataclasses.is_dataclass(value) or hasattr(value, "_fields"):
-            return self._object(value, "" if label.flat else name, owner)
+            return self._object(value, name, owner)
         if isinstance(value, (tuple, list)):
             parts = self._parts(value, name, label, owner)
             return parts if isinstance(value, list) else {MARK: "tuple", "is": parts}
@@ -84,15 +84,14 @@ class _Encoder:
         for one, label in labels(cls).items():
             own = label.name.format_map(_Attributes(value)) or one
             # A field named by an attribute, such as an axis by its path, takes no prefix.
-            name = own if "{" in label.name or not prefix else f"{prefix}.{own}"
+            name = own if "{" in label.name else prefix if label.flat else _joined(prefix, own)
             inner = getattr(value, one)
             inside[one] = self.tree(inner, name, label, _Owner(value, owner))
         return {MARK: "object", "of": f"{cls.__module__}:{cls.__qualname__}", "is": inside}
 
     def _parts(self, value: Any, name: str, label: Label, owner: Any) -> list[Any]:
         if not label.over:
-            inner = dataclasses.replace(label, flat=False)
-            return [self.tree(v, f"{name}.{k}", inner, owner) for k, v in enumerate(value)]
+            return [self.tree(v, _joined(name, k), label, owner) for k, v in enumerate(value)]
         found = []
         for one in value:
             apart = _Encoder()
@@ -159,8 +158,8 @@ def _same(one: NDArray[Any], other: NDArray[Any]) -> bool:
     return bool(np.array_equal(one, other, equal_nan=one.dtype.kind == "f"))
 
 
-def _joined(name: str, key: Any, label: Label) -> str:
-    return str(key) if label.flat else f"{name}.{key}"
+def _joined(prefix: str, key: Any) -> str:
+    return f"{prefix}.{key}" if prefix else str(key)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import csv
 import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,20 +22,44 @@ from drillctl.store.json_files import write_text
 
 NOTHING = "–"
 """Shown in place of a missing number."""
+GAIN_OF_WEIGHT = "N*s/rad"
+"""Of a weight on bit per bit speed: read in the unit of the weight."""
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Estimate(NamedTuple):
     """A number with the ends of its 95 % interval."""
 
-    value: float | None
-    interval: tuple[float | None, float | None] | None
+    value: float | None  # None where nothing defines it or it is not finite
+    interval: tuple[float, float] | None  # None where it is unknown; an open end is NaN
+    draws: int | None = None  # draws, or pairs of draws, that it is the mean of
+
+    @property
+    def ends(self) -> tuple[float | None, float | None]:
+        """Lower and upper end of the interval."""
+        return self.interval or (None, None)
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether the interval lies on one side of zero."""
+        return self.interval is not None and self.interval[0] * self.interval[1] > 0.0
+
+    def summary(self, name: str = "value", prefix: str = "") -> dict[str, Any]:
+        """As strict JSON values: the value by a name, and its interval."""
+        interval = None if self.interval is None else list(self.interval)
+        return {name: self.value, f"{prefix}interval_95": interval}
+
+
+def open_estimate(value: float | None, ends: tuple[float | None, float | None]) -> Estimate:
+    """An estimate whose interval may have open ends, which are None."""
+    low, high = (math.nan if end is None else end for end in ends)
+    return Estimate(value, None if ends == (None, None) else (low, high))
 
 
 class Quantity(NamedTuple):
-    """A number (SI) in a column of several units."""
+    """A number or an estimate (SI) in a column of several units."""
 
-    value: float | None
+    value: float | Estimate | None
     unit: str
 
 
@@ -67,7 +91,9 @@ class Column:
         if isinstance(cell, Estimate):
             return self._estimate(cell, system)
         if isinstance(cell, Quantity):
-            return quantity(cell.value, cell.unit, system, self.digits)
+            text = replace(self, unit=cell.unit).text(cell.value, system)
+            unit = "" if text == NOTHING else displayed_unit(cell.unit, system)
+            return f"{text} {unit}".rstrip()
         if isinstance(cell, str):
             return cell
         if isinstance(cell, bool):
@@ -98,6 +124,8 @@ class Column:
 
     def fields(self, cell: Cell) -> list[Any]:
         """Fields of a cell in a CSV file; empty without a finite number."""
+        if isinstance(cell, Quantity):
+            return self.fields(cell.value)
         if not self.interval:
             return [_field(cell)]
         if not isinstance(cell, Estimate):
@@ -165,8 +193,6 @@ def write_columns(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
 
 
 def _field(value: Cell) -> Any:
-    if isinstance(value, Quantity):
-        value = value.value
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return ""
     return float(value) if isinstance(value, float) else value
@@ -213,6 +239,8 @@ def displayed_unit(si_unit: str, system: units.System) -> str:
     """The displayed unit for an SI unit; empty for a pure number."""
     if si_unit in ("", "1"):
         return ""
+    if si_unit == GAIN_OF_WEIGHT:
+        return f"{displayed_unit('N', system)} s/rad"
     name = "kJ" if si_unit == "J" else units.displayed(1.0, si_unit, system)[1]
     return str(name).replace("^2", "²").replace("*", " ")
 
@@ -221,6 +249,8 @@ def scaled(value: float, si_unit: str, system: units.System) -> float:
     """Convert an SI value to the displayed unit."""
     if si_unit in ("", "1"):
         return value
+    if si_unit == GAIN_OF_WEIGHT:
+        return scaled(value, "N", system)
     return value / 1e3 if si_unit == "J" else float(units.displayed(value, si_unit, system)[0])
 
 

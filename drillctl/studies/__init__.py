@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from drillctl.studies.loop_mapping.compute import LoopMap as LoopMap
     from drillctl.studies.loop_mapping.compute import loop_map as loop_map
     from drillctl.studies.map.outputs import responses as responses
-    from drillctl.studies.tables import write_comparison as write_comparison
-    from drillctl.studies.tables import write_weight_delay as write_weight_delay
     from drillctl.studies.uncertainty.result import Uncertainty as Uncertainty
 
 _HOME = {
@@ -49,8 +47,6 @@ _HOME = {
     "sweep": "drillctl.ensemble.sweeps",
     "uncertain_parameters": "drillctl.ensemble.parameters",
     "weight_delay": "drillctl.studies.delay.compute",
-    "write_comparison": "drillctl.studies.tables",
-    "write_weight_delay": "drillctl.studies.tables",
 }
 
 __all__ = [*_HOME]

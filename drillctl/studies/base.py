@@ -55,11 +55,16 @@ class Option(NamedTuple):
     how: bool = False  # whether it only says how to compute: the result is the same
     metavar: str | None = None
     least: float | None = None
+    opposite: str = ""  # name of the flag that says no
 
     @property
     def flag(self) -> str:
         """As it is written on the command line."""
         return f"--{self.name.replace('_', '-')}"
+
+
+DRAWS = Option("realizations", int, "Draws of what is uncertain", sets="uncertainty.realizations")
+SEED = Option("seed", int, "Seed of the draws", sets="uncertainty.seed")
 
 
 @dataclass(frozen=True)

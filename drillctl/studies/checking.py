@@ -11,19 +11,6 @@ def refuse_what_studies_would(design: Design) -> None:
 
     What a check needs is imported only if the design has its table.
     """
-    if design.tables.compare.cases:
-        from drillctl.studies.compare.cases import case_designs, refuse_unequal
-
-        refuse_unequal(case_designs(design))
-    if "weight_delay" in design.tree:
-        from drillctl.studies.delay.lanes import following_design
-
-        following_design(design)
-    if "advantage" in design.tree:
-        from drillctl.studies.advantage.compute import checked
-        from drillctl.studies.advantage.policies import policies
-
-        checked(policies(design))
     if "tune" in design.tree:
         from drillctl.studies.robust import tuned_parameters
 

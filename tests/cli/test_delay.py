@@ -9,6 +9,7 @@ import pytest
 from strict_json import strict
 
 import drillctl
+from drillctl.studies.delay import compute
 
 SHIPPED = "dynamic-wob-delay-140kn"
 SMALL = [
@@ -48,19 +49,19 @@ def test_folder_holds_table_picture_and_the_run(call):
     assert len(rows) == 6
     point = result.benefits[1][1]
     assert float(rows[4]["difference"]) == point.difference.value
-    assert float(rows[4]["ended_high"]) == point.ended.interval[1]
+    assert float(rows[4]["ended_share_high"]) == point.ended.interval[1]
     assert [float(rows[4][key]) for key in ("gain", "delay")] == [6000.0, 0.2]
 
 
 def test_tables_for_people(call):
     code, out, _ = call("delay", SHIPPED, *SMALL)
     assert code == 0
-    assert "J1 less that of a constant weight, mean (95 % interval), s" in out
-    assert "stick-slip has ended, share of the draws (95 % interval)" in out
-    assert "6 kN s/rad" in out
-    assert "beyond 1 s" in out or "harmful from" in out
-    assert "constant weight: J1 " in out
-    assert "3 draws: bit_rock.a1_factor, bit_rock.a2_factor; seed 2012" in out
+    assert "J1 and end of stick-slip over 3 draws (95 % intervals)" in out
+    assert "delay that each gain bears" in out
+    assert "K_w (kN s/rad)" in out
+    assert "harmful from a delay of (s)" in out
+    assert "Constant weight: mean J1 " in out
+    assert "3 draws of bit_rock.a1_factor, bit_rock.a2_factor; seed 2012" in out
     assert "nan" not in out
     assert "klbf s/rad" in call("delay", SHIPPED, *SMALL, "--units", "field")[1]
 
@@ -72,7 +73,7 @@ def test_finished_run_is_shown_again(call, monkeypatch):
     def fail(*arguments, **options):
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("drillctl.studies.weight_delay", fail, raising=False)
+    monkeypatch.setattr(compute, "weight_delay", fail)
     code, again, err = call("delay", SHIPPED, *SMALL, "--out", "run")
     assert (code, err) == (0, "already done: run\n")
     assert again == first.replace("results: run\n", "")

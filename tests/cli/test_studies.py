@@ -45,6 +45,13 @@ QUICK = {
         "--set", "weight_delay.gains=['0 kN*s/rad', '6 kN*s/rad']",
         "--set", "weight_delay.delays=['0 s', '0.2 s', '1 s']",
     ),
+    "advantage": (
+        "pi-vs-pi-dynamic-wob", *SHORT, "--set", "advantage.largest_gain=0 kN*s/rad",
+        "--set", "tune.realizations=8", "--set", "advantage.realizations=8",
+        "--set", "advantage.sweep_realizations=4", "--set", "advantage.region_points=3",
+        "--set", "advantage.region_realizations=4", "--set", "advantage.weights=['140 kN']",
+        "--set", "advantage.speeds=['100 rpm']", "--set", "advantage.delays=['0 s', '0.5 s']",
+    ),
 }  # fmt: skip
 verb = import_module("drillctl.cli.verb")
 COMMANDS = [study for study in studies().values() if study.command]

@@ -14,7 +14,7 @@ from drillctl.errors import InputError
 from drillctl.plots import j1_against_weight, j1_distributions, paired_differences
 from drillctl.plots.comparison import UNBEATEN, _unbeaten
 from drillctl.studies.compare.cases import Nominal
-from drillctl.studies.compare.compute import MEASURES, ComparedCase, Comparison
+from drillctl.studies.compare.compute import COMPARED, ComparedCase, Comparison
 
 COUNT = 30
 
@@ -28,7 +28,7 @@ def case(design, name, shift, failed=0):
     """A case whose every measure is 10 to 39, more by a shift; the first draws failed."""
     values = np.arange(COUNT) + 10.0 + shift
     values[:failed] = np.nan
-    measures = {measure: values.copy() for measure in MEASURES}
+    measures = {measure: values.copy() for measure in COMPARED}
     measures["settling_time"][:] = np.nan
     measures["time_outside_table"][:] = 0.0
     measures["mean_weight_after_start"] = 140e3 + 1e3 * values

@@ -18,7 +18,9 @@ from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.progress import SILENT
 from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed, ObservedWeight, RealWeight
-from drillctl.studies.advantage import advantage, write_advantage
+from drillctl.store.tables import NOTHING, write_csv
+from drillctl.store.tables import number as tables_number
+from drillctl.studies.advantage import STUDY
 from drillctl.studies.advantage import delays as delays_module
 from drillctl.studies.advantage.cases import (
     MEAN,
@@ -29,6 +31,7 @@ from drillctl.studies.advantage.cases import (
     measured,
     optimum_beside,
 )
+from drillctl.studies.advantage.compute import advantage
 from drillctl.studies.advantage.delays import delay_curve
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import (
@@ -394,18 +397,34 @@ def test_a_finished_run_is_shown_again(result, tmp_path, capsys):
 
 
 def test_tables_hold_the_figures(result, tmp_path):
-    write_advantage(result, tmp_path)
-    with (tmp_path / "delays.csv").open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    kept = [float(row["advantage"]) for row in rows if row["gains"] == "ideal path"]
+    rows = {}
+    for table in STUDY.tables(result):
+        write_csv(table, tmp_path)
+        with (tmp_path / f"{table.name}.csv").open(encoding="utf-8") as stream:
+            rows[table.name] = list(csv.DictReader(stream))
+    kept = [float(row["advantage"]) for row in rows["delays"] if row["gains"] == "ideal path"]
     np.testing.assert_array_equal(kept, result.delay.kept.advantage)
-    with (tmp_path / "map.csv").open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    values = [float(row["objective"]) for row in rows]
+    values = [float(row["objective"]) for row in rows["map"]]
     np.testing.assert_array_equal(values, result.chart.figures["objective"].ravel())
-    for name, count in (("cases", 7 * 12), ("shares", 7 * 5), ("areas", 3 * 4), ("front", 3 * 2)):
-        lines = (tmp_path / f"{name}.csv").read_text(encoding="utf-8").splitlines()
-        assert len(lines) == count + 1, name
+    for row, case in zip(rows["cases"], result.cases, strict=True):
+        assert row["case"] == case.name
+        assert float(row["objective_high"]) == case.objective.interval[1]
+        assert float(row["peak_top_torque"]) == case.mean("peak_top_torque")
+        apart = case.difference(result.baseline, "j1", result.seed)
+        assert row["j1_difference"] == ("" if case is result.baseline else str(apart.value))
+    for name, count in (("cases", 7), ("shares", 7 * 5), ("areas", 3 * 4), ("front", 3 * 2)):
+        assert len(rows[name]) == count, name
+
+
+def test_tables_are_read_in_the_units_of_people(result):
+    tables = {table.name: table for table in STUDY.tables(result)}
+    heads, cells = tables["cases"].heads("si"), tables["cases"].texts("si")
+    ideal = dict(zip(heads, cells[1], strict=True))
+    case = result.cases[1]
+    assert ideal["K_w (kN s/rad)"] == f"{case.gains[GAIN] / 1e3:.4g}"
+    low, high = (tables_number(end, 4) for end in case.objective.interval)
+    assert ideal[f"{result.objective} (s)"].endswith(f"({low} to {high})")
+    assert dict(zip(heads, cells[0], strict=True))["less constant weight (s)"] == NOTHING
 
 
 def test_pictures_show_the_figures(result):

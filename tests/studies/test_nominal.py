@@ -144,7 +144,7 @@ def test_without_maps_nothing_is_swept_and_all_comes_back(short, tmp_path, monke
 
     monkeypatch.setattr(sys.modules[case_designs.__module__], "sweep", swept)
     made = compare(short.replace({"compare.maps": False}), realizations=2)
-    assert not [name for name in made.data.variables if name.startswith("map_")]
+    assert not [name for name in made.data.variables if name.startswith("nominal.map")]
     same_nominal(made, drillctl.open(made.save(tmp_path / "run")))
 
 
@@ -248,22 +248,19 @@ def test_an_axis_that_is_drawn_too_is_told_apart(short, tmp_path):
     path = "bit_rock.a1_factor"
     axes = [AXES[0], {"path": path, "min": 0.9, "max": 1.1, "points": 3}]
     made = compare(short.replace({"map.axes": axes}), realizations=4)
-    assert made.data[path].dims == ("case", "realization")
-    assert made.data["map_j1"].dims == ("case", KP, f"map {path}")
-    assert made.data[f"map {path}"].values.tolist() == pytest.approx([0.9, 1.0, 1.1])
+    assert made.data[f"drawn.{path}"].dims == ("case", "realization")
+    assert made.data[path].values.tolist() == pytest.approx([0.9, 1.0, 1.1])
     same_nominal(made, drillctl.open(made.save(tmp_path / "run")))
 
 
 def test_data_is_labelled(result):
     data = result.data
-    assert data["map_j1"].dims == ("case", KP, KI)
-    assert data["map_j1"].units == "s"
-    assert data["response_weight_on_bit"].units == "N"
-    assert (
-        data["map_j1"].sel({"case": "4 kN s/rad", KP: 500.0, KI: 150.0})
-        == (result.cases[2].nominal.map.j1[2, 1])
+    assert data[KP].values.tolist() == [100.0, 300.0, 500.0, 700.0, 900.0]
+    weight = data["nominal.response.weight_on_bit"]
+    assert (weight.dims, weight.units) == (("case", "time"), "N")
+    np.testing.assert_array_equal(
+        weight.sel(case="4 kN s/rad"), result.cases[2].nominal.response.signals["weight_on_bit"]
     )
-    assert np.isfinite(data["response_time"]).all()
 
 
 # --- progress ----------------------------------------------------------------------------------

@@ -71,8 +71,8 @@ def test_a_run_is_the_one_that_simulate_gives(result, design, i, k):
     run = drillctl.simulate(alone)
     for name in ("j1", "peak_bit_speed", "peak_pipe_torque", "mean_weight_on_bit"):
         expected = getattr(run.measures, name)
-        assert result.runs.measures[name][i, k, number] == pytest.approx(expected, rel=1e-9), name
-    assert STATUSES[result.runs.status[i, k, number]] == run.status
+        assert result.measures[name][i, k, number] == pytest.approx(expected, rel=1e-9), name
+    assert STATUSES[result.status[i, k, number]] == run.status
 
 
 @pytest.mark.slow
@@ -82,8 +82,8 @@ def test_a_run_is_that_of_the_reference_solver(result, design, i, k):
     run = drillctl.simulate(late(design, GAINS[i], DELAYS[k]).replace(drawn))
     for name in ("j1", "peak_bit_speed", "peak_pipe_torque"):
         expected = getattr(run.measures, name)
-        assert result.runs.measures[name][i, k, 5] == pytest.approx(expected, rel=5e-3), name
-    assert STATUSES[result.runs.status[i, k, 5]] == run.status
+        assert result.measures[name][i, k, 5] == pytest.approx(expected, rel=5e-3), name
+    assert STATUSES[result.status[i, k, 5]] == run.status
 
 
 def test_differences_are_those_of_a_comparison(result, design):
@@ -115,8 +115,8 @@ def test_a_gain_of_zero_is_the_constant_weight_at_any_delay(result):
 
 def test_other_delays_and_gains_change_nothing(result, design):
     fewer = weight_delay(design, GAINS[2:], DELAYS[1:3], DRAWS)
-    for name, values in fewer.runs.measures.items():
-        np.testing.assert_array_equal(values[0], result.runs.measures[name][2, 1:3], name)
+    for name, values in fewer.measures.items():
+        np.testing.assert_array_equal(values[0], result.measures[name][2, 1:3], name)
     np.testing.assert_allclose(
         fewer.constant.measures["j1"], result.constant.measures["j1"], rtol=1e-9
     )
@@ -138,7 +138,7 @@ def test_without_lags_no_delay_is_the_ideal_law(short):
         alone = late(ideal, 6e3, found.delays[k]).replace({"weight_on_bit.path.hoist_lag": "0 s"})
         assert type(alone.weight_on_bit) is kind
         run = drillctl.simulate(alone.replace({**drawn, "simulation.engine": "batch"}))
-        j1 = found.runs.measures["j1"][0, k, 2]
+        j1 = found.measures["j1"][0, k, 2]
         assert j1 == pytest.approx(run.measures.j1, rel=1e-9)
 
 
@@ -150,7 +150,7 @@ def test_draws_of_the_string_are_run_one_by_one(short):
         drawn = {path: units.SI(values[1]) for path, values in found.drawn.items()}
         alone = late(design, 6e3, delay).replace({**drawn, "simulation.engine": "batch"})
         expected = drillctl.simulate(alone).measures.j1
-        assert found.runs.measures["j1"][0, k, 1] == pytest.approx(expected, rel=1e-9)
+        assert found.measures["j1"][0, k, 1] == pytest.approx(expected, rel=1e-9)
 
 
 def test_impossible_draws_are_counted_and_have_not_ended(short):
@@ -165,11 +165,11 @@ def test_impossible_draws_are_counted_and_have_not_ended(short):
     assert one.ended.value == one.ended.hits / 20
     assert found.summary()["failures"][0]["count"] == failure.count
     # The same draws at every delay, each in its place.
-    failed = np.isnan(found.runs.measures["j1"][0])
+    failed = np.isnan(found.measures["j1"][0])
     assert failed.sum(axis=1).tolist() == [failure.count] * 2
     np.testing.assert_array_equal(failed[0], failed[1])
     later = weight_delay(design, [6e3], [0.5], 20)
-    np.testing.assert_array_equal(later.runs.measures["j1"][0, 0], found.runs.measures["j1"][0, 1])
+    np.testing.assert_array_equal(later.measures["j1"][0, 0], found.measures["j1"][0, 1])
 
 
 # --- what is told ------------------------------------------------------------------------------
@@ -190,10 +190,10 @@ def test_delay_turns_a_smooth_rig_to_stick_slip(result):
 
 def test_shares_have_their_intervals(result):
     one = result.benefits[2][2]
-    ended = result.runs.ended[2, 2]
+    ended = result.ended[2, 2]
     assert one.ended.hits == ended.sum()
     assert one.ended.interval == share_interval(int(ended.sum()), DRAWS)
-    assert one.peak_bit_speed == pytest.approx(result.runs.measures["peak_bit_speed"][2, 2].mean())
+    assert one.peak_bit_speed == pytest.approx(result.measures["peak_bit_speed"][2, 2].mean())
 
 
 def test_ended_is_neither_sticking_nor_stalled_nor_failed():
@@ -225,9 +225,9 @@ def test_saved_and_read_back(result, tmp_path):
     back = drillctl.open(result.save(tmp_path / "run"))
     assert back.summary() == result.summary() == json.loads(json.dumps(result.summary()))
     assert back.limits == result.limits
-    for name, values in result.runs.measures.items():
-        np.testing.assert_array_equal(back.runs.measures[name], values)
-    np.testing.assert_array_equal(back.runs.status, result.runs.status)
+    for name, values in result.measures.items():
+        np.testing.assert_array_equal(back.measures[name], values)
+    np.testing.assert_array_equal(back.status, result.status)
     for path, values in result.drawn.items():
         np.testing.assert_array_equal(back.drawn[path], values)
 
@@ -292,9 +292,9 @@ def test_stick_slip_ends_up_to_a_delay_and_at_all_shorter_ones(shares, expected)
 
 def ended_at(result, *delays):
     """The result with stick-slip ended in all draws of the gain 6 kN s/rad at some delays alone."""
-    status = np.full_like(result.runs.status, STATUSES.index("sticking"))
+    status = np.full_like(result.status, STATUSES.index("sticking"))
     status[2, [DELAYS.index(delay) for delay in delays]] = STATUSES.index("ok")
-    return replace(result, runs=replace(result.runs, status=status))
+    return replace(result, status=status)
 
 
 @pytest.mark.parametrize(
@@ -320,8 +320,8 @@ def test_a_design_whose_own_weight_follows_is_taken_as_it_is(short):
     assert not bare.tables.weight_delay.values
     assert following_design(bare).weight_on_bit.hoist == 0.5
     one, other = (weight_delay(d, [6e3], [0.1, 0.5], 2) for d in (bare, short))
-    for name, values in one.runs.measures.items():
-        np.testing.assert_array_equal(values, other.runs.measures[name])
+    for name, values in one.measures.items():
+        np.testing.assert_array_equal(values, other.measures[name])
 
 
 def test_a_constant_weight_alone_gets_the_law_without_limits():

@@ -12,9 +12,7 @@ from typing import NamedTuple
 from drillctl.reporting.blocks import Block, Text, block, figure
 from drillctl.reporting.gather import Gathered
 from drillctl.reporting.sections import (
-    advantage,
     audit,
-    comparison,
     responses,
     rig,
     stability,
@@ -43,8 +41,6 @@ KINDS = (
     Kind("uncertainty", "Uncertainty", ("uncertainty", "setting"), uncertainty.build),
     Kind("sensitivity", "Sensitivity", ("uncertainty",), uncertainty.build_sensitivity),
     Kind("tuning", "Tuned gains and their certificate", ("tune",), tuning.build),
-    Kind("comparison", "Comparison of cases", ("compare",), comparison.build),
-    Kind("advantage", "Advantage of dynamic weight on bit", ("advantage",), advantage.build),
     Kind("audit", "Accuracy audit",
          ("simulate", "map", "uncertainty", "doctor", "mesh-1", "mesh-2", "mesh-4", "step-2",
           "step-4"), audit.build),
@@ -53,8 +49,8 @@ KINDS = (
 """Every section that is not of a study object, in the order in which they are read."""
 _ORDER = {
     "summary": 0, "rig": 10, "operating-point": 20, "modes": 30, "loop": 40, "map": 50,
-    "responses": 60, "uncertainty": 70, "sensitivity": 80, "tuning": 90, "comparison": 100,
-    "advantage": 110, "audit": 120, "glossary": 130,
+    "responses": 60, "uncertainty": 70, "sensitivity": 80, "tuning": 90,
+     "audit": 120, "glossary": 130,
 }  # fmt: skip
 
 

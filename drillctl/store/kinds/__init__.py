@@ -1,14 +1,8 @@
 """Kinds of result: what each was asked for, and how it is read back."""
 
 from drillctl.store.kinds import (
-    advantage,
-    comparisons,
     tuning,
 )
 
-KINDS = (
-    *comparisons.KINDS,
-    *advantage.KINDS,
-    *tuning.KINDS,
-)
+KINDS = (*tuning.KINDS,)
 """Every kind that is written and read back."""

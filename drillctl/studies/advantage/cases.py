@@ -21,18 +21,18 @@ from drillctl.design import Design
 from drillctl.ensemble.cases import Estimate, Runs, percentile_estimate
 from drillctl.ensemble.draws import CommonDraws, matching_shift
 from drillctl.progress import Progress
-from drillctl.simulation.measures import units_of
+from drillctl.store.result import label
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import CONSTANT, GAIN, KI, KP, Policies, Policy
 from drillctl.studies.robust.problem import Objective, objective_of
 
 Array = NDArray[np.float64]
 
-MEASURES = units_of(
+KEPT = (
     "j1", "mean_weight_after_start", "rop_proxy", "peak_bit_speed", "peak_pipe_torque",
     "peak_top_torque", "settling_time",
 )  # fmt: skip
-"""What is kept of every draw, with its unit."""
+"""Measures that are kept of every draw."""
 PATHS = (KP, KI, GAIN)
 STARTS = (0.0, 500.0, 1500.0)
 """Gains of the weight (N s/rad) that are tried with the constant weight's gains of the drive."""
@@ -112,18 +112,19 @@ def less(one: Array, other: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Case(Runs):
-    """A policy at its robust optimum on some terms, at fresh draws, by the names of `MEASURES`."""
+    """A policy at its robust optimum on some terms, at fresh draws."""
 
-    # names
-    policy: str
-    terms: str
-    gains: dict[str, float]  # path to value (SI)
-    at_bounds: tuple[str, ...]  # gains that lie on a bound
-    shift: float  # added to the nominal weight (N)
-    off: float  # what the terms' mean is off by at that shift, over that of the constant weight
-    tuned_value: float  # objective at the draws of the tuning (s), which flatters
-    objective: Estimate  # at the fresh draws (s)
-    objective_less: Estimate  # less that of the constant weight (s)
+    policy: str = label(means="name of the policy")
+    terms: str = label(means="name of the terms")
+    gains: dict[str, float] = label(means="path to value, SI")
+    at_bounds: tuple[str, ...] = label(means="gains that lie on a bound")
+    shift: float = label(unit="N", means="added to the nominal weight")
+    off: float = label(
+        means="what the terms' mean is off by at that shift, over that of the constant weight"
+    )
+    tuned_value: float = label(unit="s", means="objective at the draws of the tuning; flatters")
+    objective: Estimate = label(unit="s", means="at the fresh draws")
+    objective_less: Estimate = label(unit="s", means="less that of the constant weight")
 
     @property
     def name(self) -> str:
@@ -148,10 +149,8 @@ class Case(Runs):
             "tuned_value": self.tuned_value,
             "objective": self.objective.summary(),
             "objective_difference": self.objective_less.summary(),
-            "means": {name: self.mean(name) for name in MEASURES},
-            "differences": {
-                name: self.difference(baseline, name, seed).summary() for name in MEASURES
-            },
+            "means": {name: self.mean(name) for name in KEPT},
+            "differences": {name: self.difference(baseline, name, seed).summary() for name in KEPT},
             "levels": shares,
             "step": self.step,
             "modes": self.modes,
@@ -244,7 +243,7 @@ def _case(
 ) -> Case:  # fmt: skip
     gains = {t.path: float(v) for t, v in zip(policy.tuned, best.values, strict=True)}
     return Case(
-        measures={name: own.runs.measures[name] for name in MEASURES},
+        measures={name: own.runs.measures[name] for name in KEPT},
         status=own.runs.status,
         step=own.runs.step,
         modes=own.runs.modes,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,10 @@ from drillctl.ensemble.cases import Estimate
 from drillctl.ensemble.grid import refuse_too_large
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.provenance import provenance
-from drillctl.simulation.measures import STATUSES
+from drillctl.store.result import Result, label
 from drillctl.studies.advantage.cases import (
     ALL_TERMS,
     MEAN,
-    MEASURES,
     Case,
     cases,
     fresh_draws,
@@ -27,29 +25,32 @@ from drillctl.studies.advantage.cases import (
 )
 from drillctl.studies.advantage.delays import DelayCurve, delay_curve
 from drillctl.studies.advantage.policies import IDEAL, SPEED, WEIGHT, Policies, policies
-from drillctl.studies.advantage.sweeps import FIGURES, Chart, Regions, chart, regions
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
+from drillctl.studies.advantage.sweeps import Chart, Regions, chart, regions
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Advantage:
-    """PI against PI with a weight that follows the bit speed, each at its own robust optimum."""
+class Advantage(Result):
+    """PI against PI with a weight that follows the bit speed, each at its own robust optimum.
 
-    design: Design  # its `[advantage]` and `[tune]` tables say what was compared and to what end
-    cases: tuple[Case, ...]  # at the design's own weight and speed; the constant weight first
-    regions: tuple[Regions, ...]  # of every policy, over the gains of the drive
-    front: Chart  # over weights at the design's own speed
-    chart: Chart  # over weights and speeds
-    delay: DelayCurve  # against the delay of the real path
-    total_seconds: float  # from call to return (s)
-    # versions and processor it came from
-    provenance: dict[str, str] = field(default_factory=provenance)
+    Its design's `[advantage]` and `[tune]` say what was compared and to what end.
+    """
+
+    kind: ClassVar[str] = "advantage"
+
+    design: Design = label(means="what was compared")
+    cases: tuple[Case, ...] = label(
+        over="case", flat=True,
+        means="at the design's own weight and speed; the constant weight first",
+    )  # fmt: skip
+    regions: tuple[Regions, ...] = label(
+        over="policy", flat=True, means="of each policy, over the gains of the drive"
+    )
+    front: Chart = label(means="over weights at the design's own speed")
+    chart: Chart = label(name="map", means="over weights and speeds")
+    delay: DelayCurve = label(means="against the delay of the real path")
+    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def baseline(self) -> Case:
@@ -77,47 +78,22 @@ class Advantage:
         return self.case(IDEAL, MEAN.name).objective_less
 
     @property
-    def data(self) -> xarray.Dataset:
-        """Draws of the cases, regions, front, map and delays; with units."""
-        import xarray
+    def objective(self) -> str:
+        """What the gains are tuned to."""
+        tune = self.design.tables.tune
+        return {
+            "mean": "mean of J1",
+            "quantile": f"{tune.quantile:.0%} quantile of J1",
+            "cvar": f"mean of J1 beyond its {tune.quantile:.0%} quantile",
+            "worst": "worst J1",
+        }[tune.objective]
 
-        coordinates: dict[str, Any] = {
-            "case": ("case", np.array([case.name for case in self.cases], dtype=object)),
+    def derived(self) -> dict[str, Any]:
+        """Names of policies and gains."""
+        return {
             "policy": ("policy", np.array(self.chart.policies, dtype=object)),
             "parameter": ("parameter", np.array(["kp", "ki", "gain"], dtype=object)),
-            "kp": ("kp", self.regions[0].kp, {"units": "N*m*s"}),
-            "ki": ("ki", self.regions[0].ki, {"units": "N*m"}),
-            "weight": ("weight", self.chart.weights, {"units": "N"}),
-            "speed": ("speed", self.chart.speeds, {"units": "rad/s"}),
-            "kept_delay": ("kept_delay", self.delay.kept.delays, {"units": "s"}),
-            "anew_delay": ("anew_delay", self.delay.anew.delays, {"units": "s"}),
         }
-        variables: dict[str, Any] = {
-            f"case_{name}": (
-                ("case", "realization"),
-                np.stack([case.measures[name] for case in self.cases]),
-                {"units": unit},
-            )
-            for name, unit in MEASURES.items()
-        }
-        flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
-        status = np.stack([case.status for case in self.cases])
-        variables["case_status"] = (("case", "realization"), status, flags)
-        variables |= _regions(self.regions)
-        for prefix, found, over in (
-            ("front", self.front, ("policy", "weight")),
-            ("map", self.chart, ("policy", "weight", "speed")),
-        ):
-            for name, unit in FIGURES.items():
-                values = found.figures[name][:, :, 0] if prefix == "front" else found.figures[name]
-                variables[f"{prefix}_{name}"] = (over, values, {"units": unit})
-        for prefix, line in (("kept", self.delay.kept), ("anew", self.delay.anew)):
-            variables[f"{prefix}_gains"] = ((f"{prefix}_delay", "parameter"), line.gains)
-            for name in ("objective", "advantage", "low", "high"):
-                variables[f"{prefix}_{name}"] = (
-                    f"{prefix}_delay", getattr(line, name), {"units": "s"},
-                )  # fmt: skip
-        return xarray.Dataset(variables, coordinates, dict(self.provenance))
 
     def summary(self) -> dict[str, Any]:
         """Cases with paired differences, areas, front, map, crossing delays; SI units."""
@@ -138,22 +114,6 @@ class Advantage:
             "material": table.material,
             "total_seconds": self.total_seconds,
         }
-
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
-
-
-def _regions(found: tuple[Regions, ...]) -> dict[str, Any]:
-    over = ("policy", "kp", "ki")
-    return {
-        "region_j1": (
-            (*over, "region_realization"), np.stack([one.j1 for one in found]), {"units": "s"},
-        ),
-        "region_nominal_j1": (over, np.stack([one.nominal for one in found]), {"units": "s"}),
-    }  # fmt: skip
 
 
 def _chart_summary(found: Chart) -> dict[str, Any]:
@@ -218,9 +178,9 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
     areas = regions(compared, optima, progress)
     curve = delay_curve(compared, optima, draws, progress)
     over = chart(compared, table.weights, table.speeds, draws, progress)
-    front = over.at_speed(design.speed) or chart(
-        compared, table.weights, (design.speed,), draws, progress
-    )
+    front = over.at_speed(design.speed)
+    if front is None:
+        front = chart(compared, table.weights, (design.speed,), draws, progress, "front_speed")
     return Advantage(
         design=design,
         cases=found,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from drillctl.ensemble.cases import Crossing, percentile_estimate, resampled_crossing
 from drillctl.ensemble.draws import CommonDraws
 from drillctl.progress import Progress
+from drillctl.store.result import label
 from drillctl.studies.advantage.cases import Optima, less, measured, optimum_beside
 from drillctl.studies.advantage.optimum import Optimum
 from drillctl.studies.advantage.policies import DELAY, Policies, Policy
@@ -34,16 +35,22 @@ STEPS_ANEW = 5
 class DelayLine:
     """One choice of gains over the delays, at the same fresh draws."""
 
-    delays: Array  # shape (delays,): Increasing (s), closer together where the advantage vanishes
-    gains: Array  # shape (delays, 3): kp, ki and the gain of the weight (SI)
-    objective: Array  # shape (delays,): At the fresh draws (s)
-    # shape (delays,): Objective of the constant weight less that, and its 95 % interval (s)
-    advantage: Array
-    low: Array
-    high: Array
-    zero: Crossing  # where the advantage first is none
-    # where it first falls under the stated share of the constant weight's objective
-    material: Crossing
+    name: str
+    delays: Array = label(
+        "{name}_delay", unit="s", name="{name}_delay",
+        means="increasing, closer together where the advantage vanishes",
+    )  # fmt: skip
+    gains: Array = label("{name}_delay", "parameter", means="kp, ki and K_w, SI")
+    objective: Array = label("{name}_delay", unit="s", means="at the fresh draws")
+    advantage: Array = label(
+        "{name}_delay", unit="s", means="objective of the constant weight less that"
+    )
+    low: Array = label("{name}_delay", unit="s", means="lower end of its 95 % interval")
+    high: Array = label("{name}_delay", unit="s", means="upper end of its 95 % interval")
+    zero: Crossing = label(means="where the advantage first is none")
+    material: Crossing = label(
+        means="where it first falls under the stated share of the constant weight's objective"
+    )
 
     @property
     def indistinct_from(self) -> float | None:
@@ -56,12 +63,13 @@ class DelayLine:
 class DelayCurve:
     """The advantage against the delay of the path."""
 
-    # shape (delays,): Of the way from the bit to the driller (s); lags and limits are the same at
-    # all
-    delays: Array
-    constant: float  # objective of the constant weight (s)
-    kept: DelayLine  # gains of the ideal path
-    anew: DelayLine  # gains tuned at each delay
+    delays: Array = label(
+        "delay", unit="s",
+        means="of the way from the bit to the driller; lags and limits are the same at all",
+    )  # fmt: skip
+    constant: float = label(unit="s", means="objective of the constant weight")
+    kept: DelayLine = label(means="gains of the ideal path")
+    anew: DelayLine = label(means="gains tuned at each delay")
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values, SI."""
@@ -101,8 +109,8 @@ def delay_curve(
     return DelayCurve(
         delays,
         ground,
-        _line(kept, constant, table.material),
-        _line(anew, constant, table.material),
+        _line("kept", kept, constant, table.material),
+        _line("anew", anew, constant, table.material),
     )
 
 
@@ -180,7 +188,7 @@ def _between(delays: Array, advantage: Array) -> list[float]:
     return [float(delay) for delay in inside]
 
 
-def _line(points: Points, constant: Array, share: float) -> DelayLine:
+def _line(name: str, points: Points, constant: Array, share: float) -> DelayLine:
     """A line from what was measured: objectives of the draws, then of every resample."""
     delays = np.array(sorted(points))
     gains = np.stack([points[delay][0] for delay in delays.tolist()])
@@ -190,6 +198,7 @@ def _line(points: Points, constant: Array, share: float) -> DelayLine:
     padded = np.zeros((len(gains), 3))
     padded[:, : gains.shape[1]] = gains
     return DelayLine(
+        name=name,
         delays=delays,
         gains=padded,
         objective=found[:, 0],

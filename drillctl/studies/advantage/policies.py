@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design, parameter
-from drillctl.design.study_tables import GAIN, LAW, REAL_PATH
 from drillctl.design.validation import validated
 from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.errors import InputError
+from drillctl.studies.advantage.settings import GAIN, REAL_PATH
 from drillctl.studies.delay.lanes import LAWS
+from drillctl.studies.delay.settings import LAW
 from drillctl.studies.robust.tuned import Tuned, put, tuned_parameters
 
 Array = NDArray[np.float64]

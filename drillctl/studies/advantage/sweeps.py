@@ -17,6 +17,7 @@ from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.probability import INNER, OUTER, Area, Scatter, probability_map, region_areas
 from drillctl.ensemble.sweeps import sweep
 from drillctl.progress import Progress
+from drillctl.store.result import label
 from drillctl.studies.advantage.cases import Measured, Optima, measured, optimum_beside
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import GAIN, SPEED, WEIGHT, Policies, Policy
@@ -42,13 +43,18 @@ class Regions:
 
     policy: str  # name
     gain: float  # of the weight (N s/rad)
-    # shape (points,): Axes: the bounds of the tuning (SI)
-    kp: Array
-    ki: Array
-    j1: Array  # shape (kp, ki, realizations): J1 at fresh draws (s); infinite where one failed
-    nominal: Array  # shape (kp, ki): J1 without draws (s); NaN where it failed
-    levels: tuple[float, ...]  # levels of J1 (s)
-    seed: int  # of the resampling
+    kp: Array = label("kp", unit="N*m*s", means="Kp over the bounds of the tuning")
+    ki: Array = label("ki", unit="N*m", means="Ki over the bounds of the tuning")
+    j1: Array = label(
+        "kp", "ki", "region_realization", unit="s", name="region_j1",
+        means="J1 at fresh draws; infinite where one failed",
+    )  # fmt: skip
+    nominal: Array = label(
+        "kp", "ki", unit="s", name="region_nominal_j1",
+        means="J1 without draws; NaN where it failed",
+    )  # fmt: skip
+    levels: tuple[float, ...] = label(unit="s", means="levels of J1")
+    seed: int = label(means="of the resampling")
 
     @cached_property
     def areas(self) -> dict[float, dict[str, Area]]:
@@ -124,11 +130,14 @@ def _nominal(design: Design, policy: Policy, axes: list[Array]) -> Array:
 class Chart:
     """Every policy at every weight and speed, each time at its own robust optimum."""
 
-    weights: Array  # shape (weights,): Nominal weight (N)
-    speeds: Array  # shape (speeds,): Set speed (rad/s)
-    policies: tuple[str, ...]  # names, the constant weight first
-    # shape (policies, weights, speeds): By the names of `FIGURES` (SI); NaN where unknown
-    figures: dict[str, Array]
+    weights: Array = label("weight", unit="N", means="nominal weight on bit")
+    speeds: Array = label("{over}", unit="rad/s", name="{over}", means="set speed")
+    policies: tuple[str, ...] = label(means="names, the constant weight first")
+    # by the names of `FIGURES`; NaN where unknown
+    figures: dict[str, Array] = label(
+        "policy", "weight", "{over}", unit=lambda name: FIGURES[name], flat=True
+    )
+    over: str = "speed"  # name of the dimension of the speeds
 
     def at_speed(self, speed: float) -> Chart | None:
         """The part at one set speed (rad/s), where it is among the speeds."""
@@ -136,7 +145,7 @@ class Chart:
         if not j.size:
             return None
         figures = {name: values[:, :, j] for name, values in self.figures.items()}
-        return Chart(self.weights, self.speeds[j], self.policies, figures)
+        return Chart(self.weights, self.speeds[j], self.policies, figures, "front_speed")
 
     def significant(self, policy: int) -> NDArray[np.bool_]:
         """Where the interval of a policy's advantage excludes zero, shape (weights, speeds)."""
@@ -146,7 +155,7 @@ class Chart:
 
 def chart(
     compared: Policies, weights: Sequence[float], speeds: Sequence[float], draws: CommonDraws,
-    progress: Progress,
+    progress: Progress, over: str = "speed",
 ) -> Chart:  # fmt: skip
     """Tune every policy at every weight and speed, and measure it at the fresh draws."""
     shape = (len(compared), len(weights), len(speeds))
@@ -172,7 +181,7 @@ def chart(
                     figures[name][k, i, j] = np.nan if value is None else value
                 progress.advance(1)
     names = tuple(policy.name for policy in compared)
-    return Chart(np.array(weights), np.array(speeds), names, figures)
+    return Chart(np.array(weights), np.array(speeds), names, figures, over)
 
 
 def _figures(best: Optimum, own: Measured, ground: Measured) -> dict[str, float | None]:

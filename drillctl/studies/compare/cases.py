@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from drillctl import units
 from drillctl.design import Design, parameter
-from drillctl.ensemble.grid import axes_of, shape_of
+from drillctl.ensemble.grid import axes_of
 from drillctl.ensemble.parameters import Uncertain, uncertain_parameters
 from drillctl.ensemble.sweeps import Sweep, sweep
 from drillctl.errors import InputError
 from drillctl.progress import Progress, Within
 from drillctl.simulation import Simulation, simulate
-from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.simulation.trajectory import SIGNALS
 
 if TYPE_CHECKING:
     from drillctl.design.tables import AxisTable
-
-Array = NDArray[np.float64]
 
 ALONE = "as designed"
 """Name of the only case of a design without cases."""
@@ -157,50 +150,3 @@ def _map(design: Design, tables: tuple[AxisTable, ...] | None, progress: Progres
     if len(tables) != 2:
         raise InputError(f"a map runs over 2 parameters, [map] has {len(tables)}")
     return sweep(design, axes_of(design, tables), audit_cells=0, progress=Within(progress))
-
-
-def map_dimension(path: str, drawn: Sequence[str]) -> str:
-    """Name of a map's dimension: the path, unless draws of that parameter are called so."""
-    return f"map {path}" if path in drawn else path
-
-
-def labelled(cases: Sequence[Nominal], drawn: Sequence[str]) -> dict[str, Any]:
-    """Variables and coordinates of the maps and responses of all cases."""
-    return _maps(cases, drawn) | _responses(cases)
-
-
-def _maps(cases: Sequence[Nominal], drawn: Sequence[str]) -> dict[str, Any]:
-    like = next((case.map for case in cases if case.map is not None), None)
-    if like is None:
-        return {}
-    names = [map_dimension(axis.path, drawn) for axis in like.axes]
-    over = ("case", *names)
-    made: dict[str, Any] = {
-        name: (name, axis.values, {"units": axis.unit})
-        for name, axis in zip(names, like.axes, strict=True)
-    }
-    absent = np.full(shape_of(like.axes), np.nan)
-    for name in like.measures:
-        values = [absent if case.map is None else case.map.measures[name] for case in cases]
-        made[f"map_{name}"] = (over, np.stack(values), {"units": MEASURES[name].unit})
-    none = np.full(absent.shape, STATUSES.index("failed"), dtype=np.int8)
-    status = [none if case.map is None else case.map.status for case in cases]
-    flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
-    made["map_status"] = (over, np.stack(status), flags)
-    return made
-
-
-def _responses(cases: Sequence[Nominal]) -> dict[str, Any]:
-    """Each with its own times: a step of its own makes its samples fall elsewhere."""
-    longest = max(len(case.response.time) for case in cases)
-
-    def padded(values: Array) -> Array:
-        return np.pad(values, (0, longest - len(values)), constant_values=np.nan)
-
-    over = ("case", "sample")
-    time = np.stack([padded(case.response.time) for case in cases])
-    made: dict[str, Any] = {"response_time": (over, time, {"units": "s"})}
-    for name, (unit, words) in SIGNALS.items():
-        values = np.stack([padded(case.response.signals[name]) for case in cases])
-        made[f"response_{name}"] = (over, values, {"units": unit, "long_name": words})
-    return made

@@ -1,17 +1,16 @@
 """Cases compared at equal terms: the same starts, the same draws, optionally the same mean weight.
 
-What differs between two cases is told by the paired difference: at every draw one case less the
-other, and the mean of that. Most of what the draws scatter is common to both and drops out.
+What differs between two cases is their paired difference, see `ensemble.cases`.
 """
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from contextlib import suppress
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,49 +23,44 @@ from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.ensemble.regions import Region, region
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.provenance import provenance
-from drillctl.simulation.measures import STATUSES, units_of
+from drillctl.store.result import Result, label
 from drillctl.studies.compare.cases import (
     Nominal,
     case_designs,
     cells_of,
     in_case,
-    labelled,
     nominal_runs,
     refuse_unequal,
     shifted_design,
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
-
     from drillctl.design.tables import AxisTable
 
 Array = NDArray[np.float64]
 
-MEASURES = units_of(
+COMPARED = (
     "j1", "stuck_time", "stick_slip_index", "peak_bit_speed", "peak_pipe_torque",
     "peak_top_torque", "settling_time", "mean_weight_on_bit", "mean_weight_after_start",
     "rop_proxy", "work_per_turn", "time_outside_table",
 )  # fmt: skip
-"""What is compared, with its unit."""
+"""Measures that are compared."""
 NO_ANSWER = "no finite answer"
 """Reason of a run that broke down."""
 
 
 @dataclass(frozen=True, eq=False)
 class ComparedCase(Runs):
-    """One case at all draws, by the names of `MEASURES`."""
+    """One case at all draws."""
 
-    name: str
-    design: Design  # what was simulated, but for the draws and the shift
-    # shape (draws,): values of the uncertain parameters by path (SI)
-    drawn: dict[str, Array]
-    failures: tuple[Failures, ...]  # draws without a result, by reason
-    weight_shift: float  # added to the nominal weight on bit for the sake of equal means (N)
-    nominal: Nominal  # map and motion at its own values, the weight shifted as for the draws
+    name: str = label()
+    design: Design = label(means="what was simulated, but for the draws and the shift")
+    drawn: dict[str, Array] = label("realization", means="drawn values by path, SI")
+    failures: tuple[Failures, ...] = label(means="draws without a result, by reason")
+    weight_shift: float = label(
+        unit="N", means="added to the nominal weight on bit for the sake of equal means"
+    )
+    nominal: Nominal = label(means="map and motion at its own values, the weight shifted")
 
     def region(self, level: float) -> Region | None:
         """Cells and outline of the nominal map at or under a level of J1 (s); None without map."""
@@ -85,7 +79,7 @@ class ComparedCase(Runs):
                 "area_fraction": None if inside is None else inside.area_fraction,
             }
         return {
-            "measures": {name: self.distribution(name) for name in MEASURES},
+            "measures": {name: self.distribution(name) for name in self.measures},
             "regions": regions,
             "statuses": self.counts(),
             "failures": [asdict(failure) for failure in self.failures],
@@ -97,38 +91,21 @@ class ComparedCase(Runs):
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
-    """Cases at the same starts and the same draws.
+class Comparison(Result):
+    """Cases at the same starts and the same draws."""
 
-    Attributes
-    ----------
-    design : Design
-        Whose cases they are; of cases given one by one the first.
-    cases : tuple of ComparedCase
-        The baseline first.
-    realizations, seed : int
-        Number of draws, and what they follow from.
-    levels : tuple of float
-        Levels of J1 (s).
-    weight_from : float
-        Where the window of `mean_weight_after_start` begins (s).
-    equal_mean_weight : bool
-        Whether nominal weights were shifted for equal means.
-    total_seconds : float
-        From call to return (s).
-    provenance : dict of str
-        Versions and processor it came from.
-    """
+    kind: ClassVar[str] = "compare"
 
-    design: Design
-    cases: tuple[ComparedCase, ...]
-    realizations: int
-    seed: int
-    levels: tuple[float, ...]
-    weight_from: float
-    equal_mean_weight: bool
-    total_seconds: float
-    provenance: dict[str, str] = field(default_factory=provenance)
+    design: Design = label(means="whose cases they are; of cases given one by one the first")
+    cases: tuple[ComparedCase, ...] = label(over="case", flat=True, means="the baseline first")
+    realizations: int = label(means="number of draws")
+    seed: int = label(means="what the draws follow from")
+    levels: tuple[float, ...] = label(unit="s", means="levels of J1")
+    weight_from: float = label(
+        unit="s", means="where the window of `mean_weight_after_start` begins"
+    )
+    equal_mean_weight: bool = label(means="whether nominal weights were shifted for equal means")
+    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def baseline(self) -> ComparedCase:
@@ -139,33 +116,21 @@ class Comparison:
     def paired(self) -> dict[str, dict[str, Estimate]]:
         """Mean difference of every other case from the baseline, by case and measure."""
         return {
-            case.name: {name: case.difference(self.baseline, name, self.seed) for name in MEASURES}
+            case.name: {
+                name: case.difference(self.baseline, name, self.seed) for name in case.measures
+            }
             for case in self.cases[1:]
         }
 
-    @property
-    def data(self) -> xarray.Dataset:
-        """Measures, statuses, drawn values by case and realization; maps, responses; with units."""
-        import xarray
-
+    def derived(self) -> dict[str, Any]:
+        """Drawn values with their units."""
         over = ("case", "realization")
-        coordinates = {
-            "case": ("case", np.array([case.name for case in self.cases], dtype=object)),
-            "realization": ("realization", np.arange(self.realizations)),
-        }
-        variables: dict[str, Any] = {
-            name: (over, np.stack([case.measures[name] for case in self.cases]), {"units": unit})
-            for name, unit in MEASURES.items()
-        }
-        for drawn in uncertain_parameters(self.baseline.design):
-            values = np.stack([case.drawn[drawn.path] for case in self.cases])
-            variables[drawn.path] = (over, values, {"units": drawn.unit})
-        flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
-        variables["status"] = (over, np.stack([case.status for case in self.cases]), flags)
-        variables |= labelled([case.nominal for case in self.cases], list(self.baseline.drawn))
-        designs = json.dumps([to_toml(case.design) for case in self.cases])
-        attributes = {**self.provenance, "case_designs": designs}
-        return xarray.Dataset(variables, coordinates, attributes)
+        return {
+            f"drawn.{one.path}": (
+                over, np.stack([case.drawn[one.path] for case in self.cases]), {"units": one.unit},
+            )
+            for one in uncertain_parameters(self.baseline.design)
+        }  # fmt: skip
 
     def summary(self) -> dict[str, Any]:
         """Cases with their measures and regions, paired differences, settings; SI units."""
@@ -187,11 +152,13 @@ class Comparison:
             "total_seconds": self.total_seconds,
         }
 
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """Cases that the design does not name."""
+        cases = {case.name: case.design for case in self.cases}
+        with suppress(InputError):  # cases given one by one need not be those of their first
+            if list(cases.items()) == list(case_designs(self.design).items()):
+                return self.design, {}
+        return self.design, {"cases": {name: to_toml(case) for name, case in cases.items()}}
 
 
 def compare(
@@ -287,7 +254,7 @@ def _compared(
         failures = (*failures, Failures(NO_ANSWER, broken, "a number of the run is not finite"))
     progress.advance(draws.count)
     return ComparedCase(
-        measures={measure: runs.measures[measure] for measure in MEASURES},
+        measures={measure: runs.measures[measure] for measure in COMPARED},
         status=runs.status,
         step=runs.step,
         modes=runs.modes,

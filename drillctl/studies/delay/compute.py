@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,16 +30,11 @@ from drillctl.ensemble.cases import (
 )
 from drillctl.ensemble.draws import Failures
 from drillctl.ensemble.grid import refuse_too_large
-from drillctl.ensemble.parameters import draw, refuse_dependent, uncertain_parameters
+from drillctl.ensemble.parameters import draw, refuse_dependent
 from drillctl.progress import SILENT, Progress
-from drillctl.provenance import provenance
-from drillctl.simulation.measures import STATUSES
-from drillctl.studies.delay.lanes import MEASURES, delayed_lanes, following_design
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
+from drillctl.simulation.measures import MEASURES, STATUSES
+from drillctl.store.result import Result, label
+from drillctl.studies.delay.lanes import KEPT, delayed_lanes, following_design
 
 Array = NDArray[np.float64]
 
@@ -117,34 +112,27 @@ def lasting(shares: Sequence[float], enough: float = ENOUGH) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class WeightDelay:
+class WeightDelay(Result, Runs):
     """A weight on bit that follows the bit speed, over gains and delays, at the same draws.
 
-    Attributes
-    ----------
-    design : Design
-        Its `[weight_delay]` holds gains, delays and law, its `[uncertainty]` number and seed.
-    drawn : dict of ndarray, shape (realizations,)
-        Values of the uncertain parameters by path (SI).
-    runs : Runs, shape (gains, delays, realizations)
-        Measures and statuses.
-    constant : Runs, shape (realizations,)
-        Of the constant weight, K_w = 0.
-    failures : tuple of Failures
-        Why draws came to nothing.
-    total_seconds : float
-        From call to return (s).
-    provenance : dict of str
-        Versions and processor it came from.
+    Its design's `[weight_delay]` holds gains, delays and law, its `[uncertainty]` number and seed
+    of the draws. It is itself the runs of all gains and delays: `at(i, k)` gives those of one.
     """
 
-    design: Design
-    drawn: dict[str, Array]
-    runs: Runs
-    constant: Runs
-    failures: tuple[Failures, ...]
-    total_seconds: float
-    provenance: dict[str, str] = field(default_factory=provenance)
+    kind: ClassVar[str] = "delay"
+
+    measures: dict[str, Array] = label(
+        "gain", "delay", "realization", unit=lambda name: MEASURES[name].unit,
+        means="measures by name; NaN where a run failed", flat=True,
+    )  # fmt: skip
+    status: NDArray[np.int8] = label(
+        "gain", "delay", "realization", flags=STATUSES, means="how each run ended"
+    )
+    design: Design = label(means="what was run")
+    drawn: dict[str, Array] = label("realization", means="drawn values by path, SI")
+    constant: Runs = label(means="of the constant weight, K_w = 0")
+    failures: tuple[Failures, ...] = label(means="draws without a result, by reason")
+    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def gains(self) -> Array:
@@ -180,7 +168,7 @@ class WeightDelay:
     def benefits(self) -> tuple[tuple[DelayedBenefit, ...], ...]:
         """By gain and delay."""
         return tuple(
-            tuple(self._benefit(self.runs.at(i, k), float(d)) for k, d in enumerate(self.delays))
+            tuple(self._benefit(self.at(i, k), float(d)) for k, d in enumerate(self.delays))
             for i in range(len(self.gains))
         )
 
@@ -209,50 +197,27 @@ class WeightDelay:
         at, after = ([None, *benefits, None][held + k] for k in (0, 1))
         return GainLimits(gain, at, after, harmful)
 
-    @property
-    def data(self) -> xarray.Dataset:
-        """Runs by gain, delay and realization; means, differences, shares; with units."""
-        import xarray
+    def derived(self) -> dict[str, Any]:
+        """Gains and delays, and the difference and the end of stick-slip of each, with units."""
 
-        over = ("gain", "delay", "realization")
-        coordinates = {
-            "gain": ("gain", self.gains, {"units": "N*s/rad"}),
-            "delay": ("delay", self.delays, {"units": "s"}),
-            "realization": ("realization", np.arange(self.realizations)),
-        }
-        flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
-        variables: dict[str, Any] = {
-            "status": (over, self.runs.status, flags),
-            "constant_status": ("realization", self.constant.status, flags),
-        }
-        for name, unit in MEASURES.items():
-            variables[name] = (over, self.runs.measures[name], {"units": unit})
-            alone = self.constant.measures[name]
-            variables[f"constant_{name}"] = ("realization", alone, {"units": unit})
-        for drawn in uncertain_parameters(following_design(self.design)):
-            variables[drawn.path] = ("realization", self.drawn[drawn.path], {"units": drawn.unit})
-        for name, (unit, values) in self._figures().items():
-            variables[name] = (("gain", "delay"), values, {"units": unit})
-        return xarray.Dataset(variables, coordinates, dict(self.provenance))
-
-    def _figures(self) -> dict[str, tuple[str, Array]]:
-        """What is told of each gain and delay, with its unit."""
-
-        def over(pick: Callable[[DelayedBenefit], float | None]) -> Array:
-            return np.array([[pick(one) for one in row] for row in self.benefits], dtype=float)
+        def over(unit: str, pick: Callable[[DelayedBenefit], Any]) -> tuple[Any, ...]:
+            values = [[pick(one) for one in row] for row in self.benefits]
+            return ("gain", "delay"), np.array(values, dtype=float), {"units": unit}
 
         return {
-            "difference": ("s", over(lambda one: one.difference.value)),
-            "difference_low": ("s", over(lambda one: one.difference.ends[0])),
-            "difference_high": ("s", over(lambda one: one.difference.ends[1])),
-            "ended_share": ("1", over(lambda one: one.ended.value)),
-            "ended_low": ("1", over(lambda one: one.ended.interval[0])),
-            "ended_high": ("1", over(lambda one: one.ended.interval[1])),
+            "gain": ("gain", self.gains, {"units": "N*s/rad"}),
+            "delay": ("delay", self.delays, {"units": "s"}),
+            "difference": over("s", lambda one: one.difference.value),
+            "difference_low": over("s", lambda one: one.difference.ends[0]),
+            "difference_high": over("s", lambda one: one.difference.ends[1]),
+            "ended_share": over("1", lambda one: one.ended.value),
+            "ended_low": over("1", lambda one: one.ended.interval[0]),
+            "ended_high": over("1", lambda one: one.ended.interval[1]),
         }
 
     def summary(self) -> dict[str, Any]:
         """Limits and figures of every gain and delay, settings; SI units."""
-        step, modes = scheme_of([self.constant, self.runs])
+        step, modes = scheme_of([self.constant, self])
         constant = self.baseline.summary()
         for key in ("delay", "difference", "difference_interval_95", "pairs"):
             del constant[key]
@@ -271,12 +236,6 @@ class WeightDelay:
             "modes": modes,
             "total_seconds": self.total_seconds,
         }
-
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
 
 
 def weight_delay(
@@ -334,12 +293,16 @@ def weight_delay(
     found = []
     for gain in table.gains:
         # The constant weight is the same at any delay.
-        found.append(lanes.run(gain) if gain > 0.0 else constant.over(shape, MEASURES))
+        found.append(lanes.run(gain) if gain > 0.0 else constant.over(shape, KEPT))
         progress.advance(count * len(table.delays))
+    runs = joined(found, np.stack)
     return WeightDelay(
+        measures=runs.measures,
+        status=runs.status,
+        step=runs.step,
+        modes=runs.modes,
         design=design,
         drawn=draws.values,
-        runs=joined(found, np.stack),
         constant=constant,
         failures=lanes.parts[0].failures,
         total_seconds=time.perf_counter() - begin,

@@ -10,23 +10,22 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
-from drillctl.design.study_tables import VARIED
 from drillctl.ensemble.cases import Runs, joined
 from drillctl.ensemble.draws import DrawnGroup, DrawnLanes, drawn_lanes, run_draws
 from drillctl.ensemble.parameters import Draws, uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.lanes import Lanes
-from drillctl.simulation.measures import units_of
+from drillctl.studies.delay.settings import VARIED
 
 Array = NDArray[np.float64]
 
 LAWS = ("navarro-lopez-suarez", "surface-observer")
 """Laws of a weight that follows the bit speed."""
 GAIN, DELAY = VARIED
-MEASURES = units_of(
-    "j1", "peak_bit_speed", "peak_pipe_torque", "mean_weight_on_bit", "mean_weight_after_start"
-)
-"""What is kept of a run, with its unit."""
+KEPT = (
+    "j1", "peak_bit_speed", "peak_pipe_torque", "mean_weight_on_bit", "mean_weight_after_start",
+)  # fmt: skip
+"""Measures that are kept of a run."""
 
 
 def following_design(design: Design) -> Design:
@@ -77,7 +76,7 @@ class DelayedLanes:
         for part, size in zip(self.parts, sizes, strict=True):
             given = _replaced(part, lambda lanes: _with(lanes, gain=np.full(len(lanes), gain)))
             runs = run_draws(given, size * self.draws)
-            found.append(runs.over((size, self.draws), MEASURES))
+            found.append(runs.over((size, self.draws), KEPT))
         return joined(found, np.concatenate)
 
 

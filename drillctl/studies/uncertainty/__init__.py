@@ -100,7 +100,7 @@ def _areas(name: str, title: str, result: Uncertainty) -> Table:
 
 
 def _best(result: Uncertainty) -> Table:
-    from drillctl.store.tables import Column, Estimate, Table
+    from drillctl.store.tables import Column, Table, open_estimate
 
     columns = (
         Column("objective", "best by"), Column("value", interval=True),
@@ -115,9 +115,8 @@ def _best(result: Uncertainty) -> Table:
             rows.append([f"{name}: {error.problem}", *[None] * (len(columns) - 1)])
             continue
         alike = None if found.alike is None else int(found.alike.sum())
-        known = None if found.interval == (None, None) else found.interval
         at = result.at(found.cell).values()
-        rows.append([name, Estimate(found.value, known), *at, alike])
+        rows.append([name, open_estimate(found.value, found.interval), *at, alike])
     return Table("best", "best cells over the draws (J1 in s, 95 % interval)", columns, rows)
 
 
