@@ -1,6 +1,10 @@
-"""Draws of uncertain parameters as lanes of the batch engine; impossible ones told apart.
+"""Draws of uncertain parameters at one setting as lanes; impossible ones are counted by reason.
 
-Runs of a design at every draw, and the weight on bit that it had on the mean.
+Runs of a design at every draw, and the weight on bit that it had on the mean. All draws of a
+case share the step that the steepest of them asks for, so that compared cases and searched gains
+run at one step; each realization of a map (`realizations.py`) has a step of its own, since it
+must not depend on which others are in its block. The two give different last digits, and neither
+can take the place of the other.
 """
 
 from __future__ import annotations

@@ -1,26 +1,21 @@
-"""How the error of what was found from realizations is told: by draws, or by replicates.
-
-Monte Carlo draws are independent of each other. Points of a scrambled Sobol sequence or of a
-Latin hypercube are not, on purpose; but whole replicates of them are.
-
-Probability that J1 is at or under a level, cell by cell: variability and sampling error.
+"""Probability of J1 under a level over the cells of a map, areas of regions, and their errors.
 
 Two things that are never mixed. *Variability* is what the uncertain parameters do: the inner
 region holds the cells whose probability is at least 95 %, the outer one those of at least 5 %.
 *Sampling error* is what is not known because realizations are finite in number: intervals of
-each cell's probability, and of all cells' at once.
-
-Areas of regions, and how well they are known.
+each cell's probability, and of all cells' at once. Monte Carlo draws are independent of each
+other. Points of a scrambled Sobol sequence or of a Latin hypercube are not, on purpose; but whole
+replicates of them are (`Scatter`).
 
 The area of a region of given probability is the share of the cells whose probability is at
 least that. Its sampling error is that of a count of cells which depend on the same realizations:
-told by a bootstrap over realizations, or by leaving out replicates one by one.
+known from a bootstrap over realizations, or by leaving out replicates one by one.
 
 Neither knows of what happens in fewer than some tens of realizations: by itself the bootstrap of
 a 95 % region held its area in 61 % of the cases at 16 realizations and in 88 % at 128, on the
 paper's map. The other interval is that of the cells whose own intervals, each by itself, lie
 above the probability or reach it: as good as the bootstrap where that is good, and right at few
-realizations too. What is told is the hull of both.
+realizations too. The interval of an area is the hull of both.
 """
 
 from __future__ import annotations

@@ -25,6 +25,7 @@ from drillctl.simulation.batch import Prepared
 from drillctl.simulation.measures import MEASURES, STATUSES
 from drillctl.simulation.propagator import StringStep
 from drillctl.simulation.scheme import Scheme as StringScheme
+from drillctl.store.names import stored_name
 
 if TYPE_CHECKING:
     from drillctl.ensemble.realizations import Realizations
@@ -170,8 +171,6 @@ class ZarrBlocks:
             self._array("status", np.int8, NOT_RUN, flags)
 
     def _array(self, name: str, dtype: Any, fill: Any, attributes: dict[str, Any]) -> None:
-        from drillctl.store.names import stored_name
-
         if name in self._group:
             return
         shape = shape_of(self._job.axes)

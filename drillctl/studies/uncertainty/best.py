@@ -1,14 +1,12 @@
-"""What gains can be judged by over the realizations of J1, and how well that is known.
+"""The best cell of a map under uncertainty, and the cells that are as good as far as is known.
 
 Each objective is a functional of the distribution of J1 in a cell. Its influence function says
 what every realization adds to it, so that its sampling error, and that of a difference between
 two cells at the same realizations, is that of a mean (Hampel, J. Am. Stat. Assoc. 69 (1974)
 383-393). Smaller is better for all of them.
 
-The best cell of a map under uncertainty, and the cells that cannot be told apart from it.
-
 All cells saw the same realizations, so cells are compared by differences, realization by
-realization. A cell is told apart from the best one when its difference is above zero beyond the
+realization. A cell is worse than the best one when its difference is above zero beyond the
 sampling error, corrected for the number of cells (Bonferroni): the truly best cell is among those
 that are left with at least 95 % (Gupta, Technometrics 7 (1965) 225-245).
 

@@ -1,6 +1,6 @@
-"""How areas settle as realizations are added.
+"""How areas settle as realizations are added, and when they are enough.
 
-When enough realizations were run: a fixed schedule of looks, intervals corrected for it.
+A run stops by a fixed schedule of looks, with intervals that are corrected for their number.
 
 Looking at the data again and again until an interval happens to be narrow makes it hold less
 often than it says. The looks are therefore fixed before the first lane is run, and the interval
