@@ -67,7 +67,9 @@ def friction_curves(design: Design, ax: Axes | None = None, system: units.System
         zorder=5,
         label=f"operating point: {_weight(weight, system)}, {design.speed / RPM:.4g} rpm",
     )
-    style.dress(ax, "bit speed (rpm)", f"bit torque ({torque_unit})", "Bit-rock friction")
+    style.dress(
+        ax, "bit speed (rpm)", f"bit torque ({torque_unit})", "Bit torque against bit speed"
+    )
     for line in (ax.axhline, ax.axvline):
         line(0.0, color="#888888", linewidth=0.8, zorder=1)
     ax.set_xlim(BACKWARD, last)

@@ -60,14 +60,14 @@ def drive_impedance(
         "as the pipe", (0.0, 1.0), xycoords=("axes fraction", "data"), xytext=(4, 3),
         textcoords="offset points", fontsize=style.SMALL, color=GREY,
     )  # fmt: skip
-    style.dress(above, "", "drive / pipe impedance |Z|/ζ")
+    style.dress(above, "", "drive / pipe impedance |Z|/ζ", "Impedance of the top drive")
     style.dress(below, "frequency (Hz)", "reflection |r|, 0 takes all")
     below.set_ylim(0.0, 1.05)
     _mark(above, below, marks)
     hertz(below)
     above.legend(
         handles=[line for line in above.get_lines() if line.get_label() in _names(drives)],
-        fontsize=style.SMALL, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0),
+        fontsize=style.SMALL, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
         handlelength=3.5,
     )  # fmt: skip
     return figure

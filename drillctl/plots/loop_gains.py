@@ -80,7 +80,7 @@ def gain_boundary(
     kp, ki = shown_gains(own[0], own[1], system)
     if kp > 0.0 or ki > 0.0:
         ax.plot(kp, ki, "D", **DIAMOND, label="gains of the design")
-    style.dress(ax, sides[0][1], sides[1][1], title_of(first))
+    style.dress(ax, sides[0][1], sides[1][1], f"Stable gains\n{title_of(first)}")
     ax.set_xlim(*sides[0][0])
     ax.set_ylim(*sides[1][0])
     legend_under(ax, 2)
@@ -207,8 +207,8 @@ def root_locus(result: RootLocus, ax: Axes | None = None, system: units.System =
     ax.axvline(0.0, color=style.BLACK, linewidth=1.2)
     ax.set_xlim(left, right)
     ax.set_ylim(-0.02 * top, top)
-    title = title_of(result)
-    style.dress(ax, "real part (1/s), growing to the right", "frequency (Hz)", title)
+    title = f"Root locus\n{title_of(result)}"
+    style.dress(ax, "real part (1/s), unstable to the right", "frequency (Hz)", title)
     _crossings(ax, tracks, values, top)
     ax.legend(
         loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3, fontsize=style.SMALL, frameon=False

@@ -91,6 +91,9 @@ def loop_map(
     if boundary is not None and set(paths) != set(GAINS):
         raise InputError(f"a boundary of gains does not fit {' and '.join(paths)}", "boundary")
     figure, ax, x, y = plane(result, ax, 6.2, system)
+    shown = NAMES.get(quantity, quantity)
+    title = f"{shown[0].upper()}{shown[1:]}\n{style.title_of(result)}"
+    ax.set_title(title, fontsize=style.TITLE, loc="left")
     _colour(figure, ax, result, quantity, x, y, system)
     _stability(ax, result, x, y)
     if boundary is not None:

@@ -9,7 +9,7 @@ slope of the rock closed around the bit:
     response = frequency_response(design, omega / (2 * np.pi), "open_loop", slope=slope)
 
 The falling slope makes each mode of an undamped string grow without drive, and L circle at its
-resonance, counter-clockwise: the loop is stable because L goes around -1 once per growing pole.
+resonance, counter-clockwise: the loop is stable because L goes around -1 once per unstable pole.
 The less the slope, the larger the circles; without slope they are infinite. Pictures show the
 neighbourhood of -1 true to scale and say how far the curve goes beyond.
 
@@ -25,6 +25,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
@@ -67,7 +68,7 @@ def nyquist(
     ax : Axes, optional
         Axes to draw on.
     analysis : LoopAnalysis, optional
-        Of the same loop: gives the disk of its margin and the number of growing poles.
+        Of the same loop: gives the disk of its margin and the number of unstable poles.
 
     Returns
     -------
@@ -88,7 +89,7 @@ def nyquist(
         color=style.SKY,
         linewidth=0.6,
         linestyle="--",
-        label="its mirror, f < 0",
+        label="conjugate (f < 0)",
     )
     _curve(ax, result.frequency_hz, loop, loop.real, loop.imag)
     _arrows(ax, result.frequency_hz, loop)
@@ -284,10 +285,16 @@ def _arrows(ax: Axes, frequency: Array, loop: ComplexArray) -> None:
         if any(abs(loop[i] - place) < APART for place in written):
             continue
         written.append(loop[i])
+        # Beside the curve, on the side away from -1, with a rim that keeps lines off the digits.
+        beside = 1j * step / abs(step)
+        if (beside * np.conj(1.0 + loop[i])).real < 0.0:
+            beside = -beside
         ax.annotate(
-            f"{frequency[i]:.3g} Hz", (loop[i].real, loop[i].imag), xytext=(8, -4),
-            textcoords="offset points", fontsize=style.SMALL, color=style.BLUE,
-            annotation_clip=True,
+            f"{frequency[i]:.3g} Hz", (loop[i].real, loop[i].imag),
+            xytext=(12.0 * beside.real, 12.0 * beside.imag), textcoords="offset points",
+            fontsize=style.SMALL, color=style.BLUE, annotation_clip=True, zorder=6,
+            ha="left" if beside.real > 0.0 else "right", va="center",
+            path_effects=[withStroke(linewidth=3.0, foreground="white")],
         )  # fmt: skip
 
 
@@ -334,7 +341,7 @@ def _times(count: int) -> str:
 
 
 def _turns(loop: ComplexArray, analysis: LoopAnalysis | None) -> str:
-    """Growing poles and turns about -1; empty unless curve and poles tell the same."""
+    """Unstable poles and turns about -1; empty unless curve and poles tell the same."""
     if analysis is None or not analysis.design.simple_drive or analysis.bit_side.path is not None:
         return ""
     design = analysis.design
@@ -345,13 +352,13 @@ def _turns(loop: ComplexArray, analysis: LoopAnalysis | None) -> str:
         return ""
     verdict = "stable" if analysis.stable else "not stable"
     return (
-        f"growing poles: {growing} in the open loop, {left} in the closed loop, {verdict}:\n"
-        f"L and its mirror go {_times(turns)} counter-clockwise around -1"
+        f"unstable poles: {growing} in the open loop, {left} in the closed loop, {verdict}:\n"
+        f"L with its conjugate goes {_times(turns)} counter-clockwise around -1"
     )
 
 
 def turns_about_critical(loop: ComplexArray, at_rest: int) -> int | None:
-    """How often L and its mirror go counter-clockwise about -1."""
+    """How often L with its conjugate goes counter-clockwise about -1."""
     step = np.diff(np.unwrap(np.angle(1.0 + loop)))
     if np.abs(step).max(initial=0.0) > 0.5 * np.pi:
         return None

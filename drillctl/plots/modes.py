@@ -146,12 +146,13 @@ def mobility(
         for number, one in enumerate(given):
             if _has(one, end):
                 _draw_mobility(panel, one, end, number, len(given))
-        style.dress(panel, "", f"mobility at the {end[0]} ({UNIT})")
+        title = "Mobility of the string" if panel is panels[0] else ""
+        style.dress(panel, "", f"mobility at the {end[0]} ({UNIT})", title)
     panels[-1].set_xlabel("frequency (Hz)", fontsize=style.LABEL)
     for panel in panels:
         hertz(panel)
     panels[0].legend(
-        fontsize=style.SMALL, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0),
+        fontsize=style.SMALL, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
         handlelength=3.5,
     )  # fmt: skip
     return figure
@@ -229,21 +230,18 @@ def bode(
                 level = 20.0 * np.log10(np.abs(response))
             magnitude.semilogx(one.frequency_hz, level, **look)
             phase.semilogx(one.frequency_hz, unbroken(response), label=label, **look)
-    title = results[0].title if len(results) == 1 else ""
+    title = f"Bode plot: {results[0].title.lower()}" if len(results) == 1 else ""
     style.dress(magnitude, "", _level(unit), title)
     style.dress(phase, "frequency (Hz)", "phase (deg)")
     phase.yaxis.set_major_locator(MultipleLocator(90.0))
     phase.set_ylim(-190.0, 190.0)
     hertz(phase)
-    if len(results) == 1:
-        magnitude.legend(
-            handles=phase.get_lines(), fontsize=style.SMALL, frameon=False, loc="upper right"
-        )
-    else:  # long names, above the curves instead of on them
-        magnitude.legend(
-            handles=phase.get_lines(), fontsize=style.SMALL, frameon=False, loc="lower left",
-            bbox_to_anchor=(0.0, 1.0), handlelength=3.5,
-        )  # fmt: skip
+    # Above the curves instead of on them, beside the title if there is one.
+    side = 0.0 if len(results) > 1 else 1.0
+    magnitude.legend(
+        handles=phase.get_lines(), fontsize=style.SMALL, frameon=False,
+        loc="lower right" if side else "lower left", bbox_to_anchor=(side, 1.0), handlelength=3.5,
+    )  # fmt: skip
     return figure
 
 

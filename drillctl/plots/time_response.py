@@ -157,8 +157,8 @@ def limit_cycle(result: LimitCycle, ax: Axes | None = None) -> Figure:
 def _cycle_title(result: LimitCycle) -> str:
     name, run = result.design.name, result.simulated
     if result.orbit is not None:
-        return f"{name}: periodic, largest multiplier {abs(result.orbit.multipliers[0]):.3f}"
+        return f"Limit cycle of {name}: largest multiplier {abs(result.orbit.multipliers[0]):.3f}"
     if result.status != "not periodic" or len(run.peaks) == 0:
-        return f"{name}: {result.status}"
+        return f"Long motion of {name}: {result.status}"
     low, high = (peak / units.RPM for peak in (run.last_peaks.min(), run.last_peaks.max()))
-    return f"{name}: not periodic, last peaks {low:.1f} to {high:.1f} rpm"
+    return f"Long motion of {name}: not periodic, last peaks {low:.1f} to {high:.1f} rpm"

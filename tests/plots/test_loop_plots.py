@@ -29,6 +29,7 @@ from drillctl.linear.loop_margins import pole_grid
 from drillctl.plots.loop_gains import mirrored
 from drillctl.plots.loop_shape import turns_about_critical
 from drillctl.studies import Axis
+from drillctl.studies.loop.pictures import loop_pictures
 from drillctl.studies.loop_mapping.compute import QUANTITIES, loop_map
 
 NAME = "monteiro-trindade-140kn"
@@ -116,7 +117,7 @@ def test_bode_of_any_signal(design):
     magnitude, phase = plots.bode(closed).axes
     assert magnitude.get_ylabel() == "magnitude (dB)"
     assert words(magnitude) == ["set speed to top speed", "set speed to bit speed"]
-    assert magnitude.get_title(loc="left") == "String with its drive"
+    assert magnitude.get_title(loc="left") == "Bode plot: string with its drive"
     magnitude, phase = plots.bode(closed, source="bit_torque", targets=["twist"]).axes
     assert magnitude.get_ylabel() == "magnitude (dB re 1 rad/(N m))"
     assert len(phase.get_lines()) == 1
@@ -200,7 +201,7 @@ def test_nyquist_about_the_critical_point(analysed):
     transfer = response.between("speed_error", "top_speed")
     heavy = named(ax, "L, f > 0")
     np.testing.assert_array_equal(heavy.get_xdata(), transfer.real[: len(heavy.get_xdata())])
-    np.testing.assert_array_equal(named(ax, "its mirror").get_ydata(), -transfer.imag)
+    np.testing.assert_array_equal(named(ax, "conjugate (f < 0)").get_ydata(), -transfer.imag)
     (disk,) = (p for p in ax.patches if isinstance(p, Circle))
     alpha = found.margins.disk
     left, right = disk.center[0] - disk.radius, disk.center[0] + disk.radius
@@ -221,7 +222,24 @@ def test_nyquist_of_an_unstable_loop():
     assert not any(isinstance(p, Circle) for p in ax.patches)
     assert "61 in the open loop, 2 in the closed loop, not stable" in texts(ax)
     assert "59 times" in texts(ax)
-    assert "growing" not in texts(plots.nyquist(response).axes[0])
+    assert "unstable poles" not in texts(plots.nyquist(response).axes[0])
+
+
+def test_resonance_loops_of_the_study_are_round(analysed):
+    found, response = analysed
+    corner = np.pi / 30.0
+
+    def turns(ax):
+        """Turns of the curve between points that are seen apart."""
+        line = named(ax, "L, f > 0")
+        step = np.diff(line.get_xdata() + 1j * line.get_ydata())
+        seen = np.abs(step) > 0.03
+        both = seen[1:] & seen[:-1]
+        return np.abs(np.angle(step[1:] / step[:-1]))[both]
+
+    assert turns(plots.nyquist(response, analysis=found).axes[0]).max() > 2.0 * corner
+    drawn = next(p for p in loop_pictures(found) if p.name == "nyquist").draw("si")
+    assert turns(drawn.axes[0]).max() < corner
 
 
 def test_turns_need_enough_frequencies():
@@ -237,7 +255,7 @@ def test_coarse_response_tells_no_turns(design, analysed):
     found, _ = analysed
     slope = found.operating_point.slope
     coarse = frequency_response(design, FREQUENCIES, "open_loop", slope=slope)
-    assert "growing" not in texts(plots.nyquist(coarse, analysis=found).axes[0])
+    assert "unstable poles" not in texts(plots.nyquist(coarse, analysis=found).axes[0])
 
 
 def test_turns_that_the_poles_contradict_are_not_told(analysed):
@@ -248,7 +266,7 @@ def test_turns_that_the_poles_contradict_are_not_told(analysed):
     )
     transfer = part.between("speed_error", "top_speed")
     assert turns_about_critical(transfer, 1) == 5
-    assert "growing" not in texts(plots.nyquist(part, analysis=found).axes[0])
+    assert "unstable poles" not in texts(plots.nyquist(part, analysis=found).axes[0])
 
 
 def test_nichols_has_the_critical_point_in_the_middle(analysed):

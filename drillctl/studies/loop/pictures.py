@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -75,7 +75,10 @@ def _of_loop(result: LoopAnalysis) -> Iterator[Picture]:
     @cache
     def opened() -> FrequencyResponse:
         grid = pole_grid(ends_of(design.string), result.poles) / (2.0 * math.pi)
-        return frequency_response(design, grid, "open_loop", slope=bit.slope, path=bit.path)
+        return _smooth(
+            lambda f: frequency_response(design, f, "open_loop", slope=bit.slope, path=bit.path),
+            grid,
+        )
 
     def closed() -> FrequencyResponse:
         grid = telling_frequencies(design.string)
@@ -105,6 +108,31 @@ def _of_loop(result: LoopAnalysis) -> Iterator[Picture]:
         "Magnitude of sensitivity and complementary sensitivity over frequency.",
         lambda system: plots.sensitivity(opened(), analysis=result),
     )
+
+
+TURN = np.radians(4.0)
+"""Largest turn of a Nyquist curve between two frequencies."""
+REFINEMENTS = 6
+
+
+def _smooth(respond: Callable[[Array], FrequencyResponse], grid: Array) -> FrequencyResponse:
+    """A response with more frequencies where its Nyquist curve would show corners."""
+    found = respond(grid)
+    for _ in range(REFINEMENTS):
+        loop = found.between("speed_error", "top_speed")
+        step = np.diff(loop)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            corner = np.abs(np.angle(step[1:] / step[:-1])) > TURN
+        # Of tiny steps the direction is rounding, and none of them is seen.
+        corner &= np.abs(step[1:]) > 0.02 * np.clip(np.abs(loop[1:-1]), 0.05, None)
+        at = np.flatnonzero(corner)
+        if not len(at):
+            break
+        pieces = np.unique(np.concatenate([at, at + 1]))
+        middles = np.sqrt(grid[pieces] * grid[pieces + 1])
+        grid = np.unique(np.concatenate([grid, middles]))
+        found = respond(grid)
+    return found
 
 
 def _over_gains(design: Design, slope: float) -> Iterator[Picture]:
