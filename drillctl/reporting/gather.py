@@ -98,7 +98,7 @@ class Gathered:
         )
 
 
-_PARTIAL = {"failed": "failed", "interrupted": "was interrupted"}
+_PARTIAL = {"failed": "failed", "interrupted": "is not finished"}
 INTERRUPTED = "the report was interrupted; repeat the command with the same folder to resume"
 
 

@@ -173,7 +173,7 @@ def test_a_picture_that_cannot_be_drawn_is_told_first(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr("drillctl.reporting.sections.rig.rig_drawing", fail)
         made = drillctl.report(small_design(), tmp_path / "r", TINY, sections=["rig", "glossary"])
-    told = "The picture rig could not be drawn: no ink"
+    told = "Figure rig could not be drawn: no ink"
     assert made.problems == (told,)
     page = made.files["html"].read_text(encoding="utf-8")
     assert page.index("This report is not complete") < page.index(told) < page.index("<nav")
