@@ -11,7 +11,6 @@ import pytest
 from small_report import TINY, TITLE, small_design
 
 import drillctl
-from drillctl import studies
 from drillctl.cli import run
 from drillctl.errors import InputError, SimulationError
 from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, gather, making
@@ -149,7 +148,7 @@ def test_an_interrupted_report_is_written_and_goes_on(tmp_path, monkeypatch, cap
     asked = ["report", "monteiro-trindade-140kn", "--sections", "modes,regions,map"]
     asked += ["--set", "map.audit_cells=0", "--out", str(tmp_path / "r")]
     with monkeypatch.context() as patch:
-        patch.setattr(studies, "sweep", interrupted)
+        patch.setattr("drillctl.ensemble.sweeps.sweep", interrupted)
         assert run(asked) == 130
     shown = capsys.readouterr()
     assert "is not finished" in shown.err
