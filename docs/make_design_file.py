@@ -16,13 +16,14 @@ from drillctl.rig.table import Table
 
 HEAD = """# Keys of a design file
 
-Made from the code by `docs/make_design_file.py`; a test keeps it true. TOML, `schema = 1`. At
-the top level: `schema`, `model` (a shipped name or a path; the design is laid over it), `title`,
-`source`, `status`, `notes`. Everything below is optional in a design that names a model.
+Generated from the code by `docs/make_design_file.py`; a test keeps it up to date. TOML,
+`schema = 1`. Keys at the top level: `schema`, `model` (a shipped name or a path, whose values the
+design overrides), `title`, `source`, `status`, `notes`. All tables below are optional in a design
+that names a model.
 
-A key with a unit takes text such as the example; the unit may be any of its kind. Gains may be
-bare numbers. Sections of a design and of its model are merged by name. A table whose `law`
-changes drops the numbers of the old law; `controller.drive` and `weight_on_bit.path` stay.
+A key with a unit takes text with any unit of the same kind. Gains may be bare numbers. Sections of
+a design and of its model are merged by name. A table whose `law` changes drops the numbers of the
+old law; `controller.drive` and `weight_on_bit.path` are kept.
 """
 
 

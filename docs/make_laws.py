@@ -26,9 +26,9 @@ DRIVES = (
     (RealDrive, '`[controller.drive]` around any law (torque_limit, minimum_torque, power_limit, '
      'torque_rate_limit, lag, encoder_lag, torque_lag, anti_windup, tracking_time), and '
      '`law = "z-torque"`, `"torsional-rectification"`, `"active-damping"` with or without it',
-     "Where limits are met, where filters cost damping, and wherever the drive feels a torque."),
+     "For limits, for filters that reduce damping, and for drives with torque feedback."),
     (SampledDrive, '`[controller.drive]` with `sampling_period` (10 ms is usual) and '
-     '`one_sample_delay`', "For what a digital drive does to fast modes."),
+     '`one_sample_delay`', "For the effect of a digital drive on fast modes."),
 )  # fmt: skip
 TUNED = tuple(form for form in DRIVE_FORMS if not inspect.isclass(form[0]))
 WEIGHTS = tuple(form for law in weight_laws().values() for form in law.forms)
@@ -63,18 +63,18 @@ def page() -> str:
     """The page as it should stand."""
     groups = (
         ("Bit-rock laws", "Torque T (N m) on a bit that turns at speed w (rad/s) under the weight "
-         "W (N). Positive torque brakes. *Set-valued* laws hold a bit at rest; smooth ones let it "
-         "creep.\n\n![Torque over speed](laws.png)", BIT_ROCK),
-        ("Top-drive laws", "Torque (N m) of the drive from the speed of its own inertia. All of "
-         "them are published laws but for the tuning rule of active damping.\n\n"
+         "W (N). Positive torque brakes. *Set-valued* laws hold a bit at rest; under smooth ones "
+         "it creeps.\n\n![Torque over speed](laws.png)", BIT_ROCK),
+        ("Top-drive laws", "Torque (N m) of the drive from the speed of its own inertia. All "
+         "are published laws, except the tuning rule of active damping.\n\n"
          "![Impedance and reflection of six drives](drives.png)", DRIVES),
-        ("Top drives tuned to the string", "Numbers that follow from pipe impedance, drive "
-         "inertia and the lowest frequency of the string.", TUNED),
+        ("Top drives tuned to the string", "Numbers from pipe impedance, drive inertia and the "
+         "lowest frequency of the string.", TUNED),
         ("Weight-on-bit laws", "Weight W (N) on a bit that turns at speed w (rad/s).\n\n"
          "![Weight against a bit speed that falls to zero](weights.png)", WEIGHTS),
     )  # fmt: skip
-    parts = ["# Laws", "Every law of rock, drive and weight: its equation, symbols, source and "
-             "how a design names it. Made from the docstrings by `docs/make_laws.py`."]  # fmt: skip
+    parts = ["# Laws", "Every law of rock, drive and weight: equation, symbols, source and key "
+             "in a design. Generated from the docstrings by `docs/make_laws.py`."]  # fmt: skip
     for title, text, laws in groups:
         parts += [f"## {title}", text, *(section(*law) for law in laws)]
     return "\n\n".join(parts) + "\n"
