@@ -2,16 +2,27 @@
 
 import hashlib
 import json
+import os
+import sys
 from pathlib import Path
 
 import pytest
+
+# Tests start some sixty processes: what these import is compiled once, whatever the environment.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+if "PYTEST_XDIST_WORKER" in os.environ:  # a core each: more threads would only wait in turns
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 NOTED = pytest.StashKey[list]()
 
 
 # Files that take longest, and rooms whose fixtures are made once: begun first, so that the workers
 # end together.
-LONG = ("tests/reporting",)
+LONG = (
+    "tests/reporting", "tests/cli/test_studies.py", "tests/cli/test_cli.py",
+    "tests/laws/test_friction_laws.py", "tests/studies/test_advantage.py",
+)  # fmt: skip
 
 
 def part(nodeid):

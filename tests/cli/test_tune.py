@@ -35,7 +35,7 @@ def quick(call):
     return lambda *arguments: call("tune", *arguments)
 
 
-def test_json_has_the_keys_of_the_contract(quick):
+def test_json_has_the_keys_of_the_contract_and_the_folder_all_files(quick, call):
     code, out, err = quick(SHIPPED, *SMALL, "--set", "tune.probability=0.8", "--json", "--out", "r")
     assert (code, err) == (0, "results: r\n")
     found = strict(out)
@@ -53,9 +53,7 @@ def test_json_has_the_keys_of_the_contract(quick):
     assert strict(Path("r/summary.json").read_text()) == found
     again = quick(SHIPPED, *SMALL, "--set", "tune.probability=0.8", "--json", "--out", "r")
     assert (again[0], strict(again[1]), again[2]) == (0, found, "already done: r\n")
-
-
-def test_folder_holds_a_design_ready_to_run_tables_and_pictures(quick, call):
+    # A design ready to run, tables and pictures.
     code, out, _ = quick(SHIPPED, *SMALL, "--set", "tune.probability=0.8", "--out", "r")
     assert code == 0
     assert "certificate passed: J1 <= 33 s" in out

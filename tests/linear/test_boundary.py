@@ -41,8 +41,8 @@ def eigenvalue_mask(design, slope, kp, ki):
     [
         (DESIGN, {}, 80),
         pytest.param(DESIGN, {}, 200, marks=pytest.mark.slow),
-        (DESIGN, {"drillstring.sections.pipe.stiffness_damping": "1 ms"}, 80),
-        (DESIGN, {"operating_point.speed": "80 rpm"}, 80),
+        (DESIGN, {"drillstring.sections.pipe.stiffness_damping": "1 ms"}, 40),
+        (DESIGN, {"operating_point.speed": "80 rpm"}, 40),
         ("monteiro-trindade-120kn", {"drillstring.sections.pipe.elements": 10}, 80),
     ],
 )

@@ -61,10 +61,10 @@ def test_the_papers_rig_has_its_largest_slope_margin_found():
     ("more", "points"),
     [
         ({"controller.law": "soft-torque"}, 301),
-        ({"controller.law": "stiff-speed"}, 31),
+        ({"controller.law": "stiff-speed"}, 21),
         ({"controller.law": "z-torque", **DAMPED}, 201),
-        ({"controller.law": "torsional-rectification", **DAMPED}, 101),
-        ({"controller.law": "active-damping", **DAMPED}, 31),
+        ({"controller.law": "torsional-rectification", **DAMPED}, 51),
+        ({"controller.law": "active-damping", **DAMPED}, 21),
         ({**LATE, **DAMPED}, 25),
     ],
 )
