@@ -65,7 +65,7 @@ class Gathered:
     """A design with its studies, the input of the sections."""
 
     design: Design  # reduced by the profile
-    asked: Design  # as given
+    requested: Design  # as given
     profile: Profile  # of the report
     words: Words  # units of the reader
     studies: dict[str, Study] = field(repr=False)  # by name
@@ -123,8 +123,8 @@ def gather(
         elif interrupted and not _finished(place):
             found[recipe.name] = Study(recipe.name, recipe.title, "interrupted", INTERRUPTED, place)
         else:
-            asked = Requested(cut, profile, found)
-            found[recipe.name] = _study(recipe, asked, place, progress)
+            requested = Requested(cut, profile, found)
+            found[recipe.name] = _study(recipe, requested, place, progress)
             interrupted |= found[recipe.name].state == "interrupted"
     return Gathered(cut, design, profile, words, found)
 
@@ -147,21 +147,23 @@ def _finished(place: Path) -> bool:
         return False
 
 
-def _study(recipe: Recipe, asked: Requested, place: Path, progress: Progress) -> Study:
+def _study(recipe: Recipe, requested: Requested, place: Path, progress: Progress) -> Study:
     """Read or run one study; errors become its state."""
 
     def ended(state: State, why: str = "") -> Study:
         return Study(recipe.name, recipe.title, state, why, place)
 
-    lacking = [asked.done[name] for name in recipe.needs if asked.done[name].state != "done"]
+    lacking = [
+        requested.done[name] for name in recipe.needs if requested.done[name].state != "done"
+    ]
     if lacking:
         state = lacking[0].state
         why = f"{lacking[0].title} is missing: {lacking[0].why}"
         return ended("left_out" if state in ("failed", "not_requested") else state, why)
-    if why := recipe.missing(asked):
+    if why := recipe.missing(requested):
         return ended("left_out", why)
     try:
-        design = recipe.variant(asked)
+        design = recipe.variant(requested)
     except InputError as error:
         return ended("failed", str(error))
     growing = store.growing_realizations(design) if recipe.growing else None

@@ -92,11 +92,11 @@ def _plain(cell: str) -> str:
     return minus
 
 
-def chosen_sections(asked: Iterable[str] | None) -> tuple[str, ...]:
+def chosen_sections(requested: Iterable[str] | None) -> tuple[str, ...]:
     """Names of the requested sections in order; all by default."""
-    if asked is None:
+    if requested is None:
         return tuple(SECTIONS)
-    names = [name.strip() for name in asked if name.strip()]
+    names = [name.strip() for name in requested if name.strip()]
     for name in names:
         if name not in SECTIONS:
             raise InputError(f"no section {name!r}; {nearest(name, SECTIONS)}", "--sections")
@@ -121,7 +121,7 @@ def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> D
             made.append(Section(kind.name, kind.title, kind.build(gathered)))
         except NotThereError as reason:
             left_out.append((kind.title, reason.why))
-    design = gathered.asked
+    design = gathered.requested
     return Document(
         title=title or design.tables.title or design.name,
         subtitle=f"Torsional stick-slip of a drillstring: report of the design {design.name}",
@@ -133,7 +133,7 @@ def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> D
 
 
 def _facts(gathered: Gathered) -> tuple[tuple[str, str], ...]:
-    design, table = gathered.asked, gathered.design.tables.uncertainty
+    design, table = gathered.requested, gathered.design.tables.uncertainty
     facts = [
         ("design", design.name),
         ("profile", f"{gathered.profile.name} ({gathered.profile.meaning})"),
@@ -232,16 +232,16 @@ def report(
     return Report(run.path, written, problems, interrupted, unwritten, content)
 
 
-def _profile(asked: str | Profile) -> Profile:
-    if isinstance(asked, Profile):
-        return asked
-    if asked not in PROFILES:
-        raise InputError(f"no profile {asked!r}; {nearest(asked, PROFILES)}", "--profile")
-    return PROFILES[asked]
+def _profile(requested: str | Profile) -> Profile:
+    if isinstance(requested, Profile):
+        return requested
+    if requested not in PROFILES:
+        raise InputError(f"no profile {requested!r}; {nearest(requested, PROFILES)}", "--profile")
+    return PROFILES[requested]
 
 
-def _formats(asked: Iterable[str]) -> tuple[Format, ...]:
-    names = tuple(asked)
+def _formats(requested: Iterable[str]) -> tuple[Format, ...]:
+    names = tuple(requested)
     for name in names:
         if name not in FORMATS:
             raise InputError(f"no format {name!r}; {nearest(name, FORMATS)}", "--format")
@@ -254,7 +254,7 @@ def _content(
     written: dict[str, Path],
     unwritten: dict[str, str],
 ) -> dict[str, Any]:
-    design = gathered.asked
+    design = gathered.requested
     return {
         "design": design.name,
         "title": document.title,

@@ -97,12 +97,12 @@ PROFILES = {profile.name: profile for profile in (QUICK, STANDARD, FULL)}
 """Profiles by name."""
 
 
-def _applies(asked: Requested) -> str:
+def _applies(requested: Requested) -> str:
     return ""
 
 
-def _as_asked(asked: Requested) -> Design:
-    return asked.design
+def _as_requested(requested: Requested) -> Design:
+    return requested.design
 
 
 def _summary(result: Any) -> dict[str, Any]:
@@ -118,7 +118,7 @@ class Recipe(NamedTuple):
     # the result, from its design, its folder and the progress
     compute: Callable[[Design, RunFolder, Progress], Any]
     missing: Callable[[Requested], str] = _applies  # why it does not apply; empty where it does
-    variant: Callable[[Requested], Design] = _as_asked  # the design that is studied
+    variant: Callable[[Requested], Design] = _as_requested  # the design that is studied
     needs: tuple[str, ...] = ()  # studies that must finish before
     # further settings of the result
     settings: Mapping[str, Any] = MappingProxyType({})
@@ -134,7 +134,7 @@ def level_of(design: Design) -> float:
 
 
 def _both(*reasons: Callable[[Requested], str]) -> Callable[[Requested], str]:
-    return lambda asked: next((why for reason in reasons if (why := reason(asked))), "")
+    return lambda requested: next((why for reason in reasons if (why := reason(requested))), "")
 
 
 def _cells(design: Design, folder: RunFolder, progress: Progress) -> Any:
@@ -160,22 +160,22 @@ def _setting_summary(result: Any) -> dict[str, Any]:
     }
 
 
-def _at_setting(asked: Requested) -> Design:
+def _at_setting(requested: Requested) -> Design:
     """The design with more draws at its own gains, and the level of the verdict."""
-    design, level = asked.design, level_of(asked.design)
+    design, level = requested.design, level_of(requested.design)
     levels = sorted({*design.tables.map.levels, level})
     # Only the draws of the map under uncertainty.
     values: dict[str, Any] = {
         "map.levels": levels, "uncertainty.sampling": "monte-carlo",
-        "uncertainty.realizations": asked.profile.setting, "uncertainty.sensitivity": None,
+        "uncertainty.realizations": requested.profile.setting, "uncertainty.sensitivity": None,
         "uncertainty.until": None, "uncertainty.axes": [], "uncertainty.contours": False,
         "uncertainty.keep": [],
     }  # fmt: skip
     return design.replace(values)
 
 
-def _not_tuned(asked: Requested) -> str:
-    if not asked.profile.tuned:
+def _not_tuned(requested: Requested) -> str:
+    if not requested.profile.tuned:
         return "gains are tuned with --profile full"
     if not hasattr(drillctl, "tune"):
         return "this version does not tune gains"

@@ -32,7 +32,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
                 lambda: plots.error_estimate(study.result), ("doctor",),
             )
         )  # fmt: skip
-    blocks += [_versions(gathered), Code("The design in full", to_toml(gathered.asked))]
+    blocks += [_versions(gathered), Code("The design in full", to_toml(gathered.requested))]
     return tuple(blocks)
 
 

@@ -78,10 +78,10 @@ def _probable(gathered: Gathered) -> Check | None:
     if study is None:
         return None
     found = study.summary
-    asked = gathered.design.tables.tune.probability
+    required = gathered.design.tables.tune.probability
     low, high = found["interval_95"]
-    answer = True if low >= asked else False if high < asked else None
-    question = f"Is P(J1 ≤ {number(found['level'])} s) at least {percent(asked)}?"
+    answer = True if low >= required else False if high < required else None
+    question = f"Is P(J1 ≤ {number(found['level'])} s) at least {percent(required)}?"
     detail = f"{chance(found['probability'], (low, high))}, {found['realizations']} draws"
     return Check(question, answer, detail)
 

@@ -69,9 +69,11 @@ def _gains(gathered: Gathered, found: dict[str, Any], tolerance: dict[str, Any])
 
 
 def _certificate(found: dict[str, Any]) -> Checks:
-    asked = found["required_probability"]
+    required = found["required_probability"]
     detail = chance(found["probability"], found["interval_95"])
-    question = f"Is P(J1 ≤ {number(found['level'])} s) at least {percent(asked)}, at fresh draws?"
+    question = (
+        f"Is P(J1 ≤ {number(found['level'])} s) at least {percent(required)}, at fresh draws?"
+    )
     check = Check(question, bool(found["passed"]), f"{detail}, {found['realizations']} draws")
     return Checks("certificate", "Certificate", (check,))
 

@@ -37,7 +37,7 @@ def build_sensitivity(gathered: Gathered) -> tuple[Block, ...]:
     """Indices with their errors."""
     study, system = gathered.need("uncertainty"), gathered.words.system
     if "sensitivity" not in study.summary:
-        if gathered.asked.tables.uncertainty.sensitivity is None:
+        if gathered.requested.tables.uncertainty.sensitivity is None:
             raise NotThereError("the design requests no indices ([uncertainty.sensitivity])")
         raise NotThereError("indices are computed with --profile standard or full")
     *_, picture = STUDY.pictures(study.result)
