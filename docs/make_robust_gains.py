@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 import drillctl
-from drillctl.studies.robust import linear_design, search, tuned_parameters
-from drillctl.studies.robust.problem import GainProblem, Point
+from drillctl.studies.tune.linear_design import linear_design
+from drillctl.studies.tune.problem import GainProblem, Point
+from drillctl.studies.tune.search import search
+from drillctl.studies.tune.tuned import tuned_parameters
 
 BOUNDS = {"controller.kp": {"min": 200, "max": 1200}, "controller.ki": {"min": 5, "max": 400}}
 CASES = (

@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from drillctl.studies.advantage.compute import advantage as advantage
     from drillctl.studies.compare.compute import compare as compare
     from drillctl.studies.regularisation.compute import regularisation as regularisation
-    from drillctl.studies.robust import tune as tune
     from drillctl.studies.three_regions.compute import three_regions as three_regions
+    from drillctl.studies.tune.compute import tune as tune
     from drillctl.studies.uncertainty.compute import uncertainty as uncertainty
 
 _HOME = {
@@ -56,7 +56,6 @@ _HOME = {
     "load": "drillctl.design",
     "InputError": "drillctl.errors",
     "sweep": "drillctl.studies",
-    "tune": "drillctl.studies.robust",
     "open": "drillctl.store",
     "report": "drillctl.reporting.making",
     "plots": "drillctl",

@@ -48,6 +48,7 @@ STUDIES: tuple[str, ...] = (
     "drillctl.studies.compare",
     "drillctl.studies.delay",
     "drillctl.studies.advantage",
+    "drillctl.studies.tune",
 )
 """Each package holds `STUDY`; its keys in a design file, if any, are in its `settings.py`."""
 

@@ -57,7 +57,7 @@ def test_map_needs_neither_control_nor_casadi():
 
 
 def test_the_search_for_gains_takes_casadi_when_it_needs_it():
-    assert "casadi" not in loaded_by("import drillctl.studies.robust")
+    assert "casadi" not in loaded_by("import drillctl.studies.tune")
 
 
 def test_pyplot_is_never_imported():

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from drillctl.cli import (
     files,
     reports,
-    tuning,
 )
 from drillctl.cli.app import app, run
 from drillctl.cli.verb import command
@@ -22,7 +21,6 @@ VERBS: dict[str, tuple[Callable[..., None], Group]] = {
     "new": (files.new, "Describe a rig"),
     "show": (files.show, "Describe a rig"),
     "validate": (files.validate, "Describe a rig"),
-    "tune": (tuning.tune, "Decide"),
     "report": (reports.report, "Hand over"),
 }
 """Commands that are not studies, with their groups in the help."""

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field, create_model, field_validator, model_validator
 
 from drillctl import registry, units
-from drillctl.design.study_tables import TuneTable
 from drillctl.design.uncertain_tables import (
     AxisTable,
     DistributionTable,
@@ -336,9 +335,7 @@ class OwnTables(Table):
 
 def settings_of_studies() -> dict[str, type[Table]]:
     """Tables of the studies by key: `KEY` and `Settings` of the `settings.py` beside each."""
-    found: dict[str, type[Table]] = {
-        "tune": TuneTable,
-    }
+    found: dict[str, type[Table]] = {}
     for study in registry.STUDIES:
         if find_spec(f"{study}.settings") is not None:
             settings = import_module(f"{study}.settings")

@@ -31,8 +31,8 @@ from drillctl.plots.style import (
 )
 
 if TYPE_CHECKING:
-    from drillctl.studies.robust import Tune
-    from drillctl.studies.robust.certificate import FreshRuns
+    from drillctl.studies.tune.certificate import FreshRuns
+    from drillctl.studies.tune.compute import Tune
 
 ROW = 0.42
 """Height of a row (inches)."""

@@ -176,8 +176,6 @@ def _study(recipe: Recipe, requested: Requested, place: Path, progress: Progress
         result = recipe.compute(design, run, progress)
         if isinstance(result, Result):
             result.write(run.path)
-        elif recipe.write:
-            store.write_data(result, run.path)
         run.finish(recipe.summary(result))
     except KeyboardInterrupt:
         return ended("interrupted", INTERRUPTED)

@@ -124,7 +124,6 @@ class Recipe(NamedTuple):
     settings: Mapping[str, Any] = MappingProxyType({})
     growing: bool = False  # whether draws may be added later
     grows: Callable[[Design], Any] | None = None
-    write: bool = True  # whether the store writes the result
     summary: Callable[[Any], dict[str, Any]] = _summary  # of a result
 
 
@@ -174,33 +173,14 @@ def _at_setting(requested: Requested) -> Design:
     return design.replace(values)
 
 
-def _not_tuned(requested: Requested) -> str:
-    if not requested.profile.tuned:
-        return "gains are tuned with --profile full"
-    if not hasattr(drillctl, "tune"):
-        return "this version does not tune gains"
-    return ""
-
-
-def _by_name(verb: str) -> Callable[[Design, RunFolder, Progress], Any]:
-    def compute(design: Design, folder: RunFolder, progress: Progress) -> Any:
-        return getattr(drillctl, verb)(design, progress=progress)
-
-    return compute
-
-
 ALL = (
     Recipe("setting", "the draws at the current setting", "uncertainty", _setting, in_batch,
            _at_setting, settings={"axes": []}, summary=_setting_summary),
     Recipe("cells", "the responses over the map", "report-cells", _cells, fitting_map,
-           needs=("map",), write=False, summary=dict),
-    Recipe("tune", "the tuning of the gains", "tune", _by_name("tune"),
-           _both(_not_tuned, in_batch)),
+           needs=("map",), summary=dict),
 )  # fmt: skip
 """Every study that is no object yet, in the order in which they are done."""
-_ORDER = {
-    "setting": 30, "cells": 50, "tune": 110,
-}  # fmt: skip
+_ORDER = {"setting": 30, "cells": 50}
 
 
 def _of(study: Study, recipe: base.Recipe) -> Recipe:

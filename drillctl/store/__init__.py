@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from drillctl.store.folder import identity as identity
     from drillctl.store.saving import open as open
     from drillctl.store.saving import save as save
-    from drillctl.store.saving import write_data as write_data
 
 _HOME = {
     "RunFolder": "folder",
@@ -32,7 +31,6 @@ _HOME = {
     "identity": "folder",
     "open": "saving",
     "save": "saving",
-    "write_data": "saving",
 }
 
 __all__ = [*_HOME]

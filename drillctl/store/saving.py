@@ -2,35 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from drillctl.design import load
 from drillctl.errors import InputError
 from drillctl.store.codec import TREE, read
 from drillctl.store.folder import about_run, claim
-from drillctl.store.json_files import read_json
-from drillctl.store.kind import Kind
 from drillctl.store.result import Result
 
 
-def _kinds() -> tuple[Kind, ...]:
-    from drillctl.store.kinds import KINDS
-
-    return KINDS
-
-
-def write_data(result: Any, folder: Path) -> None:
-    """Write a result's dataset as `data.zarr`."""
-    _kind(result).write(result, folder)
-
-
-def _kind(result: Any) -> Kind:
-    return next(kind for kind in _kinds() if kind.of is type(result))
-
-
-def save(result: Any, folder: str | Path) -> Path:
+def save(result: Result, folder: str | Path) -> Path:
     """Write a result into a folder of its own.
 
     Parameters
@@ -51,16 +32,9 @@ def save(result: Any, folder: str | Path) -> Path:
         The folder holds other files, or cannot be written; or the result was computed from a
         string without a design.
     """
-    if isinstance(result, Result):
-        design, settings = result.requested()
-        run = claim(result.kind, design, folder, result.growing(), **settings)
-        result.write(run.path)
-        run.finish(result.summary())
-        return run.path
-    kind = _kind(result)
-    design, settings = kind.asked(result)
-    run = claim(kind.verb, design, folder, kind.growing(design), **settings)
-    write_data(result, run.path)
+    design, settings = result.requested()
+    run = claim(result.kind, design, folder, result.growing(), **settings)
+    result.write(run.path)
     run.finish(result.summary())
     return run.path
 
@@ -83,8 +57,6 @@ def open(folder: str | Path) -> Any:
     InputError
         Not a run, an unfinished one, or one that cannot be read back.
     """
-    import xarray
-
     path = Path(folder)
     if not (path / "run.json").is_file():
         raise InputError("is not a saved run: run.json is missing", str(path))
@@ -93,13 +65,8 @@ def open(folder: str | Path) -> Any:
         raise InputError("holds an unfinished run; run the command again", str(path))
     if (path / TREE).is_file():
         return read(path)
-    kind = next((one for one in _kinds() if one.verb == about.get("verb")), None)
-    if kind is None:
-        raise InputError(f"results of {about.get('verb')!r} are not read back", str(path))
-    design = replace(load(path / "design.toml"), name=str(about.get("design")))
-    summary = read_json(path / "summary.json")
-    try:
-        with xarray.open_zarr(path / "data.zarr", consolidated=False) as data:
-            return kind.read(design, data.load(), summary)
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"cannot be read back: {error}", str(path)) from None
+    raise InputError(
+        f"holds results of {about.get('verb')!r} that this version does not read; run the command "
+        "again in a new folder",
+        str(path),
+    )

@@ -11,9 +11,5 @@ def refuse_what_studies_would(design: Design) -> None:
 
     What a check needs is imported only if the design has its table.
     """
-    if "tune" in design.tree:
-        from drillctl.studies.robust import tuned_parameters
-
-        tuned_parameters(design)
     for study in studies().values():
         study.check(design)

@@ -40,6 +40,11 @@ QUICK = {
     ),
     "compare": ("pi-vs-dynamic-wob-140kn", *SHORT, *FEW, *GAINS),
     "uncertainty": ("wob-rpm-chart", *SHORT, "--realizations", "8", "--audit", "0"),
+    "tune": (
+        "robust-gains-140kn", "--realizations", "24", "--certificate", "150",
+        "--set", "tune.starts=1", "--set", "tune.certificate.audit=1",
+        "--set", "simulation.accuracy=fast", "--set", "tune.probability=0.8",
+    ),
     "delay": (
         "dynamic-wob-delay-140kn", *SHORT, "--realizations", "3",
         "--set", "weight_delay.gains=['0 kN*s/rad', '6 kN*s/rad']",

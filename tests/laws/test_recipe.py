@@ -142,7 +142,7 @@ def test_a_drive_law_says_what_is_tuned_and_takes_arrays(drive):
     folder, design = drive
     script = f"""
 import drillctl, numpy as np
-from drillctl.studies.robust.tuned import drive_numbers, string_numbers, tuned_parameters
+from drillctl.studies.tune.tuned import drive_numbers, string_numbers, tuned_parameters
 design = drillctl.load({design!r})
 assert drillctl.loop(design).slope_margin > 0.0
 (tuned,) = tuned_parameters(design)

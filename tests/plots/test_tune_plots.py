@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 import drillctl
 from drillctl import plots
 from drillctl.errors import InputError
-from drillctl.studies.robust import tune
+from drillctl.studies.tune.compute import tune
 
 PAPER = "monteiro-trindade-140kn"
 SMALL = {"realizations": 24, "starts": 1, "certificate": {"realizations": 60, "audit": 0}}

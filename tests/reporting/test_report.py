@@ -66,7 +66,7 @@ def test_saved_studies_and_pictures_are_read_not_done_again(small, monkeypatch):
     def refuse(*args: object, **kwargs: object) -> None:
         raise AssertionError("done again")
 
-    monkeypatch.setattr("drillctl.store.write_data", refuse)
+    monkeypatch.setattr("drillctl.store.result.Result.write", refuse)
     monkeypatch.setattr("drillctl.reporting.cells.traced", refuse)
     monkeypatch.setattr("drillctl.reporting.pictures.FigureFiles._draw", refuse)
     before = small.files["html"].read_text(encoding="utf-8")

@@ -46,7 +46,7 @@ from drillctl.studies.advantage.policies import (
 )
 from drillctl.studies.advantage.sweeps import chart
 from drillctl.studies.compare.compute import compare
-from drillctl.studies.robust import search
+from drillctl.studies.tune.search import search
 
 HOLDS = (
     (

@@ -17,7 +17,6 @@ from drillctl.reporting.sections import (
     rig,
     stability,
     summary,
-    tuning,
     uncertainty,
 )
 from drillctl.studies.base import Section, studies
@@ -40,7 +39,6 @@ KINDS = (
     Kind("responses", "Time responses", ("simulate", "cells", "best", "bad"), responses.build),
     Kind("uncertainty", "Uncertainty", ("uncertainty", "setting"), uncertainty.build),
     Kind("sensitivity", "Sensitivity", ("uncertainty",), uncertainty.build_sensitivity),
-    Kind("tuning", "Tuned gains and their certificate", ("tune",), tuning.build),
     Kind("audit", "Accuracy audit",
          ("simulate", "map", "uncertainty", "doctor", "mesh-1", "mesh-2", "mesh-4", "step-2",
           "step-4"), audit.build),
@@ -49,7 +47,7 @@ KINDS = (
 """Every section that is not of a study object, in the order in which they are read."""
 _ORDER = {
     "summary": 0, "rig": 10, "operating-point": 20, "modes": 30, "loop": 40, "map": 50,
-    "responses": 60, "uncertainty": 70, "sensitivity": 80, "tuning": 90,
+    "responses": 60, "uncertainty": 70, "sensitivity": 80,
      "audit": 120, "glossary": 130,
 }  # fmt: skip
 

@@ -24,7 +24,7 @@ from drillctl.progress import Progress
 from drillctl.store.result import label
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import CONSTANT, GAIN, KI, KP, Policies, Policy
-from drillctl.studies.robust.problem import Objective, objective_of
+from drillctl.studies.tune.problem import Objective, objective_of
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.studies.advantage.policies import Policy
-from drillctl.studies.robust.search import optimum as least
-from drillctl.studies.robust.search import search_problem
+from drillctl.studies.tune.search import optimum as least
+from drillctl.studies.tune.search import search_problem
 
 Array = NDArray[np.float64]
 

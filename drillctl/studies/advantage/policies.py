@@ -20,7 +20,7 @@ from drillctl.errors import InputError
 from drillctl.studies.advantage.settings import GAIN, REAL_PATH
 from drillctl.studies.delay.lanes import LAWS
 from drillctl.studies.delay.settings import LAW
-from drillctl.studies.robust.tuned import Tuned, put, tuned_parameters
+from drillctl.studies.tune.tuned import Tuned, put, tuned_parameters
 
 Array = NDArray[np.float64]
 

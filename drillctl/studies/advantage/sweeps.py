@@ -21,7 +21,7 @@ from drillctl.store.result import label
 from drillctl.studies.advantage.cases import Measured, Optima, measured, optimum_beside
 from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import GAIN, SPEED, WEIGHT, Policies, Policy
-from drillctl.studies.robust.runs import GainRuns
+from drillctl.studies.tune.runs import GainRuns
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from drillctl.ensemble.running import measured
 from drillctl.errors import InputError
 from drillctl.simulation.batch import Prepared, prepare, trace
 from drillctl.simulation.lanes import Lanes
-from drillctl.studies.robust.tuned import (
+from drillctl.studies.tune.tuned import (
     StringNumbers,
     Tuned,
     controller_paths,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.design import Design, parameter
-from drillctl.design.study_tables import RangeTable
+from drillctl.design import Design, parameter, to_toml
 from drillctl.ensemble.parameters import Draws
 from drillctl.errors import InputError, nearest
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive.law import StringNumbers, drive_laws, tracking
+from drillctl.store.json_files import write_json, write_text
+from drillctl.studies.tune.settings import RangeTable
 
 Array = NDArray[np.float64]
 
@@ -155,6 +157,15 @@ def designs_at(design: Design, draws: Draws) -> Iterator[Design]:
         except InputError:
             continue
         yield variant
+
+
+def save_design(design: Design, summary: dict[str, Any], folder: str | Path) -> Path:
+    """Write `design.toml` and `summary.json` into a folder, which is made; returns it."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / "design.toml", to_toml(design))
+    write_json(folder / "summary.json", summary)
+    return folder
 
 
 def string_numbers(string: Drillstring) -> StringNumbers:

@@ -14,15 +14,17 @@ from drillctl.ensemble.draws import drawn_lanes, run_draws
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.store.json_files import strict
-from drillctl.studies.robust import search, tune
-from drillctl.studies.robust.certificate import (
+from drillctl.studies.tune.certificate import (
     HALVINGS,
     LOOKED_AT,
     FreshDraws,
     FreshRuns,
     certified,
 )
-from drillctl.studies.robust.tuned import put, tuned_parameters
+from drillctl.studies.tune.compute import tune
+from drillctl.studies.tune.linear_design import linear_design
+from drillctl.studies.tune.search import search
+from drillctl.studies.tune.tuned import put, tuned_parameters
 
 HOLDS = (
     (
@@ -209,22 +211,22 @@ def test_baselines_are_the_designs_that_they_name(found):
         "soft torque": {"controller.law": "soft-torque"},
         "Z-torque": {"controller.law": "z-torque"},
         "stiff speed": {"controller.law": "stiff-speed"},
-        "least nominal J1": by_name["least nominal J1"].told,
-        "largest slope margin": by_name["largest slope margin"].told,
+        "least nominal J1": by_name["least nominal J1"].gains,
+        "largest slope margin": by_name["largest slope margin"].gains,
     }
     assert set(others) == set(by_name)
     for name, values in others.items():
         expected = j1_of(found.design.replace(values), 120, seed)
         np.testing.assert_array_equal(by_name[name].runs.j1, expected, err_msg=name)
-    linear = drillctl.studies.robust.linear_design(found.design)
-    assert by_name["largest slope margin"].told == linear.gains
+    linear = linear_design(found.design)
+    assert by_name["largest slope margin"].gains == linear.gains
     nominal = by_name["least nominal J1"]
     axes = [
         {"path": "controller.kp", "min": 400, "max": 800, "points": 41},
         {"path": "controller.ki", "min": 0, "max": 200, "points": 41},
     ]
     j1, at = drillctl.stability_map(found.design.replace({"map.axes": axes}), audit_cells=0).minimum
-    assert (nominal.found["value"], nominal.told) == (j1, at)
+    assert (nominal.search["value"], nominal.gains) == (j1, at)
 
 
 def test_baselines_of_another_law_have_its_default_tuning():
@@ -235,7 +237,7 @@ def test_baselines_of_another_law_have_its_default_tuning():
     default = drillctl.load(PAPER, **{"controller.law": "soft-torque"})
     expected = j1_of(default, 120, result.certificate.seed)
     np.testing.assert_array_equal(by_name["soft torque"].runs.j1, expected)
-    assert by_name["as designed"].told == {"controller.share": 0.6}
+    assert by_name["as designed"].gains == {"controller.share": 0.6}
     assert by_name["paper's gains"].runs is None
     assert "the law is soft-torque" in by_name["paper's gains"].reason
     assert len(result.certificate.neighbourhood.axes) == 1
@@ -246,12 +248,12 @@ def test_the_exhaustive_grid_is_the_least_of_the_searchs_own_realizations():
     design = tuning(narrow, realizations=12, certificate={"audit": 0, "realizations": 20})
     result = tune(design, exhaustive=True)
     grid = {one.name: one for one in result.baselines}["exhaustive grid"]
-    assert grid.found["trajectories"] == 41 * 41 * 12
+    assert grid.search["trajectories"] == 41 * 41 * 12
     fast = design.replace({"simulation.accuracy": "fast"})
-    at = fast.replace(grid.told)
-    assert grid.found["value"] == pytest.approx(np.quantile(j1_of(at, 12, 3), 0.95), rel=1e-12)
+    at = fast.replace(grid.gains)
+    assert grid.search["value"] == pytest.approx(np.quantile(j1_of(at, 12, 3), 0.95), rel=1e-12)
     worse = fast.replace({"controller.kp": 631.0, "controller.ki": 148.0})
-    assert grid.found["value"] <= np.quantile(j1_of(worse, 12, 3), 0.95)
+    assert grid.search["value"] <= np.quantile(j1_of(worse, 12, 3), 0.95)
 
 
 def test_a_tune_is_read_back_as_it_was(found, tmp_path):
@@ -324,6 +326,6 @@ def test_the_papers_case_against_the_exhaustive_grid_at_fresh_draws():
     grid = {one.name: one for one in result.baselines}["exhaustive grid"]
     print(f"search {result.tuning.seconds:.1f} s, all {result.total_seconds:.1f} s")  # noqa: T201
     assert result.certificate.runs.value <= 1.01 * grid.runs.value
-    assert result.tuning.value <= 1.01 * grid.found["value"]
-    assert result.tuning.trajectories <= grid.found["trajectories"] / 10
+    assert result.tuning.value <= 1.01 * grid.search["value"]
+    assert result.tuning.trajectories <= grid.search["trajectories"] / 10
     assert result.passed

@@ -17,14 +17,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.design.study_tables import TuneConstraintsTable
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import tolerated_slope
-from drillctl.studies.robust.linear_nlp import PRICE, LinearProgram
-from drillctl.studies.robust.loops import Loop, least_seen, loops_of, refuse_not_linear
-from drillctl.studies.robust.requirements import Loops, LoopsState
-from drillctl.studies.robust.tuned import Tuned, by_path, designs_at, put, spread, tuned_parameters
+from drillctl.studies.tune.linear_nlp import PRICE, LinearProgram
+from drillctl.studies.tune.loops import Loop, least_seen, loops_of, refuse_not_linear
+from drillctl.studies.tune.requirements import Loops, LoopsState
+from drillctl.studies.tune.settings import TuneConstraintsTable
+from drillctl.studies.tune.tuned import (
+    Tuned,
+    by_path,
+    designs_at,
+    put,
+    save_design,
+    spread,
+    tuned_parameters,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -124,8 +132,6 @@ class LinearDesign:
 
     def save(self, folder: str | Path) -> Path:
         """Write the design with its gains as a new design file, ready to run, and the summary."""
-        from drillctl.studies.robust.saving import save_design
-
         return save_design(self.design, self.summary(), folder)
 
 

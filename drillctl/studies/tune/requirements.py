@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.design.study_tables import TuneConstraintsTable
 from drillctl.linear.ends import BitSide
 from drillctl.linear.loop_analysis import ROUNDING
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.rig.drillstring.frequencies import natural_frequencies
-from drillctl.studies.robust.line_data import chain
-from drillctl.studies.robust.loops import Crossing, Loop, crossings_of, slope_margin_of
-from drillctl.studies.robust.tuned import Tuned, by_path, put
+from drillctl.studies.tune.line_data import chain
+from drillctl.studies.tune.loops import Crossing, Loop, crossings_of, slope_margin_of
+from drillctl.studies.tune.settings import TuneConstraintsTable
+from drillctl.studies.tune.tuned import Tuned, by_path, put
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import drillctl
-from drillctl.design.study_tables import TuneConstraintsTable
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
 from drillctl.linear.slope_margin import slope_margins
-from drillctl.studies.robust.linear_design import linear_design
-from drillctl.studies.robust.loops import least_seen, loops_of
-from drillctl.studies.robust.tuned import by_path, tuned_parameters
+from drillctl.studies.tune.linear_design import linear_design
+from drillctl.studies.tune.loops import least_seen, loops_of
+from drillctl.studies.tune.settings import TuneConstraintsTable
+from drillctl.studies.tune.tuned import by_path, tuned_parameters
 
 HOLDS = (
     (
@@ -102,7 +102,7 @@ def test_gains_hold_for_a_set_of_strings():
     # At the gains of the design alone some string of the set is worse off.
     tuned = tuned_parameters(design)
     from drillctl.ensemble.parameters import draw
-    from drillctl.studies.robust.tuned import designs_at
+    from drillctl.studies.tune.tuned import designs_at
 
     loops = loops_of([design, *designs_at(design, draw(design, 8, 5))], tuned)
     worst = min(least_seen(x, alone.gains) - x.slope for x in loops)

@@ -3,59 +3,44 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from drillctl.design import Design
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
-from drillctl.studies.robust.baselines import Baseline, baselines
-from drillctl.studies.robust.certificate import Certificate, FreshDraws, certified
-from drillctl.studies.robust.search import Tuning, search, search_problem
-from drillctl.studies.robust.tuned import tuned_parameters
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray
+from drillctl.store.result import Result, label
+from drillctl.studies.tune.baselines import Baseline, baselines
+from drillctl.studies.tune.certificate import Certificate, FreshDraws, certified
+from drillctl.studies.tune.search import Tuning, search, search_problem
+from drillctl.studies.tune.tuned import tuned_parameters
 
 
 @dataclass(frozen=True, eq=False)
-class Tune:
-    """Found gains with their certificate.
+class Tune(Result):
+    """Gains with their certificate."""
 
-    Attributes
-    ----------
-    design : Design
-        As it was given.
-    tuning : Tuning
-        What the search found, at its own realizations.
-    certificate : Certificate
-        What fresh realizations say of it.
-    baselines : tuple of Baseline
-        Other gains and laws at the same fresh realizations.
-    total_seconds : float
-        From call to return.
-    provenance : dict of str
-        Versions and processor it came from.
-    """
+    kind: ClassVar[str] = "tune"
 
-    design: Design
-    tuning: Tuning
-    certificate: Certificate
-    baselines: tuple[Baseline, ...]
-    total_seconds: float
-    provenance: dict[str, str] = field(default_factory=provenance)
+    design: Design = label(means="as it was given")
+    tuning: Tuning = label(means="gains of the search, at its own realizations")
+    certificate: Certificate = label(flat=True, means="the gains at fresh realizations")
+    baselines: tuple[Baseline, ...] = label(
+        over="baseline", name="baseline", means="other gains and laws at the same realizations"
+    )
+    total_seconds: float = label(unit="s", means="from call to return")
+    provenance: dict[str, str] = label(
+        default_factory=provenance, means="versions and processor it came from"
+    )
 
     @property
     def tuned_design(self) -> Design:
-        """The design with the found gains, ready to run."""
+        """The design with the tuned gains, ready to run."""
         return self.tuning.design
 
     @property
     def gains(self) -> dict[str, float]:
-        """Found values by path (SI)."""
+        """Tuned values by path (SI)."""
         return self.tuning.gains
 
     @property
@@ -65,7 +50,7 @@ class Tune:
 
     @property
     def message(self) -> str:
-        """What came of it, in a sentence or two."""
+        """The result in a sentence or two."""
         if not self.tuning.feasible:
             return self.tuning.message
         if self.certificate.passed:
@@ -78,7 +63,7 @@ class Tune:
 
     @property
     def _nearer(self) -> str:
-        """The baseline that keeps the level most often, if it does so more than what was found.
+        """The baseline that keeps the level most often, if more often than the tuned gains.
 
         The least quantile is blind to the probability where no gains reach the level.
         """
@@ -100,18 +85,10 @@ class Tune:
             "total_seconds": self.total_seconds,
         }
 
-    @cached_property
-    def data(self) -> xarray.Dataset:
-        """J1 of gains and baselines at the fresh realizations; probability about the optimum."""
-        from drillctl.studies.robust.tune_data import dataset
-
-        return dataset(self)
-
-    def save(self, folder: str | Path) -> Path:
-        """Write design, dataset and summary into a folder; see `drillctl.store`."""
-        from drillctl.store import save
-
-        return save(self, folder)
+    def requested(self) -> tuple[Design, dict[str, Any]]:
+        """Whether a grid was gone through as well."""
+        grid = any(one.name == "exhaustive grid" for one in self.baselines)
+        return self.design, {"exhaustive": True} if grid else {}
 
 
 def tune(
@@ -120,7 +97,7 @@ def tune(
     progress: Progress = SILENT,
     verbose: bool = False,
 ) -> Tune:
-    """Find robust gains, certify them, and set them beside others.
+    """Search robust gains, certify them, and set them beside others.
 
     Parameters
     ----------

@@ -31,9 +31,9 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.robust.linear_design import linear_design
-from drillctl.studies.robust.problem import GainProblem, Point
-from drillctl.studies.robust.tuned import Tuned, by_path, put, spread, tuned_parameters
+from drillctl.studies.tune.linear_design import linear_design
+from drillctl.studies.tune.problem import GainProblem, Point
+from drillctl.studies.tune.tuned import Tuned, by_path, put, save_design, spread, tuned_parameters
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -238,8 +238,6 @@ class Tuning:
 
     def save(self, folder: str | Path) -> Path:
         """Write the design with its gains as a new design file, ready to run, and the summary."""
-        from drillctl.studies.robust.saving import save_design
-
         return save_design(self.design, self.summary(), folder)
 
 

@@ -1,4 +1,4 @@
-"""Tables of studies that are not yet beside what they are of."""
+"""Keys of `[tune]`: what is tuned, to what end, within which limits, and how it is certified."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from drillctl.errors import InputError
 from drillctl.rig import table as q
 from drillctl.rig.table import Table, number_or_quantity
 
-# Robust gains.
-
+KEY = "tune"
 FRESH = 1_000_003
 """From the seed of a search to that of its certificate, where none is given."""
 
@@ -49,7 +48,7 @@ class TuneWeightsTable(Table):
 
 
 class TuneConstraintsTable(Table):
-    """What tuned gains must keep; nothing is asked where nothing is given.
+    """What tuned gains must keep; nothing is required where nothing is given.
 
     Of the runs: the `quantile` of the peak top torque over the realizations, and the mean weight
     on bit. Of the linear loop, at every string: how far its slope margin stands above the slope
@@ -79,7 +78,7 @@ class TuneConstraintsTable(Table):
 
 
 class TuneCertificateTable(Table):
-    """How found gains are certified: runs that the search has not seen.
+    """How gains are certified: runs that the search has not seen.
 
     `realizations` fresh draws, always independent ones (`monte-carlo`), at the accuracy of the
     design; `seed` of them, by default that of the search and 1000003, never that of the search;
@@ -97,8 +96,9 @@ class TuneTable(Table):
     `parameters` names the paths and their bounds; by default those of the controller's law. The
     objective is J1 over the realizations: its `mean`, its `quantile`, the mean of what lies
     beyond that quantile (`cvar`), or the `worst` of all. `level` and `probability` are what the
-    result is certified against: P(J1 <= level) >= probability. `starts`: how many of the best
-    gains of the first look are followed further. `realizations` and `seed` of the search.
+    result is certified against: P(J1 <= level) >= probability. `starts`: at how many
+    gains that are apart, the best of the search's population, its last stage begins. `realizations`
+    and `seed` of the search.
     """
 
     parameters: dict[str, RangeTable] = Field(default_factory=dict)
@@ -139,3 +139,6 @@ class TuneTable(Table):
         """Seed of the certificate's draws."""
         given = self.certificate.seed
         return self.seed + FRESH if given is None else given
+
+
+Settings = TuneTable

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import drillctl
-from drillctl.design.study_tables import TuneTable
-from drillctl.studies.robust.problem import (
+from drillctl.studies.tune.problem import (
     PRICE,
     Objective,
     objective_of,
     rank_weights,
     smooth_weights,
 )
+from drillctl.studies.tune.settings import TuneTable
 
 J1 = np.random.default_rng(3).lognormal(3.0, 0.4, 97)
 

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.studies.robust.line_data import (
+from drillctl.studies.tune.line_data import (
     TERMS,
     WITHIN,
     Chain,
@@ -38,9 +38,9 @@ from drillctl.studies.robust.line_data import (
     circles,
     pair,
 )
-from drillctl.studies.robust.loops import Crossing, Loop
-from drillctl.studies.robust.requirements import Loops, LoopsState, LoopState
-from drillctl.studies.robust.tuned import StringNumbers, Tuned, by_path, drive_numbers
+from drillctl.studies.tune.loops import Crossing, Loop
+from drillctl.studies.tune.requirements import Loops, LoopsState, LoopState
+from drillctl.studies.tune.tuned import StringNumbers, Tuned, by_path, drive_numbers
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.design import Design
+from drillctl.design import Design, parameter
 from drillctl.ensemble.audit import Audit, choose_cells, references
 from drillctl.ensemble.cases import Interval, share_interval
 from drillctl.ensemble.draws import Failures, beyond_the_table
@@ -34,9 +34,10 @@ from drillctl.ensemble.grid import Axis
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.robust.problem import GainProblem, Point, rank_weights
-from drillctl.studies.robust.runs import GainRuns
-from drillctl.studies.robust.tuned import Tuned
+from drillctl.store.result import label
+from drillctl.studies.tune.problem import GainProblem, Point, rank_weights
+from drillctl.studies.tune.runs import GainRuns
+from drillctl.studies.tune.tuned import Tuned
 
 Array = NDArray[np.float64]
 
@@ -69,11 +70,12 @@ LEAST_HALF = 0.02
 class FreshRuns:
     """J1 of one rig at the fresh draws."""
 
-    # shape (draws,): Seconds; infinite for a run without an answer, NaN for a draw that no rig
-    # has
-    j1: Array
-    value: float  # objective of `[tune]` over the draws that a rig can have (s)
-    level: float  # of J1 (s)
+    j1: Array = label(
+        "realization", unit="s",
+        means="J1; infinite for a run without an answer, NaN for a draw that no rig has",
+    )  # fmt: skip
+    value: float = label(unit="s", means="objective of `[tune]` over the draws of possible rigs")
+    level: float = label(unit="s", means="level of J1")
 
     @property
     def hits(self) -> int:
@@ -182,29 +184,32 @@ class FreshDraws:
 class Tolerance:
     """How far one parameter may drift alone."""
 
-    # of the parameter
-    path: str
-    unit: str
-    value: float  # at the optimum (SI)
-    # between these the probability is never below the required one (SI); both the value itself
-    # where it is so at the optimum already
-    low: float
-    high: float
-    # whether that end is the bound of the search: how far it goes on is not known
-    low_at_bound: bool
-    high_at_bound: bool
-    # shape (points,): Points that were looked at (SI, increasing), and the probability there
-    values: Array
-    probability: Array
+    path: str = label(means="of the parameter")
+    unit: str = label(means="of its values")
+    value: float = label(means="at the optimum (SI)")
+    # Between these the probability is never below the required one; both the value itself where it
+    # is so at the optimum already.
+    low: float = label(means="least value that keeps the probability (SI)")
+    high: float = label(means="largest value that keeps it (SI)")
+    low_at_bound: bool = label(means="whether the bound of the search is the lower end")
+    high_at_bound: bool = label(means="whether it is the upper end")
+    values: Array = label(
+        "line {path}", unit="{unit}", name="line {path}", means="points that were run, increasing"
+    )
+    probability: Array = label(
+        "line {path}", name="probability {path}", means="share of the draws at or under the level"
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbourhood:
     """Probability about the optimum over the first one or two parameters."""
 
-    axes: tuple[Axis, ...]  # one or two
-    probability: Array  # shape of the axes: Share of the draws with J1 at or under the level
-    realizations: int  # how many draws
+    axes: tuple[Axis, ...] = label(flat=True, means="one or two")
+    probability: Array = label(
+        "axes", name="probability", means="share of the draws with J1 at or under the level"
+    )
+    realizations: int = label(means="how many draws")
 
 
 def tolerances(
@@ -309,24 +314,36 @@ def _about(tuned: Tuned, one: Tolerance, points: int) -> Axis:
 
 
 @dataclass(frozen=True, eq=False)
+class Drawn:
+    """Values drawn for one parameter."""
+
+    path: str = label(means="of the parameter")
+    unit: str = label(means="of its values")
+    values: Array = label("realization", unit="{unit}", name="drawn {path}", means="drawn values")
+
+
+@dataclass(frozen=True, eq=False)
 class Certificate:
     """What fresh draws say of gains."""
 
-    runs: FreshRuns  # J1 at each draw
-    required: float  # probability that is asked for
-    seed: int  # of the draws
-    drawn: dict[str, Array]  # shape (draws,): Drawn values by path (SI)
-    failures: tuple[Failures, ...]  # draws that no rig has: they count as over the level
-    # requirements that are missed at the fresh draws, over their limits
-    violations: dict[str, float]
-    # figures of the linear loop, see `drillctl.loop`; empty where there is none
-    margins: dict[str, Any]
-    no_margins: str  # why there are none
-    audit: Audit  # A sample of the draws by the reference solver; `cells` are numbers of draws
-    tolerances: tuple[Tolerance, ...]  # how far each parameter may drift alone
-    neighbourhood: Neighbourhood  # probability about the optimum
-    trajectories: int  # runs of the batch engine
-    seconds: float  # time that it took (s)
+    runs: FreshRuns = label(flat=True, means="J1 at each draw")
+    required: float = label(means="required probability")
+    seed: int = label(means="of the draws")
+    draws: tuple[Drawn, ...] = label(means="what was drawn")
+    failures: tuple[Failures, ...] = label(means="draws that no rig has; over the level")
+    violations: dict[str, float] = label(means="requirements that are missed, over their limits")
+    margins: dict[str, Any] = label(means="figures of the linear loop, empty where there is none")
+    no_margins: str = label(means="why there are none")
+    audit: Audit = label(means="a sample of the draws by the reference solver, by their numbers")
+    tolerances: tuple[Tolerance, ...] = label(means="how far each parameter may drift alone")
+    neighbourhood: Neighbourhood = label(flat=True, means="probability about the optimum")
+    trajectories: int = label(means="runs of the batch engine")
+    seconds: float = label(unit="s", means="time that it took")
+
+    @property
+    def drawn(self) -> dict[str, Array]:
+        """Drawn values by path (SI), shape (draws,)."""
+        return {one.path: one.values for one in self.draws}
 
     @property
     def passed(self) -> bool:
@@ -445,7 +462,10 @@ def certified(
         runs=runs,
         required=table.probability,
         seed=table.fresh_seed,
-        drawn=fresh.drawn,
+        draws=tuple(
+            Drawn(path, parameter(design, path).si_unit, values)
+            for path, values in fresh.drawn.items()
+        ),
         failures=fresh.failures,
         violations=problem.violations(point),
         margins=margins,

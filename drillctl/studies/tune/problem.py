@@ -24,13 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design, parameter
-from drillctl.design.study_tables import TuneTable
 from drillctl.errors import InputError
 from drillctl.linear.operating_point import at_speed
-from drillctl.studies.robust.loops import loops_of, refuse_not_linear
-from drillctl.studies.robust.requirements import Loops
-from drillctl.studies.robust.runs import GainRuns
-from drillctl.studies.robust.tuned import Tuned, designs_at
+from drillctl.studies.tune.loops import loops_of, refuse_not_linear
+from drillctl.studies.tune.requirements import Loops
+from drillctl.studies.tune.runs import GainRuns
+from drillctl.studies.tune.settings import TuneTable
+from drillctl.studies.tune.tuned import Tuned, designs_at
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""What found gains are set beside: other gains and other laws, at the same fresh draws.
+"""What tuned gains are compared with: other gains and other laws, at the same fresh draws.
 
 Each is what an engineer would have without the search. Where one does not apply, the reason
 stands in its place.
@@ -13,20 +13,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.design import Design, parameter
+from drillctl.design import Design, load, parameter
 from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.studies.robust.certificate import FreshDraws, FreshRuns
-from drillctl.studies.robust.linear_design import linear_design
-from drillctl.studies.robust.problem import PRICE, GainProblem
-from drillctl.studies.robust.tuned import Tuned, by_path
+from drillctl.studies.tune.certificate import FreshDraws, FreshRuns
+from drillctl.studies.tune.linear_design import linear_design
+from drillctl.studies.tune.problem import PRICE, GainProblem
+from drillctl.studies.tune.tuned import Tuned, by_path
 
 Array = NDArray[np.float64]
 
 PAPER = {"controller.kp": 200.0, "controller.ki": 100.0}
 """Gains that Monteiro & Trindade (2012) begin with (N m s/rad, N m/rad)."""
+PAPER_RIG = "monteiro-trindade-2012"
 OTHER_LAWS = {"soft torque": "soft-torque", "Z-torque": "z-torque", "stiff speed": "stiff-speed"}
 """Laws at their default tuning."""
 ANY_OTHER = {"soft-torque": "stiff-speed", "z-torque": "stiff-speed", "stiff-speed": "soft-torque"}
@@ -39,32 +40,32 @@ MOST_AXES = 2
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Gains or a law beside those that were found."""
+    """Gains or a law beside the tuned ones."""
 
     name: str  # what it is
-    told: dict[str, Any]  # its gains by path (SI); of another law its name alone
+    gains: dict[str, Any]  # by path (SI); of another law its name alone
     runs: FreshRuns | None  # at the fresh draws; None where it does not apply
     reason: str  # why it does not
     # of a search of its own: value (s) where it searched, trajectories, seconds
-    found: dict[str, float]
+    search: dict[str, float]
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI."""
-        told: dict[str, Any] = {"gains": self.told, "reason": self.reason or None}
+        summary: dict[str, Any] = {"gains": self.gains, "reason": self.reason or None}
         if self.runs is not None:
-            told |= {
+            summary |= {
                 "value": self.runs.value,
                 "probability": self.runs.probability,
                 "interval_95": list(self.runs.interval),
                 "quantiles": self.runs.quantiles,
             }
-        return told | ({"search": self.found} if self.found else {})
+        return summary | ({"search": self.search} if self.search else {})
 
 
 def baselines(
     design: Design, fresh: FreshDraws, exhaustive: GainProblem | None, progress: Progress = SILENT
 ) -> tuple[Baseline, ...]:
-    """What the found gains are compared with."""
+    """What the tuned gains are compared with."""
     made = [
         ("as designed", lambda: _own(design, fresh)),
         ("paper's gains", lambda: _paper(design, fresh)),
@@ -81,8 +82,8 @@ def baselines(
     found = []
     for name, make in made:
         try:
-            told, runs, more = make()
-            found.append(Baseline(name, told, runs, "", more))
+            gains, runs, more = make()
+            found.append(Baseline(name, gains, runs, "", more))
         except InputError as error:
             found.append(Baseline(name, {}, None, error.problem, {}))
         progress.advance(1)
@@ -94,16 +95,18 @@ Made = tuple[dict[str, Any], FreshRuns, dict[str, float]]
 
 def _own(design: Design, fresh: FreshDraws) -> Made:
     tuned = fresh.problem.tuned
-    told = {t.path: parameter(design, t.path).value for t in tuned}
-    if any(value is None for value in told.values()):  # by a rule of its law
-        return told, fresh.of_design(design), {}
+    gains = {t.path: parameter(design, t.path).value for t in tuned}
+    if any(value is None for value in gains.values()):  # by a rule of its law
+        return gains, fresh.of_design(design), {}
     # The same runs; the draws are not made again.
-    return told, fresh.of_gains(np.array([told[t.path] for t in tuned], dtype=float))[1], {}
+    return gains, fresh.of_gains(np.array([gains[t.path] for t in tuned], dtype=float))[1], {}
 
 
 def _paper(design: Design, fresh: FreshDraws) -> Made:
     if design.tables.controller.law != "pi":
         raise InputError(f"gains of a PI; the law is {design.tables.controller.law}")
+    if design.string.parts != load(PAPER_RIG).string.parts:
+        raise InputError("gains of the rig of Monteiro & Trindade (2012); this is another one")
     other = design.replace(dict(PAPER))
     if set(PAPER) <= {t.path for t in fresh.problem.tuned}:
         return dict(PAPER), _own(other, fresh)[1], {}

@@ -9,10 +9,10 @@ import drillctl
 from drillctl.ensemble.draws import drawn_lanes, run_draws
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
-from drillctl.studies.robust.problem import GainProblem
-from drillctl.studies.robust.runs import GainRuns
-from drillctl.studies.robust.search import optimum, polished, search, search_problem
-from drillctl.studies.robust.tuned import put, tuned_parameters
+from drillctl.studies.tune.problem import GainProblem
+from drillctl.studies.tune.runs import GainRuns
+from drillctl.studies.tune.search import optimum, polished, search, search_problem
+from drillctl.studies.tune.tuned import put, tuned_parameters
 
 HOLDS = (
     (

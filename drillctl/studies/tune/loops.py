@@ -21,8 +21,8 @@ from drillctl.linear.ends import Ends, WeightPath, ends_of, weight_path
 from drillctl.linear.loop_margins import TURNS
 from drillctl.linear.operating_point import at_speed
 from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
-from drillctl.studies.robust.line_data import WITHIN, Circle, Grid, circles, grid_of
-from drillctl.studies.robust.tuned import (
+from drillctl.studies.tune.line_data import WITHIN, Circle, Grid, circles, grid_of
+from drillctl.studies.tune.tuned import (
     WEIGHT_KEYS,
     StringNumbers,
     Tuned,
