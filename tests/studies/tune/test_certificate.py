@@ -13,6 +13,10 @@ from drillctl.ensemble.cases import share_interval
 from drillctl.ensemble.draws import drawn_lanes, run_draws
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
+from drillctl.reporting.blocks import Figure, Table, Text
+from drillctl.reporting.gather import Gathered, NotThereError, Study
+from drillctl.reporting.sections import SECTIONS
+from drillctl.reporting.words import Words
 from drillctl.store.json_files import strict
 from drillctl.studies.tune.certificate import (
     HALVINGS,
@@ -266,6 +270,31 @@ def test_a_tune_is_read_back_as_it_was(found, tmp_path):
     json.dumps(strict(found.summary()), allow_nan=False)
     assert drillctl.tune is tune
     assert found.save(tmp_path / "run") == tmp_path / "run"  # the very same run
+
+
+def test_its_section_of_a_report_holds_its_message_tables_and_pictures(found, tmp_path):
+    folder = found.save(tmp_path / "run")
+    for state in ("done", "left_out"):
+        study = Study("tune", "the tuning", state, "it was not requested", folder)
+        gathered = Gathered(found.design, found.design, None, Words("si"), {"tune": study})
+        if state == "left_out":
+            with pytest.raises(NotThereError, match="it was not requested"):
+                SECTIONS["tuning"].build(gathered)
+            continue
+        blocks = SECTIONS["tuning"].build(gathered)
+    assert found.message in {block.text for block in blocks if isinstance(block, Text)}
+    tables = {block.name: block for block in blocks if isinstance(block, Table)}
+    assert set(tables) == {"tolerance", "baselines"}
+    assert tables["tolerance"].rows[0][:2] == (
+        "controller.kp",
+        f"{found.tuning.values[0]:.6g} N m s",
+    )
+    assert [row[0] for row in tables["baselines"].rows] == [
+        "tuned",
+        *(one.name for one in found.baselines),
+    ]
+    drawn = [block.name for block in blocks if isinstance(block, Figure)]
+    assert drawn == ["baselines", "neighbourhood"]
 
 
 def test_runs_without_an_answer_are_null_and_come_back(found, tmp_path):
