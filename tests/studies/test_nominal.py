@@ -256,6 +256,9 @@ def test_an_axis_that_is_drawn_too_is_told_apart(short, tmp_path):
 def test_data_is_labelled(result):
     data = result.data
     assert data[KP].values.tolist() == [100.0, 300.0, 500.0, 700.0, 900.0]
+    assert (data["nominal.map.j1"].dims, data["nominal.map.j1"].units) == (("case", KP, KI), "s")
+    cell = data["nominal.map.j1"].sel({"case": "4 kN s/rad", KP: 500.0, KI: 150.0})
+    assert cell == result.cases[2].nominal.map.j1[2, 1]
     weight = data["nominal.response.weight_on_bit"]
     assert (weight.dims, weight.units) == (("case", "time"), "N")
     np.testing.assert_array_equal(
