@@ -6,5 +6,7 @@
 - `running.py`: lanes into measures, block by block, by the threads of this process or, with
   `cluster.py`, by a dask cluster; `storing.py`: finished blocks, from which a run resumes.
 - `sweeps.py`: a map; `regions.py`: its regions; `audit.py`: some cells simulated again with the
-  reference solver; `intervals.py`: confidence intervals of shares and means.
+  reference solver.
+- `probability.py`: regions by probability over realizations; `cases.py`: cases at common draws,
+  with confidence intervals of shares, means and differences.
 """
