@@ -17,6 +17,8 @@ from drillctl.reporting.words import Words, name_of
 from drillctl.simulation.batch import prepare, trace
 from drillctl.simulation.measures import STATUSES
 from drillctl.store.json_files import strict, write_text
+from drillctl.studies.applies import fitting_map
+from drillctl.studies.base import Recipe, Run, Study
 
 if TYPE_CHECKING:
     from drillctl.studies import Sweep
@@ -33,8 +35,10 @@ PART = 10
 """Speeds are stored in units of 1 / PART rpm."""
 
 
-def traced(design: Design, folder: Path, progress: Progress) -> dict[str, Any]:
+def traced(design: Design, run: Run) -> dict[str, Any]:
     """Write values and time responses of the cells of the map."""
+    assert run.folder is not None
+    folder, progress = run.folder, run.progress
     result = store.open(folder.parent / "map")
     own = _own(design, result.axes)
     best, bad = _best(result), _bad(result)
@@ -154,3 +158,17 @@ def _responses(
             top[row] = np.interp(times, time, signals["top_speed"][:, column])
         progress.advance(len(rows))
     return bit, top
+
+
+CELLS = Study(
+    name="report-cells",
+    help="Time responses over the map of a report",
+    group="Hand over",
+    compute=traced,
+    command=False,
+    recipes=(
+        Recipe("cells", "the responses over the map", fitting_map, needs=("map",), summary=dict,
+               order=50),
+    ),
+)  # fmt: skip
+"""What the cells of the map show in a page: of reports alone."""

@@ -14,11 +14,12 @@ from drillctl import store
 from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.reporting.recipes import RECIPES, Profile, Recipe
+from drillctl.reporting.recipes import RECIPES, Profile
 from drillctl.reporting.words import Words
 from drillctl.store.json_files import read_json
 from drillctl.store.result import Result
-from drillctl.studies.base import Requested
+from drillctl.studies.base import Recipe, Requested, Run
+from drillctl.studies.base import Study as Kind
 
 State = Literal["done", "failed", "interrupted", "left_out", "not_requested"]
 
@@ -115,7 +116,7 @@ def gather(
     names = _with_needs(wanted)
     found: dict[str, Study] = {}
     interrupted = False
-    for recipe in RECIPES.values():
+    for study, recipe in RECIPES.values():
         place = folder / recipe.name
         if recipe.name not in names:
             why = "it was not requested"
@@ -124,7 +125,7 @@ def gather(
             found[recipe.name] = Study(recipe.name, recipe.title, "interrupted", INTERRUPTED, place)
         else:
             requested = Requested(cut, profile, found)
-            found[recipe.name] = _study(recipe, requested, place, progress)
+            found[recipe.name] = _study(study, recipe, requested, place, progress)
             interrupted |= found[recipe.name].state == "interrupted"
     return Gathered(cut, design, profile, words, found)
 
@@ -136,7 +137,7 @@ def _with_needs(wanted: Iterable[str]) -> set[str]:
         name = waiting.pop()
         if name not in names:
             names.add(name)
-            waiting += RECIPES[name].needs
+            waiting += RECIPES[name][1].needs
     return names
 
 
@@ -147,7 +148,9 @@ def _finished(place: Path) -> bool:
         return False
 
 
-def _study(recipe: Recipe, requested: Requested, place: Path, progress: Progress) -> Study:
+def _study(
+    study: Kind, recipe: Recipe, requested: Requested, place: Path, progress: Progress
+) -> Study:
     """Read or run one study; errors become its state."""
 
     def ended(state: State, why: str = "") -> Study:
@@ -166,14 +169,13 @@ def _study(recipe: Recipe, requested: Requested, place: Path, progress: Progress
         design = recipe.variant(requested)
     except InputError as error:
         return ended("failed", str(error))
-    growing = store.growing_realizations(design) if recipe.growing else None
-    if recipe.grows is not None:
-        growing = recipe.grows(design)
-    run = store.claim(recipe.verb, design, place, growing, **recipe.settings)
+    options = study.defaults() | dict(recipe.options)
+    run = store.claim(study.name, design, place, study.growing(design), **study.settings(options))
     if run.finished:
         return ended("done")
     try:
-        result = recipe.compute(design, run, progress)
+        compute = recipe.compute or study.compute
+        result = compute(design, Run(options, progress, run.path))
         if isinstance(result, Result):
             result.write(run.path)
         run.finish(recipe.summary(result))

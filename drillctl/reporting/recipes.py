@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
-import drillctl
 from drillctl.design import Design
-from drillctl.reporting import cells
-from drillctl.studies import base
-from drillctl.studies.applies import fitting_map, in_batch
-from drillctl.studies.base import Requested, Run, Study, studies
-
-if TYPE_CHECKING:
-    from drillctl.progress import Progress
-    from drillctl.store import RunFolder
+from drillctl.reporting.cells import CELLS
+from drillctl.studies.base import Recipe, Study, studies
 
 
 @dataclass(frozen=True)
@@ -97,111 +88,14 @@ PROFILES = {profile.name: profile for profile in (QUICK, STANDARD, FULL)}
 """Profiles by name."""
 
 
-def _applies(requested: Requested) -> str:
-    return ""
+def _recipes() -> dict[str, tuple[Study, Recipe]]:
+    """Every run of a report by name, with the study that it is of, in order of execution."""
+    placed = [(study, recipe) for study in (*studies().values(), CELLS) for recipe in study.recipes]
+    return {recipe.name: (study, recipe) for study, recipe in sorted(placed, key=_order)}
 
 
-def _as_requested(requested: Requested) -> Design:
-    return requested.design
-
-
-def _summary(result: Any) -> dict[str, Any]:
-    return dict(result.summary())
-
-
-class Recipe(NamedTuple):
-    """One study of a report."""
-
-    name: str  # of its folder
-    title: str  # in messages
-    verb: str  # command that writes the same folder
-    # the result, from its design, its folder and the progress
-    compute: Callable[[Design, RunFolder, Progress], Any]
-    missing: Callable[[Requested], str] = _applies  # why it does not apply; empty where it does
-    variant: Callable[[Requested], Design] = _as_requested  # the design that is studied
-    needs: tuple[str, ...] = ()  # studies that must finish before
-    # further settings of the result
-    settings: Mapping[str, Any] = MappingProxyType({})
-    growing: bool = False  # whether draws may be added later
-    grows: Callable[[Design], Any] | None = None
-    summary: Callable[[Any], dict[str, Any]] = _summary  # of a result
-
-
-def level_of(design: Design) -> float:
-    """The level of J1 (s) of the verdict."""
-    return design.tables.tune.level
-
-
-def _both(*reasons: Callable[[Requested], str]) -> Callable[[Requested], str]:
-    return lambda requested: next((why for reason in reasons if (why := reason(requested))), "")
-
-
-def _cells(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    return cells.traced(design, folder.path, progress)
-
-
-def _setting(design: Design, folder: RunFolder, progress: Progress) -> Any:
-    return drillctl.uncertainty(design, axes=(), audit_cells=0, progress=progress)
-
-
-def _setting_summary(result: Any) -> dict[str, Any]:
-    level = level_of(result.design)
-    share = result.probability(level)
-    low, high = share.interval
-    return {
-        "level": level,
-        "realizations": result.realizations,
-        "seed": result.seed,
-        "uncertain": list(result.drawn),
-        "probability": float(share.probability),
-        "interval_95": [float(low), float(high)],
-        "failures": [{"reason": one.reason, "count": one.count} for one in result.failures],
-    }
-
-
-def _at_setting(requested: Requested) -> Design:
-    """The design with more draws at its own gains, and the level of the verdict."""
-    design, level = requested.design, level_of(requested.design)
-    levels = sorted({*design.tables.map.levels, level})
-    # Only the draws of the map under uncertainty.
-    values: dict[str, Any] = {
-        "map.levels": levels, "uncertainty.sampling": "monte-carlo",
-        "uncertainty.realizations": requested.profile.setting, "uncertainty.sensitivity": None,
-        "uncertainty.until": None, "uncertainty.axes": [], "uncertainty.contours": False,
-        "uncertainty.keep": [],
-    }  # fmt: skip
-    return design.replace(values)
-
-
-ALL = (
-    Recipe("setting", "the draws at the current setting", "uncertainty", _setting, in_batch,
-           _at_setting, settings={"axes": []}, summary=_setting_summary),
-    Recipe("cells", "the responses over the map", "report-cells", _cells, fitting_map,
-           needs=("map",), summary=dict),
-)  # fmt: skip
-"""Every study that is no object yet, in the order in which they are done."""
-_ORDER = {"setting": 30, "cells": 50}
-
-
-def _of(study: Study, recipe: base.Recipe) -> Recipe:
-    options = study.defaults() | dict(recipe.options)
-
-    def compute(design: Design, folder: RunFolder, progress: Progress) -> Any:
-        return study.compute(design, Run(options, progress, folder.path))
-
-    return Recipe(
-        recipe.name, recipe.title, study.name, compute, recipe.missing, recipe.variant,
-        recipe.needs, study.settings(options), summary=recipe.summary, grows=study.growing,
-    )  # fmt: skip
-
-
-def _recipes() -> dict[str, Recipe]:
-    """Every study of a report by name, in order of execution."""
-    placed = [(_ORDER[recipe.name], recipe) for recipe in ALL]
-    placed += [
-        (one.order, _of(study, one)) for study in studies().values() for one in study.recipes
-    ]
-    return {recipe.name: recipe for _, recipe in sorted(placed, key=lambda pair: pair[0])}
+def _order(placed: tuple[Study, Recipe]) -> int:
+    return placed[1].order
 
 
 RECIPES = _recipes()

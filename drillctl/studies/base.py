@@ -124,6 +124,7 @@ class Recipe:
     variant: Callable[[Requested], Design] = _as_it_is  # the design that is studied
     needs: tuple[str, ...] = ()  # recipes that must be done before
     options: Mapping[str, Any] = field(default_factory=dict)
+    compute: Callable[[Design, Run], Any] | None = None  # if not that of the study
     summary: Callable[[Any], dict[str, Any]] = _summary
     order: int = 50  # those with less are done first
 

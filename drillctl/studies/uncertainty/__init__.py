@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from drillctl.errors import InputError
+from drillctl.studies.applies import in_batch
 from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Study
 
 if TYPE_CHECKING:
@@ -233,7 +234,7 @@ def files(result: Uncertainty, folder: Path) -> None:
 
 def not_applicable(request: Requested) -> str:
     """Why a report has no map under uncertainty."""
-    from drillctl.studies.applies import fitting_map, in_batch
+    from drillctl.studies.applies import fitting_map
 
     return in_batch(request) or fitting_map(request)
 
@@ -255,6 +256,43 @@ def check(design: Design) -> None:
         from drillctl.studies.uncertainty.result import map_axes
 
         refuse_impossible(design, map_axes(design))
+
+
+def at_setting(request: Requested) -> Design:
+    """The design with more draws at its own gains, and its level among those that are counted."""
+    design, level = request.design, request.design.tables.tune.level
+    # Nothing that a map under uncertainty has beyond its draws.
+    values: dict[str, Any] = {
+        "map.levels": sorted({*design.tables.map.levels, level}),
+        "uncertainty.sampling": "monte-carlo",
+        "uncertainty.realizations": request.profile.setting, "uncertainty.sensitivity": None,
+        "uncertainty.until": None, "uncertainty.axes": [], "uncertainty.contours": False,
+        "uncertainty.keep": [],
+    }  # fmt: skip
+    return design.replace(values)
+
+
+def setting(design: Design, run: Run) -> Uncertainty:
+    """Draws at the design's own values."""
+    from drillctl.studies.uncertainty.compute import uncertainty
+
+    return uncertainty(design, axes=(), audit_cells=0, progress=run.progress)
+
+
+def setting_summary(result: Uncertainty) -> dict[str, Any]:
+    """The probability of keeping the level, with its interval."""
+    level = result.design.tables.tune.level
+    share = result.probability(level)
+    low, high = share.interval
+    return {
+        "level": level,
+        "realizations": result.realizations,
+        "seed": result.seed,
+        "uncertain": list(result.drawn),
+        "probability": float(share.probability),
+        "interval_95": [float(low), float(high)],
+        "failures": [{"reason": one.reason, "count": one.count} for one in result.failures],
+    }
 
 
 STUDY = Study(
@@ -290,6 +328,8 @@ STUDY = Study(
     growing=growing,
     check=check,
     recipes=(
+        Recipe("setting", "the draws at the current setting", in_batch, at_setting,
+               compute=setting, summary=setting_summary, order=30),
         Recipe("uncertainty", "the map under uncertainty", not_applicable, audited_as_profile,
                order=90),
     ),
