@@ -12,7 +12,7 @@ import xarray
 
 import drillctl
 from drillctl.ensemble.storing import Folder
-from drillctl.errors import InputError
+from drillctl.errors import InputError, StoreError
 from drillctl.store import claim, identity, save
 from drillctl.studies import Axis, sweep
 
@@ -322,7 +322,7 @@ def test_open_refuses_junk(tmp_path, content):
 
 
 def test_open_refuses_what_is_not_there(tmp_path):
-    with pytest.raises(InputError, match=r"no run\.json"):
+    with pytest.raises(InputError, match=r"run\.json is missing"):
         drillctl.open(tmp_path / "nothing")
 
 
@@ -333,13 +333,28 @@ def test_open_refuses_a_run_with_parts_missing(result, tmp_path, gone):
     folder = result.save(tmp_path / "run")
     victim = folder / gone
     shutil.rmtree(victim) if victim.is_dir() else victim.unlink()
-    with pytest.raises(InputError, match="run"):
+    with pytest.raises(StoreError, match=Path(gone).name):
+        drillctl.open(folder)
+
+
+@pytest.mark.parametrize("content", ["{", "[]", '{"$": "object"}'])
+def test_open_refuses_a_damaged_result(result, tmp_path, content):
+    folder = result.save(tmp_path / "run")
+    (folder / "result.json").write_text(content)
+    with pytest.raises(StoreError, match=r"result\.json"):
+        drillctl.open(folder)
+
+
+def test_open_refuses_the_format_of_an_earlier_version(result, tmp_path):
+    folder = result.save(tmp_path / "run")
+    (folder / "result.json").unlink()
+    with pytest.raises(InputError, match="'map' in a format that this version does not read"):
         drillctl.open(folder)
 
 
 def test_open_refuses_an_unfinished_run(design, tmp_path):
     claim("map", design, tmp_path / "run")
-    with pytest.raises(InputError, match="not finished"):
+    with pytest.raises(InputError, match="unfinished"):
         drillctl.open(tmp_path / "run")
 
 

@@ -266,12 +266,14 @@ def read(folder: Path) -> Any:
     """
     import xarray
 
-    tree = read_json(folder / TREE)
     try:
+        tree = read_json(folder / TREE)
+        if not isinstance(tree, dict):
+            raise ValueError(f"{TREE} is not of a result")
         with xarray.open_zarr(folder / DATA, consolidated=False) as data:
             return decoded(tree, data.load())
     except (OSError, KeyError, TypeError, ValueError, AttributeError, ImportError) as error:
-        raise StoreError(f"{folder}: cannot be read back: {error}") from None
+        raise StoreError(f"{folder}: {TREE} or {DATA} cannot be read: {error}") from None
 
 
 def decoded(tree: Any, data: xarray.Dataset) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from drillctl.errors import InputError
+from drillctl.errors import InputError, StoreError
 from drillctl.store.codec import TREE, read
 from drillctl.store.folder import about_run, claim
 from drillctl.store.result import Result
@@ -49,13 +49,15 @@ def open(folder: str | Path) -> Any:
 
     Returns
     -------
-    Sweep, AdaptiveMap, Simulation, Modes, LoopAnalysis, LoopMap, Comparison, LimitCycle, ...
-        Equal to what was saved, to the bit; a simulation without its events.
+    Sweep, Simulation, Modes, LoopAnalysis, LoopMap, Comparison, LimitCycle, ...
+        Equal to the saved result, to the bit.
 
     Raises
     ------
     InputError
-        Not a run, an unfinished one, or one that cannot be read back.
+        Not a run, an unfinished one, or one in the format of another version.
+    StoreError
+        A file is missing or damaged.
     """
     path = Path(folder)
     if not (path / "run.json").is_file():
@@ -64,9 +66,12 @@ def open(folder: str | Path) -> Any:
     if not about.get("finished"):
         raise InputError("holds an unfinished run; run the command again", str(path))
     if (path / TREE).is_file():
+        for name in ("design.toml", "summary.json"):  # not needed here, but the folder is damaged
+            if not (path / name).is_file():
+                raise StoreError(f"{path}: {name} is missing")
         return read(path)
     raise InputError(
-        f"holds results of {about.get('verb')!r} that this version does not read; run the command "
-        "again in a new folder",
+        f"holds results of {about.get('verb')!r} in a format that this version does not read; run "
+        "the command again in a new folder",
         str(path),
     )
