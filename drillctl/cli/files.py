@@ -49,10 +49,11 @@ def validate(
 ) -> None:
     """Check keys, units and ranges, axes, draws and cases."""
     from drillctl.cli import console
-    from drillctl.studies.checking import refuse_what_studies_would
+    from drillctl.studies.base import studies
 
     loaded_design = loaded(design, sets)
-    refuse_what_studies_would(loaded_design)
+    for study in studies().values():
+        study.check(loaded_design)
     if json:
         console.emit({"valid": True, "name": loaded_design.name, "path": loaded_design.origin})
     else:

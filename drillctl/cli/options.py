@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from drillctl.errors import InputError
+from drillctl.studies.base import Option
 
 if TYPE_CHECKING:
     from drillctl.design import Design
@@ -66,37 +67,53 @@ def common_options(
     return Common(out, json, units, verbose)
 
 
-Options = Common
-_shared_options = common_options
+_KEYWORD = inspect.Parameter.KEYWORD_ONLY
 
 
-def computing(
-    verb: Callable[..., None], system: Literal["si", "field"] = "si"
+def command_of(
+    name: str,
+    meaning: str,
+    own: Sequence[Option],
+    perform: Callable[[Design, dict[str, Any], Common], None],
+    axes: bool = False,
+    system: Literal["si", "field"] = "si",
 ) -> Callable[..., None]:
-    """The function that typer reads: design, values set, own options, shared options."""
-    shared = dict(inspect.signature(_shared_options, eval_str=True).parameters)
+    """The function that typer reads: design, values set, own options, shared options.
+
+    `perform` takes the design, its own options by name and the shared ones; with `axes` the
+    design has the axes of each `--axis`.
+    """
+    shared = dict(inspect.signature(common_options, eval_str=True).parameters)
     shared["units"] = shared["units"].replace(default=system)
-    own = [
-        parameter.replace(annotation=eval(parameter.annotation, verb.__globals__))
-        for parameter in inspect.signature(verb).parameters.values()
-        if parameter.name not in ("design", "options")
+    parameters = [
+        inspect.Parameter("design", _KEYWORD, annotation=DesignName),
+        inspect.Parameter("sets", _KEYWORD, default=None, annotation=Sets),
+        *([inspect.Parameter("axis", _KEYWORD, default=None, annotation=Axes)] if axes else []),
+        *map(_parameter, own),
+        *(parameter.replace(kind=_KEYWORD) for parameter in shared.values()),
     ]
 
     def command(**given: Any) -> None:
-        common = {name: given.pop(name) for name in shared}
-        design = loaded(given.pop("design"), given.pop("sets"))
-        verb(design=design, options=_shared_options(**common), **given)
+        common = common_options(**{one: given.pop(one) for one in shared})
+        design = with_axes(loaded(given.pop("design"), given.pop("sets")), given.pop("axis", None))
+        perform(design, given, common)
 
-    kind = inspect.Parameter.KEYWORD_ONLY
-    parameters = [
-        inspect.Parameter("design", kind, annotation=DesignName),
-        inspect.Parameter("sets", kind, default=None, annotation=Sets),
-        *(parameter.replace(kind=kind) for parameter in (*own, *shared.values())),
-    ]
-    command.__name__, command.__doc__ = verb.__name__, verb.__doc__
+    command.__name__, command.__doc__ = name, f"{meaning.rstrip('.')}."
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {one.name: one.annotation for one in parameters}
     return command
+
+
+def _parameter(option: Option) -> inspect.Parameter:
+    more: dict[str, Any] = {} if option.metavar is None else {"metavar": option.metavar}
+    if option.least is not None:
+        more["min"] = option.least
+    flag = f"{option.flag}/--{option.opposite}" if option.opposite else option.flag
+    note = typer.Option(flag, help=f"{option.help.rstrip('.')}.", **more)
+    kind = option.type if option.default is not None else option.type | None
+    return inspect.Parameter(
+        option.name, _KEYWORD, default=option.default, annotation=Annotated[kind, note]
+    )
 
 
 def loaded(name: str, sets: list[str] | None) -> Design:
@@ -115,17 +132,6 @@ def with_axes(design: Design, axes: list[str] | None) -> Design:
     from drillctl.design.reading import parse_axis
 
     return design.replace({"map.axes": [parse_axis(text) for text in axes]}) if axes else design
-
-
-def with_values(design: Design, given: dict[str, Any]) -> Design:
-    """The design with the values of options; None means not given."""
-    values = {path: value for path, value in given.items() if value is not None}
-    return design.replace(values) if values else design
-
-
-def with_draws(design: Design, realizations: int | None, seed: int | None) -> Design:
-    """The design with the draws of the command line, if given."""
-    return with_values(design, {"uncertainty.realizations": realizations, "uncertainty.seed": seed})
 
 
 def _use(threads: int) -> None:

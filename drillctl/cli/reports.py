@@ -2,57 +2,45 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
-from drillctl.cli import console, running
-from drillctl.cli.options import Options, computing
+from drillctl.cli import console
+from drillctl.cli.options import Common, command_of
+from drillctl.studies.base import Option
 
 if TYPE_CHECKING:
     from drillctl.design import Design
 
+OPTIONS = (
+    Option("profile", Literal["quick", "standard", "full"], "Set how much to compute.", "quick"),
+    Option("sections", str, "Write only these sections.", metavar="NAME,NAME"),
+    Option("title", str, "Set the title of the report."),
+    Option("format", list[str], "Write this format; repeatable.", metavar="html|pdf|md"),
+)
 
-@partial(computing, system="field")
-def report(
-    design: Design,
-    options: Options,
-    profile: Annotated[
-        Literal["quick", "standard", "full"],
-        typer.Option("--profile", help="Set how much to compute."),
-    ] = "quick",
-    sections: Annotated[
-        str | None,
-        typer.Option("--sections", metavar="NAME,NAME", help="Write only these sections."),
-    ] = None,
-    title: Annotated[
-        str | None, typer.Option("--title", help="Set the title of the report.")
-    ] = None,
-    formats: Annotated[
-        list[str] | None,
-        typer.Option("--format", metavar="html|pdf|md", help="Write this format; repeatable."),
-    ] = None,
-) -> None:
-    """Full report: verdict, figures, accuracy audit."""
+
+def _report(design: Design, given: dict[str, Any], common: Common) -> None:
     from drillctl.reporting import report as write_report
 
-    with console.progress() as bar, running.library_output_on_stderr():
+    sections = given["sections"]
+    with console.progress() as bar, console.library_output_on_stderr():
         result = write_report(
             design,
-            options.out,
-            profile=profile,
+            common.out,
+            profile=given["profile"],
             sections=None if sections is None else sections.split(","),
-            title=title,
-            formats=formats or ["html"],
-            system=options.units,
+            title=given["title"],
+            formats=given["format"] or ["html"],
+            system=common.units,
             progress=bar,
         )
     for problem in result.problems:
         console.note(f"warning: {problem}")
     for reason in result.unwritten.values():
         console.note(f"warning: {reason}")
-    if options.json:
+    if common.json:
         console.emit(result.summary())
         console.note(f"results: {result.folder}")
     else:
@@ -64,3 +52,8 @@ def report(
         raise typer.Exit(130)
     if result.problems or result.unwritten:
         raise typer.Exit(1)
+
+
+report = command_of(
+    "report", "Full report: verdict, figures, accuracy audit", OPTIONS, _report, system="field"
+)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from drillctl.cli import console
-from drillctl.cli.options import Axes, Common, DesignName, Sets, common_options, loaded, with_axes
+from drillctl.cli.options import Common, command_of
 from drillctl.errors import InputError
-from drillctl.studies.base import Option, Run, Study
+from drillctl.studies.base import Run, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,42 +25,9 @@ DPI = 150
 
 
 def command(study: Study) -> Callable[..., None]:
-    """The function that typer reads: options of the study, then those of every command."""
-    shared = dict(inspect.signature(common_options, eval_str=True).parameters)
-    shared["units"] = shared["units"].replace(default=study.system)
-    own = [_parameter(option) for option in study.options]
-    if study.axes:
-        own.insert(0, inspect.Parameter("axis", _KEYWORD, default=None, annotation=Axes))
-
-    def verb(**given: Any) -> None:
-        common = common_options(**{name: given.pop(name) for name in shared})
-        design = loaded(given.pop("design"), given.pop("sets"))
-        perform(study, with_axes(design, given.pop("axis", None)), given, common)
-
-    parameters = [
-        inspect.Parameter("design", _KEYWORD, annotation=DesignName),
-        inspect.Parameter("sets", _KEYWORD, default=None, annotation=Sets),
-        *own,
-        *(parameter.replace(kind=_KEYWORD) for parameter in shared.values()),
-    ]
-    verb.__name__, verb.__doc__ = study.name, f"{study.help}."
-    verb.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    verb.__annotations__ = {one.name: one.annotation for one in parameters}
-    return verb
-
-
-_KEYWORD = inspect.Parameter.KEYWORD_ONLY
-
-
-def _parameter(option: Option) -> inspect.Parameter:
-    more = {} if option.metavar is None else {"metavar": option.metavar}
-    if option.least is not None:
-        more["min"] = option.least  # type: ignore[assignment]
-    flag = f"{option.flag}/--{option.opposite}" if option.opposite else option.flag
-    note = typer.Option(flag, help=option.help, **more)  # type: ignore[arg-type]
-    kind = option.type if option.default is not None else option.type | None
-    return inspect.Parameter(
-        option.name, _KEYWORD, default=option.default, annotation=Annotated[kind, note]
+    """The command of a study."""
+    return command_of(
+        study.name, study.help, study.options, partial(perform, study), study.axes, study.system
     )
 
 

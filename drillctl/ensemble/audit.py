@@ -15,7 +15,7 @@ from drillctl.design import Design
 from drillctl.ensemble.grid import Axis, cell_design, shape_of
 from drillctl.errors import SimulationError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.result import label
+from drillctl.store.labels import label
 
 Array = NDArray[np.float64]
 

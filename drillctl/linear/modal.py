@@ -20,7 +20,8 @@ from drillctl.errors import InputError
 from drillctl.linear.poles import DIAGONAL, Pole, fixed_top_poles, free_free_poles
 from drillctl.linear.transmission import EndMobility
 from drillctl.rig.drillstring import Drillstring, Parts
-from drillctl.store.result import Result, label
+from drillctl.store.labels import label
+from drillctl.store.result import Result
 
 Array = NDArray[np.float64]
 

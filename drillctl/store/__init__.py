@@ -12,35 +12,26 @@ No pickle anywhere; a folder with any other content is never written to.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from drillctl.registry import resolve
+from drillctl.registry import at_first_use
 
 if TYPE_CHECKING:
-    from drillctl.store.differences import growing_realizations as growing_realizations
     from drillctl.store.folder import RunFolder as RunFolder
     from drillctl.store.folder import claim as claim
+    from drillctl.store.folder import growing_realizations as growing_realizations
     from drillctl.store.folder import identity as identity
-    from drillctl.store.saving import open as open
-    from drillctl.store.saving import save as save
+    from drillctl.store.result import Result as Result
+    from drillctl.store.result import open as open
 
-_HOME = {
-    "RunFolder": "folder",
-    "claim": "folder",
-    "growing_realizations": "differences",
-    "identity": "folder",
-    "open": "saving",
-    "save": "saving",
+_MODULES = {
+    "folder": ("RunFolder", "claim", "growing_realizations", "identity"),
+    "result": ("Result", "open"),
 }
 
-__all__ = [*_HOME]
-
-
-def __getattr__(name: str) -> Any:
-    # A list of names is written as JSON from here, and needs nothing of a design.
-    if name in _HOME:
-        return resolve(f"drillctl.store.{_HOME[name]}:{name}")
-    raise AttributeError(f"module 'drillctl.store' has no attribute {name!r}")
+__all__ = [name for names in _MODULES.values() for name in names]
+# A list of names is written as JSON from here, and needs nothing of a design.
+__getattr__ = at_first_use(__name__, _MODULES)
 
 
 def __dir__() -> list[str]:

@@ -25,8 +25,7 @@ from drillctl.design.validation import validated
 from drillctl.errors import StoreError
 from drillctl.provenance import provenance
 from drillctl.store.json_files import read_json, write_json
-from drillctl.store.names import stored_name
-from drillctl.store.result import Label
+from drillctl.store.labels import Label, stored_name
 
 if TYPE_CHECKING:
     import xarray

@@ -1,54 +1,18 @@
-"""Base class of results: labelled data, saved to a folder.
-
-A result is a frozen dataclass. Its arrays are labelled where they are declared:
-
-    axes: tuple[Axis, ...]
-    j1: Array = label("axes", unit="s", means="J1; NaN where the run failed")
-
-From the labels follow the dataset (`data`) and the files of the result; see `codec`.
-"""
+"""Base class of results: labelled data, saved to a folder; see `labels` and `codec`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.store.codec import TREE, dataset, read, write
+from drillctl.store.folder import Growing, about_run, claim
+from drillctl.store.labels import Label
 
 if TYPE_CHECKING:
     import xarray
-
-    from drillctl.store.folder import Growing
-
-
-@dataclass(frozen=True)
-class Label:
-    """Dimensions, unit and meaning of an array or of a dictionary of arrays."""
-
-    # "axes" means the paths of the axes of the object; {name} an attribute of the object
-    dims: tuple[str, ...] = ()
-    unit: str | Callable[[str], str] = "1"  # SI; for a dictionary a function of the key
-    means: str | Callable[[str], str] = ""
-    name: str = ""  # of the variable; default: that of the field
-    flat: bool = False  # whether names inside omit the name of this field
-    over: str = ""  # dimension along which arrays of a tuple of objects are stacked
-    flags: tuple[str, ...] = ()  # meanings of the integers 0, 1, ...
-
-
-def label(
-    *dims: str,
-    unit: str | Callable[[str], str] = "1",
-    means: str | Callable[[str], str] = "",
-    name: str = "",
-    flat: bool = False,
-    over: str = "",
-    flags: tuple[str, ...] = (),
-    **options: Any,
-) -> Any:
-    """Declare a field of a result with its label; other options are those of a dataclass field."""
-    return field(metadata={"label": Label(dims, unit, means, name, flat, over, flags)}, **options)
 
 
 class Result:
@@ -77,8 +41,6 @@ class Result:
     @property
     def data(self) -> xarray.Dataset:
         """Labelled arrays with units; provenance as attributes."""
-        from drillctl.store.codec import dataset
-
         return dataset(self)
 
     def derived(self) -> dict[str, Any]:
@@ -95,8 +57,6 @@ class Result:
 
     def write(self, folder: Path) -> None:
         """Write arrays and numbers into the folder of a run."""
-        from drillctl.store.codec import write
-
         write(self, folder)
 
     def save(self, folder: str | Path) -> Path:
@@ -117,9 +77,44 @@ class Result:
         InputError
             The folder holds other files, or cannot be written.
         """
-        from drillctl.store.saving import save
+        design, settings = self.requested()
+        run = claim(self.kind, design, folder, self.growing(), **settings)
+        self.write(run.path)
+        run.finish(self.summary())
+        return run.path
 
-        return save(self, folder)
+
+def open(folder: str | Path) -> Any:
+    """Read a saved result back.
+
+    Parameters
+    ----------
+    folder : str or Path
+        As written by `save` or by a command.
+
+    Returns
+    -------
+    Result
+        Equal to what was saved, to the bit.
+
+    Raises
+    ------
+    InputError
+        Not a run, an unfinished one, or one that cannot be read back.
+    """
+    path = Path(folder)
+    if not (path / "run.json").is_file():
+        raise InputError("is not a saved run: run.json is missing", str(path))
+    about = about_run(path)
+    if not about.get("finished"):
+        raise InputError("holds an unfinished run; run the command again", str(path))
+    if (path / TREE).is_file():
+        return read(path)
+    raise InputError(
+        f"holds results of {about.get('verb')!r} that this version does not read; run the command "
+        "again in a new folder",
+        str(path),
+    )
 
 
 def _attributes(cls: type) -> str:

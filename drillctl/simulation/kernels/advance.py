@@ -242,12 +242,8 @@ def _advance_block(
 
 
 def _compile(on_disk: bool) -> Any:
-    # A constant of the compiled code, so that numba's disk cache, which looks at the date of
-    # one file only, notices a change in any law or kernel.
     version = fingerprint(sources())
 
-    # Threads are the caller's: numba's own loop in parallel compiles everything twice.
-    @njit(nogil=True, cache=on_disk, **OPTIONS)
     def run(
         begin: int, end: int,
         string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
@@ -260,7 +256,12 @@ def _compile(on_disk: bool) -> Any:
             )  # fmt: skip
         return version
 
-    return run
+    # numba's disk cache looks at the date of one file only, and reads the list of kernels by the
+    # name of the function: with the version in it a change in any law or kernel is noticed, and
+    # no list is read that names modules which are no more.
+    run.__name__ = run.__qualname__ = f"run_{version}"
+    # Threads are the caller's: numba's own loop in parallel compiles everything twice.
+    return njit(nogil=True, cache=on_disk, **OPTIONS)(run)
 
 
 def sources() -> list[Path]:

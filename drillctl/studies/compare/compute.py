@@ -23,7 +23,8 @@ from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.ensemble.regions import Region, region
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.result import Result, label
+from drillctl.store.labels import label
+from drillctl.store.result import Result
 from drillctl.studies.compare.cases import (
     Nominal,
     case_designs,

@@ -33,7 +33,8 @@ from drillctl.ensemble.grid import refuse_too_large
 from drillctl.ensemble.parameters import draw, refuse_dependent
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.store.result import Result, label
+from drillctl.store.labels import label
+from drillctl.store.result import Result
 from drillctl.studies.delay.lanes import KEPT, delayed_lanes, following_design
 
 Array = NDArray[np.float64]

@@ -26,7 +26,8 @@ from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
-from drillctl.store.result import Result, label
+from drillctl.store.labels import label
+from drillctl.store.result import Result
 from drillctl.studies.doctor.error_estimate import (
     PROMISES,
     REFINEMENTS,

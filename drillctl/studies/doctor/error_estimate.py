@@ -14,7 +14,7 @@ from drillctl.rig.drillstring import Drillstring
 from drillctl.simulation.batch import Prepared
 from drillctl.simulation.propagator import string_step
 from drillctl.simulation.scheme import ACCURACIES, Scheme
-from drillctl.store.result import label
+from drillctl.store.labels import label
 
 Array = NDArray[np.float64]
 

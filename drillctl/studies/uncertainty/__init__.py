@@ -50,7 +50,7 @@ def computed(design: Design, run: Run) -> Uncertainty:
 
 def growing(design: Design) -> Growing | None:
     """The number of realizations, to which more can be added."""
-    from drillctl.store.differences import growing_realizations
+    from drillctl.store.folder import growing_realizations
 
     return growing_realizations(design)
 

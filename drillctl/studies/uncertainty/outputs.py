@@ -19,7 +19,7 @@ from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
 from drillctl.store.codec import TREE, encoded
 from drillctl.store.json_files import write_json
-from drillctl.store.names import stored_name
+from drillctl.store.labels import stored_name
 from drillctl.store.tables import texts, write_columns
 from drillctl.studies.uncertainty.best import Mean, Quantile, TailMean
 
