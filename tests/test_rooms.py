@@ -23,7 +23,7 @@ ROOMS = (
 UPWARD = {
     ("plots", "studies"),
 }
-CIRCLES = {"store"}  # rooms that hold one
+CIRCLES: set[str] = set()  # rooms that hold one
 LEAVING: tuple[str, ...] = ()  # folders that are no room
 STRAY: set[str] = set()  # modules beside the rooms that are not of the ground
 

@@ -13,7 +13,7 @@ import xarray
 import drillctl
 from drillctl.ensemble.storing import Folder
 from drillctl.errors import InputError, StoreError
-from drillctl.store import claim, identity, save
+from drillctl.store import claim, identity
 from drillctl.studies import Axis, sweep
 
 GAINS = [
@@ -99,7 +99,7 @@ def test_failed_cells_there_and_back(result, tmp_path):
 def test_simulation_there_and_back_and_run_again(bistable, tmp_path, engine):
     """Also when the engine was chosen in Python and is not in the design."""
     run = drillctl.simulate(bistable, engine=engine)
-    back = drillctl.open(save(run, tmp_path / "run"))
+    back = drillctl.open(run.save(tmp_path / "run"))
     same_run(run, back)
     same_run(run, drillctl.simulate(back.design))
 
@@ -111,7 +111,7 @@ def test_undefined_measures_there_and_back(tmp_path):
     )
     run = drillctl.simulate(stuck)
     assert run.measures.stick_slip_index is None
-    back = drillctl.open(save(run, tmp_path / "run"))
+    back = drillctl.open(run.save(tmp_path / "run"))
     same_run(run, back)
     assert back.measures.settling_time is None
 
@@ -135,7 +135,7 @@ def test_modes_back(bistable, tmp_path, monkeypatch):
 
 
 def test_zarr_holds_units_and_provenance(result, bistable, tmp_path):
-    save(result, tmp_path / "map")
+    result.save(tmp_path / "map")
     with xarray.open_zarr(tmp_path / "map/data.zarr", consolidated=False) as data:
         assert set(data["j1"].dims) == {"controller.kp", "controller.ki"}
         assert data["controller.kp"].attrs["units"] == "N*m*s/rad"
@@ -143,7 +143,7 @@ def test_zarr_holds_units_and_provenance(result, bistable, tmp_path):
         assert data["peak_pipe_torque"].attrs["units"] == "N*m"
         assert data["status"].attrs["flag_meanings"].split()[-1] == "failed"
         about_map = dict(data.attrs)
-    save(drillctl.simulate(bistable, engine="batch"), tmp_path / "run")
+    drillctl.simulate(bistable, engine="batch").save(tmp_path / "run")
     with xarray.open_zarr(tmp_path / "run/data.zarr", consolidated=False) as data:
         assert data["bit_speed"].attrs["units"] == "rad/s"
         assert data["time"].attrs["units"] == "s"
@@ -264,19 +264,19 @@ def test_results_of_python_are_not_taken_for_the_designs_own(design, result, bis
     """Axes, audit and engine given in Python: the command with that design computes afresh."""
     uneven = (Axis("controller.kp", "N*m*s/rad", np.array([1.0, 10.0, 100.0])),)
     other = sweep(design, axes=uneven)
-    save(other, tmp_path / "axes")
+    other.save(tmp_path / "axes")
     same_sweep(other, drillctl.open(tmp_path / "axes"))
     audited = dataclasses.replace(
         result, audit=type(result.audit)(np.array([1]), np.array([2.0]), np.array([2.0]))
     )
-    save(audited, tmp_path / "audit")
+    audited.save(tmp_path / "audit")
     for name in ("axes", "audit"):
         with pytest.raises(InputError, match="other settings"):
             claim("map", design, tmp_path / name)
-    save(drillctl.simulate(bistable, engine="batch"), tmp_path / "engine")
+    drillctl.simulate(bistable, engine="batch").save(tmp_path / "engine")
     with pytest.raises(InputError, match="another design"):
         claim("simulate", bistable, tmp_path / "engine")
-    save(drillctl.simulate(bistable), tmp_path / "default")
+    drillctl.simulate(bistable).save(tmp_path / "default")
     assert claim("simulate", bistable, tmp_path / "default").finished
 
 
@@ -284,7 +284,7 @@ def test_axes_that_do_not_fit_the_law_do_not_stop_saving(tmp_path):
     rig = drillctl.load("navarro-lopez-2dof", **{"simulation.duration": "5 s"})
     axes = (Axis("operating_point.speed", "rad/s", np.array([1.0, 2.0])),)
     one = sweep(rig, axes=axes, audit_cells=0)  # its default axes are the gains of a PI law
-    same_sweep(one, drillctl.open(save(one, tmp_path / "run")))
+    same_sweep(one, drillctl.open(one.save(tmp_path / "run")))
 
 
 def test_default_folders_are_never_shared(design, tmp_path, monkeypatch):
