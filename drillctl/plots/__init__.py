@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from drillctl.plots.modes import bode as bode
     from drillctl.plots.modes import mobility as mobility
     from drillctl.plots.modes import mode_shapes as mode_shapes
+    from drillctl.plots.over_time import limit_cycle as limit_cycle
+    from drillctl.plots.over_time import time_response as time_response
     from drillctl.plots.regions import three_regions as three_regions
-    from drillctl.plots.time_response import limit_cycle as limit_cycle
-    from drillctl.plots.time_response import time_response as time_response
     from drillctl.plots.tune import tune_baselines as tune_baselines
     from drillctl.plots.tune import tune_neighbourhood as tune_neighbourhood
     from drillctl.plots.uncertainty import area_convergence as area_convergence
@@ -72,7 +72,7 @@ _MODULES = {
     "map": ("error_estimate", "regularisation", "stability_map", "sweep_line"),
     "modes": ("bode", "mobility", "mode_shapes"),
     "regions": ("three_regions",),
-    "time_response": ("limit_cycle", "time_response"),
+    "over_time": ("limit_cycle", "time_response"),
     "tune": ("tune_baselines", "tune_neighbourhood"),
     "uncertainty": (
         "area_convergence",

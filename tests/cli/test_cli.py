@@ -231,8 +231,8 @@ def test_map_json(call):
     assert "results: m" in err
     held = {path.name for path in Path("m").iterdir()}
     assert held == {
-        "design.toml", "run.json", "summary.json", "data.zarr", "map.csv", "regions.csv",
-        "map.png", "responses.png",
+        "design.toml", "run.json", "summary.json", "data.zarr", "result.json", "map.csv",
+        "regions.csv", "map.png", "responses.png",
     }  # fmt: skip
     assert parsed(Path("m/summary.json").read_text()) == found
 

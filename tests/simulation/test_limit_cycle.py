@@ -14,7 +14,7 @@ from scipy.special import iv
 import drillctl
 from drillctl.errors import InputError, SimulationError
 from drillctl.linear.ends import ends_of
-from drillctl.plots.time_response import limit_cycle as drawn
+from drillctl.plots.over_time import limit_cycle as drawn
 from drillctl.simulation.limit_cycle import (
     find_orbit,
     harmonic_cycles,
