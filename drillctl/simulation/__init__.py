@@ -29,3 +29,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return resolve(f"drillctl.simulation.{_HOME[name]}:{name}")
     raise AttributeError(f"module 'drillctl.simulation' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
