@@ -33,7 +33,6 @@ from drillctl.studies.advantage.cases import (
 )
 from drillctl.studies.advantage.compute import advantage
 from drillctl.studies.advantage.delays import delay_curve
-from drillctl.studies.advantage.optimum import Optimum, optimum
 from drillctl.studies.advantage.policies import (
     CONSTANT,
     DELAY,
@@ -42,6 +41,8 @@ from drillctl.studies.advantage.policies import (
     KI,
     KP,
     REAL,
+    Optimum,
+    optimum,
     policies,
 )
 from drillctl.studies.advantage.sweeps import chart

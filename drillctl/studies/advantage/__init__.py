@@ -1,7 +1,6 @@
 """PI against PI with a weight on bit that follows the bit speed, each at its robust optimum.
 
-- `policies.py`: what is compared, and what of it is tuned.
-- `optimum.py`: robust gains of a policy.
+- `policies.py`: what is compared, what of it is tuned, and its robust gains.
 - `cases.py`: policies at their optima on equal terms, at fresh draws.
 - `sweeps.py`: areas over the gains of the drive, front and map over weights and speeds.
 - `delays.py`: against the delay of the path; `compute.py`: all of it.

@@ -22,8 +22,16 @@ from drillctl.ensemble.cases import Estimate, Runs, percentile_estimate
 from drillctl.ensemble.draws import CommonDraws, matching_shift
 from drillctl.progress import Progress
 from drillctl.store.labels import label
-from drillctl.studies.advantage.optimum import Optimum, optimum
-from drillctl.studies.advantage.policies import CONSTANT, GAIN, KI, KP, Policies, Policy
+from drillctl.studies.advantage.policies import (
+    CONSTANT,
+    GAIN,
+    KI,
+    KP,
+    Optimum,
+    Policies,
+    Policy,
+    optimum,
+)
 from drillctl.studies.tune.problem import Objective, objective_of
 
 Array = NDArray[np.float64]

@@ -20,8 +20,7 @@ from drillctl.ensemble.draws import CommonDraws
 from drillctl.progress import Progress
 from drillctl.store.labels import label
 from drillctl.studies.advantage.cases import Optima, less, measured, optimum_beside
-from drillctl.studies.advantage.optimum import Optimum
-from drillctl.studies.advantage.policies import DELAY, Policies, Policy
+from drillctl.studies.advantage.policies import DELAY, Optimum, Policies, Policy
 
 Array = NDArray[np.float64]
 

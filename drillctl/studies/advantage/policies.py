@@ -1,4 +1,4 @@
-"""What is compared: a constant weight on bit, and one that follows the bit speed, two ways.
+"""What is compared, a constant weight on bit and one that follows the bit speed; its robust gains.
 
 A policy is a law of the weight with what is tuned beside it. The drive and its bounds are the same
 for all.
@@ -6,6 +6,7 @@ for all.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -29,6 +30,8 @@ DELAY = LAW + "path.delay"
 WEIGHT, SPEED = "operating_point.weight_on_bit", "operating_point.speed"
 CONSTANT, IDEAL, REAL = "constant weight", "dynamic, ideal path", "dynamic, real path"
 """Names of the policies."""
+AT_BOUND = 1e-3
+"""Over the width of the bounds: gains nearer to one are on it."""
 
 
 @dataclass(frozen=True)
@@ -165,3 +168,33 @@ def _tuned(design: Design, following: Design) -> tuple[tuple[Tuned, Tuned], Tune
 def _where(design: Design, key: str) -> str:
     """A key after the file it is in."""
     return f"{design.origin}: {key}" if design.origin else key
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Gains with the least objective."""
+
+    values: Array  # shape (parameters,): SI
+    value: float  # objective at the realizations of the search (s)
+    share: float  # share of them with J1 at or under the level
+    # paths of gains that lie on a bound: the objective may be less beyond it
+    at_bounds: tuple[str, ...]
+    trajectories: int  # runs that it took
+
+
+def optimum(policy: Policy, realizations: int, starts: Sequence[Array] = ()) -> Optimum:
+    """Search the gains of a policy with the least objective, from known ones as well."""
+    # Checks of a design come here too, and need no engine.
+    from drillctl.studies.tune.search import optimum as least
+    from drillctl.studies.tune.search import search_problem
+
+    design = policy.design.replace({"tune.realizations": realizations})
+    problem = search_problem(design, policy.tuned)
+    best = least(problem, starts)
+    shares = problem.shares(best.values)
+    bounds = tuple(
+        t.path
+        for t, share in zip(policy.tuned, shares, strict=True)
+        if not AT_BOUND < share < 1.0 - AT_BOUND
+    )
+    return Optimum(best.values, best.value, best.share, bounds, problem.trajectories)

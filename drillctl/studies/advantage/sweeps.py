@@ -19,8 +19,15 @@ from drillctl.ensemble.sweeps import sweep
 from drillctl.progress import Progress
 from drillctl.store.labels import label
 from drillctl.studies.advantage.cases import Measured, Optima, measured, optimum_beside
-from drillctl.studies.advantage.optimum import Optimum, optimum
-from drillctl.studies.advantage.policies import GAIN, SPEED, WEIGHT, Policies, Policy
+from drillctl.studies.advantage.policies import (
+    GAIN,
+    SPEED,
+    WEIGHT,
+    Optimum,
+    Policies,
+    Policy,
+    optimum,
+)
 from drillctl.studies.tune.runs import GainRuns
 
 Array = NDArray[np.float64]
