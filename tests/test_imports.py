@@ -105,7 +105,7 @@ def section(text, title):
 
 def own(module):
     """Public functions, classes and methods that a module defines."""
-    for name, value in vars(module).items():
+    for name, value in list(vars(module).items()):
         value = inspect.unwrap(value) if callable(value) else value
         if name.startswith("_") or getattr(value, "__module__", None) != module.__name__:
             continue
