@@ -34,27 +34,7 @@ def time_response(
     ax: Axes | Sequence[Axes] | None = None,
     paths: Sequence[str] = (),
 ) -> Figure:
-    """Speeds of top drive and bit against time.
-
-    Parameters
-    ----------
-    results : Simulation or sequence of Simulation
-        One panel each, in the order given.
-    ax : Axes or sequence of Axes, optional
-        As many as results.
-    paths : sequence of str, optional
-        Parameters to be named in the titles; by default the drive's numbers.
-
-    Returns
-    -------
-    Figure
-        Speeds in rpm; grey where the bit is at rest.
-
-    Raises
-    ------
-    InputError
-        Not as many axes as results.
-    """
+    """Speeds of top drive and bit against time."""
     runs = list(results) if isinstance(results, Sequence) else [results]
     columns = 1 if len(runs) == 1 else 2
     rows = -(-len(runs) // columns)

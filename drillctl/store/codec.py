@@ -274,13 +274,7 @@ def _put(group: Any, name: str, one: _Variable) -> None:
 
 
 def read(folder: Path) -> Any:
-    """Read the result of a folder.
-
-    Raises
-    ------
-    StoreError
-        A file is missing or damaged.
-    """
+    """Read the result of a folder."""
     import zarr
 
     try:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from drillctl.design import Design
-from drillctl.errors import InputError
+from drillctl.errors import InputError, StoreError
 from drillctl.store.codec import TREE, dataset, read, write
 from drillctl.store.folder import Growing, about_run, claim
 from drillctl.store.labels import Label
@@ -100,7 +100,9 @@ def open(folder: str | Path) -> Any:
     Raises
     ------
     InputError
-        Not a run, an unfinished one, or one that cannot be read back.
+        Not a run, an unfinished one, or one in the format of another version.
+    StoreError
+        A file is missing or damaged.
     """
     path = Path(folder)
     if not (path / "run.json").is_file():
@@ -109,10 +111,13 @@ def open(folder: str | Path) -> Any:
     if not about.get("finished"):
         raise InputError("holds an unfinished run; run the command again", str(path))
     if (path / TREE).is_file():
+        for name in ("design.toml", "summary.json"):  # not needed here, but the folder is damaged
+            if not (path / name).is_file():
+                raise StoreError(f"{path}: {name} is missing")
         return read(path)
     raise InputError(
-        f"holds results of {about.get('verb')!r} that this version does not read; run the command "
-        "again in a new folder",
+        f"holds results of {about.get('verb')!r} in a format that this version does not read; run "
+        "the command again in a new folder",
         str(path),
     )
 

@@ -41,15 +41,7 @@ def responses(result: Sweep, count: int = 4) -> list[Simulation]:
 
 
 def write_cells(result: Sweep, path: Path) -> None:
-    """Write a row a cell: parameters, measures (SI) and status.
-
-    Parameters
-    ----------
-    result : Sweep
-        The map.
-    path : Path
-        Where to.
-    """
+    """Write a row a cell: parameters, measures (SI) and status."""
     columns = over_axes(result.axes) | {name: texts(v) for name, v in result.measures.items()}
     columns["status"] = np.array(STATUSES, dtype=object)[result.status.ravel()].tolist()
     write_columns(path, columns)

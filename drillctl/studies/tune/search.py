@@ -165,44 +165,21 @@ def _around(problem: GainProblem, best: Point, step: float, gained: Array) -> Ar
 
 @dataclass(frozen=True, eq=False)
 class Tuning:
-    """Gains found by a search, not certified yet.
+    """Gains found by a search, not certified yet."""
 
-    Attributes
-    ----------
-    design : Design
-        With the gains put in.
-    tuned : tuple of Tuned
-        What was tuned.
-    values : ndarray, shape (parameters,)
-        Their values (SI); where requirements cannot be met, of the closest point.
-    value : float
-        Objective at all realizations of the search (s).
-    share : float
-        Share of them with J1 at or under the level.
-    violations : dict
-        Requirements that are missed, over their limits.
-    realizations : int
-        How many could be run.
-    trajectories : int
-        Runs of the batch engine.
-    stages : list of dict
-        What each stage led to, and the trajectories until then.
-    message : str
-        The result in a sentence.
-    seconds, processor_seconds : float
-        Time that it took (s).
-    """
-
-    design: Design
-    tuned: tuple[Tuned, ...]
+    design: Design  # with the gains put in
+    tuned: tuple[Tuned, ...]  # what was tuned
+    # shape (parameters,): Their values (SI); where requirements cannot be met, of the closest
+    # point
     values: Array
-    value: float
-    share: float
-    violations: dict[str, float]
-    realizations: int
-    trajectories: int
-    stages: list[dict[str, Any]]
-    message: str
+    value: float  # objective at all realizations of the search (s)
+    share: float  # share of them with J1 at or under the level
+    violations: dict[str, float]  # requirements that are missed, over their limits
+    realizations: int  # how many could be run
+    trajectories: int  # runs of the batch engine
+    stages: list[dict[str, Any]]  # what each stage led to, and the trajectories until then
+    message: str  # the result in a sentence
+    # time that it took (s)
     seconds: float
     processor_seconds: float
 
@@ -259,28 +236,7 @@ class _Log:
 
 
 def search(design: Design, progress: Progress = SILENT, verbose: bool = False) -> Tuning:
-    """Search the gains of the least objective.
-
-    Parameters
-    ----------
-    design : Design
-        Its `[tune]` table says what is tuned and to what end, `[uncertain]` what is drawn. Step
-        and modes are those of accuracy `fast` unless the design gives a step.
-    progress : Progress
-        Receives finished stages.
-    verbose : bool
-        Let IPOPT print.
-
-    Returns
-    -------
-    Tuning
-        A level that no gains reach, or requirements that none meet, are stated in its message.
-
-    Raises
-    ------
-    InputError
-        A parameter that does not exist, bounds reversed, or no realization that a rig can have.
-    """
+    """Search the gains of the least objective."""
     begin, processor = time.perf_counter(), time.process_time()
     problem = search_problem(design, tuned_parameters(design))
     log = _Log(problem, progress)

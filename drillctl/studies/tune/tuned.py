@@ -33,32 +33,17 @@ WEIGHT_KEYS = ("weight_on_bit.gain", "weight_on_bit.path.delay")
 
 @dataclass(frozen=True)
 class Tuned:
-    """A tuned parameter.
+    """A tuned parameter."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted path.
-    unit : str
-        Unit of its values, empty for factors.
-    low, high : float
-        Bounds (SI).
-    """
-
-    path: str
-    unit: str
+    path: str  # dotted path
+    unit: str  # unit of its values, empty for factors
+    # bounds (SI)
     low: float
     high: float
 
 
 def tuned_parameters(design: Design) -> tuple[Tuned, ...]:
-    """What the `[tune]` table of a design names, or the numbers of its controller.
-
-    Raises
-    ------
-    InputError
-        An unknown path, a wrong unit, bounds in the wrong order, or a count.
-    """
+    """What the `[tune]` table of a design names, or the numbers of its controller."""
     table = design.tables.tune
     if table.parameters:
         found = tuple(_read(design, path, entry) for path, entry in table.parameters.items())
