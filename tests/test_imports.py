@@ -113,7 +113,7 @@ def own(module):
             yield name, value
         elif inspect.isclass(value):
             yield name, value
-            for inner, method in vars(value).items():
+            for inner, method in list(vars(value).items()):
                 method = getattr(method, "__func__", method)
                 if inspect.isfunction(method) and not inner.startswith("_"):
                     yield f"{name}.{inner}", method

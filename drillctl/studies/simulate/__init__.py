@@ -59,9 +59,10 @@ def pictures(result: Simulation) -> Iterator[Picture]:
     """Speeds, torques and weight over time."""
     from drillctl import plots
 
+    j1 = "undefined" if result.measures.j1 is None else f"{result.measures.j1:.4g} s"
     yield Picture(
         "time-response", "Speeds of bit and top drive over time; grey where the bit stands still.",
-        f"Time response: {result.status.replace('_', ' ')}, J1 {result.measures.j1:.4g} s.",
+        f"Time response: {result.status.replace('_', ' ')}, J1 {j1}.",
         lambda system: plots.time_response(result),
     )  # fmt: skip
 
