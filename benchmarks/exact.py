@@ -15,7 +15,7 @@ from drillctl.design import Design
 from drillctl.ensemble.grid import axes_of, cell_design
 from drillctl.provenance import provenance
 from drillctl.simulation.reference import solve
-from drillctl.simulation.trajectory import deviation
+from drillctl.simulation.run import deviation
 
 TOLERANCE, LOOSER = 1e-10, 1e-9
 

@@ -7,10 +7,7 @@ command of a study. Every command takes a design by path or shipped name. Exit c
 
 from collections.abc import Callable
 
-from drillctl.cli import (
-    files,
-    reports,
-)
+from drillctl.cli import files
 from drillctl.cli.app import app, run
 from drillctl.cli.verb import command
 from drillctl.studies.base import Group, studies
@@ -21,7 +18,7 @@ VERBS: dict[str, tuple[Callable[..., None], Group]] = {
     "new": (files.new, "Describe a rig"),
     "show": (files.show, "Describe a rig"),
     "validate": (files.validate, "Describe a rig"),
-    "report": (reports.report, "Hand over"),
+    "report": (files.report, "Hand over"),
 }
 """Commands that are not studies, with their groups in the help."""
 

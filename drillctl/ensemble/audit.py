@@ -142,7 +142,7 @@ def references(
 def reference_j1(design: Design) -> float:
     """J1 of a design by the reference solver (s); NaN if that fails, be it by overflow."""
     from drillctl.simulation.reference import solve
-    from drillctl.simulation.trajectory import deviation
+    from drillctl.simulation.run import deviation
 
     table = design.tables.simulation
     try:

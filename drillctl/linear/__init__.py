@@ -26,7 +26,7 @@ thirty elements. `control` is imported where a system is made and not before, as
 """
 
 from drillctl.linear import export, tuning
-from drillctl.linear.boundary import GainBoundary, gain_boundary
+from drillctl.linear.boundary import GainBoundary, RootLocus, gain_boundary, root_locus
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_analysis import (
     LoopAnalysis,
@@ -49,7 +49,6 @@ from drillctl.linear.response import (
     response_of,
     telling_frequencies,
 )
-from drillctl.linear.root_loci import RootLocus, root_locus
 from drillctl.linear.slope_margin import slope_margin, slope_margins
 from drillctl.linear.state_space import open_loop, plant
 from drillctl.linear.tuning import DriveImpedance, drive_impedance

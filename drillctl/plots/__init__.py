@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from drillctl.plots.following_weight import advantage_map as advantage_map
     from drillctl.plots.following_weight import weight_delay as weight_delay
     from drillctl.plots.friction import friction_curves as friction_curves
-    from drillctl.plots.impedance import drive_impedance as drive_impedance
+    from drillctl.plots.loop_gains import drive_impedance as drive_impedance
     from drillctl.plots.loop_gains import gain_boundary as gain_boundary
     from drillctl.plots.loop_gains import root_locus as root_locus
     from drillctl.plots.loop_maps import loop_map as loop_map
@@ -65,8 +65,7 @@ _MODULES = {
         "weight_delay",
     ),
     "friction": ("friction_curves",),
-    "impedance": ("drive_impedance",),
-    "loop_gains": ("gain_boundary", "root_locus"),
+    "loop_gains": ("drive_impedance", "gain_boundary", "root_locus"),
     "loop_maps": ("loop_map",),
     "loop_shape": ("nichols", "nyquist", "sensitivity"),
     "map": ("error_estimate", "regularisation", "stability_map", "sweep_line"),

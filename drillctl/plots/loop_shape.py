@@ -34,7 +34,7 @@ from drillctl.linear.loop_analysis import LoopAnalysis
 from drillctl.linear.loop_model import loop_poles
 from drillctl.linear.response import FrequencyResponse, frequency_response
 from drillctl.plots import style
-from drillctl.plots.impedance import GREY
+from drillctl.plots.loop_gains import GREY
 from drillctl.plots.modes import hertz
 
 Array = NDArray[np.floating[Any]]

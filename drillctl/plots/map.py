@@ -33,7 +33,7 @@ from drillctl.plots.style import (
     title_of,
 )
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.doctor.error_estimate import PROMISES, ROUNDING, SMALLEST
+from drillctl.studies.doctor.scheme import PROMISES, ROUNDING, SMALLEST
 
 if TYPE_CHECKING:
     from drillctl.studies import Doctor, Sweep

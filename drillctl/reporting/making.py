@@ -14,10 +14,9 @@ from drillctl import store
 from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError, nearest
 from drillctl.progress import SILENT, Progress
-from drillctl.reporting import html, markdown
-from drillctl.reporting import html as pdf
 from drillctl.reporting.blocks import Checks, Document, Section, Table
 from drillctl.reporting.gather import INTERRUPTED, Gathered, NotThereError, gather
+from drillctl.reporting.pages import html_page, markdown_page, printed
 from drillctl.reporting.pictures import FigureFiles
 from drillctl.reporting.recipes import PROFILES, Profile
 from drillctl.reporting.sections import SECTIONS
@@ -43,15 +42,15 @@ def write(
     _write_tables(document, folder / "tables")
     if "html" in formats or "pdf" in formats:
         page = folder / NAMES["html"]
-        write_text(page, html.page(document, files))
+        write_text(page, html_page(document, files))
         written["html"] = page
     if "md" in formats:
         path = folder / NAMES["md"]
-        write_text(path, markdown.page(document, files))
+        write_text(path, markdown_page(document, files))
         written["md"] = path
     if "pdf" in formats:
         try:
-            written["pdf"] = pdf.printed(folder / NAMES["html"], folder / NAMES["pdf"])
+            written["pdf"] = printed(folder / NAMES["html"], folder / NAMES["pdf"])
         except DrillctlError as error:
             unwritten["pdf"] = str(error)
     return written, unwritten

@@ -2,7 +2,7 @@
 
 - `reference.py`: adaptive integration with located events; `system.py`, `phases.py`: its
   equations; `laws_in_time.py`: laws with a memory in them; `printed.py`: the paper's own three
-  branches; `run.py`, `trajectory.py`: signals and measures.
+  branches; `run.py`: signals and measures.
 - `batch.py`: thousands of lanes at a fixed step; `lanes.py`: what a lane is and how it starts;
   `propagator.py`: the exact step of the string; `step_laws.py`: laws with a memory for it;
   `kernels/`: compiled loops and nothing else; `scheme.py`: step and modes.
@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 from drillctl.registry import resolve
 
 if TYPE_CHECKING:
+    from drillctl.simulation.run import Simulation as Simulation
     from drillctl.simulation.run import simulate as simulate
-    from drillctl.simulation.trajectory import Simulation as Simulation
 
-_HOME = {"Simulation": "trajectory", "simulate": "run"}
+_HOME = {"Simulation": "run", "simulate": "run"}
 
 __all__ = [*_HOME]
 

@@ -18,7 +18,7 @@ import drillctl
 from drillctl.design import Design
 from drillctl.ensemble.grid import axes_of, cell_design, shape_of
 from drillctl.simulation.reference import solve
-from drillctl.simulation.trajectory import deviation
+from drillctl.simulation.run import deviation
 
 DESIGN, SEED, CELLS = "monteiro-trindade-140kn", 2012, 40
 TOLERANCES = (1e-9, 1e-10)

@@ -15,7 +15,7 @@ from drillctl.linear import loop, operating_point
 from drillctl.rig.bit_rock import NavarroLopezSuarez, PrintedThreeBranch
 from drillctl.simulation.printed import BACKWARD_EDGE, CREEPING, FORWARD_EDGE, PUSHED
 from drillctl.simulation.reference import solve
-from drillctl.simulation.trajectory import sample
+from drillctl.simulation.run import sample
 
 HOLDS = (
     (

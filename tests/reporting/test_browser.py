@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from drillctl.reporting import Report
-from drillctl.reporting import html as pdf
+from drillctl.reporting import pages as pdf
 
 pytestmark = [
     pytest.mark.skipif(pdf.browser() is None, reason="no Chromium"),

@@ -14,7 +14,7 @@ import drillctl
 from drillctl.cli import run
 from drillctl.errors import InputError, SimulationError
 from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, gather, making
-from drillctl.reporting import html as pdf
+from drillctl.reporting import pages as pdf
 from drillctl.reporting.sections.summary import verdict
 
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from drillctl.rig.drillstring import Drillstring, Section, assemble
 from drillctl.rig.top_drive import PI
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import put
-from drillctl.simulation.kernels.compiling import OPTIONS
+from drillctl.simulation.kernels.arithmetic import OPTIONS, put
 from drillctl.simulation.kernels.observer_step import NoObserver
 from drillctl.simulation.kernels.string_step import (
     BlockString,

@@ -6,7 +6,7 @@ import pytest
 import drillctl
 from drillctl.design import Design
 from drillctl.simulation.reference import solve
-from drillctl.simulation.trajectory import sample
+from drillctl.simulation.run import sample
 
 HOLDS = (
     (

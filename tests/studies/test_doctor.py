@@ -11,7 +11,7 @@ from drillctl.ensemble import audit
 from drillctl.errors import InputError
 from drillctl.studies.doctor import examination
 from drillctl.studies.doctor import result as diagnosis
-from drillctl.studies.doctor.error_estimate import PROMISES, ErrorEstimate, Promise, errors_of
+from drillctl.studies.doctor.scheme import PROMISES, ErrorEstimate, Promise, errors_of
 
 PAPER = "monteiro-trindade-140kn"
 GAINS = ("controller.kp=100:1000:9", "controller.ki=20:500:7")

@@ -15,7 +15,7 @@ import pytest
 import drillctl
 from drillctl.ensemble.grid import axes_of, groups
 from drillctl.simulation.batch import prepare, run_batch
-from drillctl.studies.doctor.error_estimate import PROMISES
+from drillctl.studies.doctor.scheme import PROMISES
 
 HOLDS = (
     (

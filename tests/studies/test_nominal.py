@@ -11,7 +11,7 @@ import pytest
 import drillctl
 from drillctl.errors import InputError
 from drillctl.progress import Within
-from drillctl.simulation.trajectory import SIGNALS
+from drillctl.simulation.run import SIGNALS
 from drillctl.studies.compare.cases import NO_MAPS, case_designs
 from drillctl.studies.compare.compute import compare
 

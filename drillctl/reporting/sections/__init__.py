@@ -11,14 +11,7 @@ from typing import NamedTuple
 
 from drillctl.reporting.blocks import Block, Text, block, figure
 from drillctl.reporting.gather import Gathered
-from drillctl.reporting.sections import (
-    audit,
-    responses,
-    rig,
-    stability,
-    summary,
-    uncertainty,
-)
+from drillctl.reporting.sections import audit, rig, runs, summary
 from drillctl.studies.base import Section, studies
 
 
@@ -35,10 +28,10 @@ KINDS = (
     Kind("summary", "Summary and verdict",
          ("simulate", "loop", "setting", "map", "cells", "uncertainty", "tune"), summary.build),
     Kind("rig", "The rig", (), rig.build),
-    Kind("map", "J1 over the map", ("map", "cells"), stability.build),
-    Kind("responses", "Time responses", ("simulate", "cells", "best", "bad"), responses.build),
-    Kind("uncertainty", "Uncertainty", ("uncertainty", "setting"), uncertainty.build),
-    Kind("sensitivity", "Sensitivity", ("uncertainty",), uncertainty.build_sensitivity),
+    Kind("map", "J1 over the map", ("map", "cells"), runs.build_map),
+    Kind("responses", "Time responses", ("simulate", "cells", "best", "bad"), runs.build_responses),
+    Kind("uncertainty", "Uncertainty", ("uncertainty", "setting"), runs.build_uncertainty),
+    Kind("sensitivity", "Sensitivity", ("uncertainty",), runs.build_sensitivity),
     Kind("audit", "Accuracy audit",
          ("simulate", "map", "uncertainty", "doctor", "mesh-1", "mesh-2", "mesh-4", "step-2",
           "step-4"), audit.build),

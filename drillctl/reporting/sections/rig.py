@@ -1,13 +1,130 @@
-"""The rig: a drawing by depth and tables of its parts; the glossary."""
+"""A drawing of the rig: top drive, sections by depth, BHA and bit, rock.
+
+The rig: a drawing by depth and tables of its parts; the glossary.
+"""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawn
+from matplotlib.patches import Polygon, Rectangle
+
+from drillctl.design import Design
 from drillctl.design.tables import SectionTable
+from drillctl.plots import style
 from drillctl.reporting.blocks import Block, Figure, Table, Text
 from drillctl.reporting.gather import Gathered
-from drillctl.reporting.rig_drawing import rig_drawing
 from drillctl.reporting.words import NOTHING, Words, number
 from drillctl.rig.drillstring import PIPES
+
+LUMPED = 0.12
+"""Height of a lumped spring as a share of the drawing."""
+WIDEST = 0.16
+"""Half the width of the widest section, as a share of the drawing's width."""
+LEAST = 0.055
+"""Smallest share of the height for a section, so that its name fits."""
+
+
+class _Part(NamedTuple):
+    table: SectionTable
+    top: float
+    bottom: float
+    half: float
+
+
+def rig_drawing(design: Design, words: Words) -> Drawn:
+    """Draw a rig, depth downward."""
+    figure, ax = style.axes_or_new(None, 6.4, 6.2)
+    ax.set_xlim(-0.5, 1.0)
+    ax.set_ylim(1.16, -0.16)
+    ax.set_axis_off()
+    parts = _parts(design)
+    depth = 0.0
+    for number_, part in enumerate(parts):
+        _section(ax, part, number_, words)
+        depth += part.table.length or 0.0
+        if part.table.length:
+            shown = words.quantity(depth, "m")
+            ax.text(-0.22, part.bottom, shown, ha="right", va="center", fontsize=style.SMALL)
+            ax.plot([-0.2, -part.half], [part.bottom] * 2, color="#888888", linewidth=0.6)
+    _ends(ax, design, words)
+    title = (design.tables.title or design.name).replace("$", r"\$")
+    ax.set_title(title, fontsize=style.TITLE, loc="left", wrap=True)
+    return figure
+
+
+def _parts(design: Design) -> list[_Part]:
+    """Sections between 0 and 1, by length, each high enough for its name."""
+    tables = design.tables.drillstring.sections
+    lengths = [table.length or 0.0 for table in tables]
+    total = sum(lengths) or 1.0
+    shares = [max(LEAST, length / total) if length else LUMPED for length in lengths]
+    if not any(lengths):
+        shares = [1.0] * len(tables)
+    scale = 1.0 / sum(shares)
+    widths = [_outer(table) for table in tables]
+    widest = max(widths)
+    parts, top = [], 0.0
+    for table, share, width in zip(tables, shares, widths, strict=True):
+        bottom = top + scale * share
+        parts.append(_Part(table, top, bottom, WIDEST * (0.35 + 0.65 * width / widest)))
+        top = bottom
+    return parts
+
+
+def _outer(table: SectionTable) -> float:
+    if table.pipe is not None:
+        return PIPES[table.pipe].outer_diameter
+    return table.outer_diameter or 0.1
+
+
+def _section(ax: Axes, part: _Part, order: int, words: Words) -> None:
+    table = part.table
+    if table.stiffness is not None:
+        _spring(ax, part)
+        text = f"{table.name}: spring {number(table.stiffness)} N m/rad"
+    else:
+        colour = style.COLOURS[order % len(style.COLOURS)]
+        ax.add_patch(
+            Rectangle(
+                (-part.half, part.top), 2.0 * part.half, part.bottom - part.top, facecolor=colour,
+                alpha=0.35, edgecolor=colour, linewidth=1.4,
+            )
+        )  # fmt: skip
+        text = f"{table.name}: {words.quantity(table.length, 'm')}"
+        if table.pipe is not None:
+            text += f", {table.pipe}"
+        elif table.outer_diameter is not None:
+            text += f", {words.diameter(table.outer_diameter)} x "
+            text += words.diameter(table.inner_diameter)
+    middle = 0.5 * (part.top + part.bottom)
+    ax.text(WIDEST + 0.06, middle, text, va="center", fontsize=style.SMALL)
+
+
+def _spring(ax: Axes, part: _Part) -> None:
+    turns = 9
+    heights = [part.top + (part.bottom - part.top) * k / turns for k in range(turns + 1)]
+    sides = [0.0] + [(-1.0) ** k * 0.5 * WIDEST for k in range(turns - 1)] + [0.0]
+    ax.plot(sides, heights, color="black", linewidth=style.LINE)
+
+
+def _ends(ax: Axes, design: Design, words: Words) -> None:
+    tables = design.tables
+    ax.add_patch(Rectangle((-0.24, -0.09), 0.48, 0.085, facecolor=style.SKY, edgecolor="black"))
+    text = f"top drive: {number(tables.top_drive.inertia)} kg m²\n{tables.controller.law}"
+    ax.text(0.28, -0.05, text, va="center", fontsize=style.SMALL)
+    ax.add_patch(Rectangle((-0.1, 1.0), 0.2, 0.035, facecolor="#888888", edgecolor="black"))
+    bit = [(-0.1, 1.035), (0.1, 1.035), (0.05, 1.075), (-0.05, 1.075)]
+    ax.add_patch(Polygon(bit, facecolor=style.ORANGE, edgecolor="black"))
+    ax.add_patch(
+        Rectangle((-0.45, 1.075), 0.9, 0.06, facecolor="#BBBBBB", edgecolor="none", hatch="///",
+                  alpha=0.7)
+    )  # fmt: skip
+    weight = words.quantity(tables.operating_point.weight_on_bit, "N")
+    text = f"BHA: {number(tables.bha.inertia)} kg m², {weight} on bit"
+    ax.text(WIDEST + 0.06, 1.045, text, va="center", fontsize=style.SMALL)
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:

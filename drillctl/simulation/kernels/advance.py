@@ -17,8 +17,17 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import aligned_stack, any_of, at, fma, pick, put
-from drillctl.simulation.kernels.compiling import OPTIONS, compiled, inlined
+from drillctl.simulation.kernels.arithmetic import (
+    OPTIONS,
+    aligned_stack,
+    any_of,
+    at,
+    compiled,
+    fma,
+    inlined,
+    pick,
+    put,
+)
 from drillctl.simulation.kernels.drive_step import (
     begin_drive,
     eliminate,

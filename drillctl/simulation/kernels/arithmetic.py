@@ -1,4 +1,6 @@
-"""What rows need beyond the operators: memory, choice, fused multiply-adds.
+"""How everything in this package is compiled.
+
+What rows need beyond the operators: memory, choice, fused multiply-adds.
 
 exp(x) of a row in plain arithmetic.
 
@@ -10,12 +12,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 
-from drillctl.simulation.kernels.compiling import inlined
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.kernels.vectors import (
     MASK,
@@ -28,6 +30,26 @@ from drillctl.simulation.kernels.vectors import (
     row,
     splat,
 )
+
+# No fastmath: what may be fused, `vectors` says. Division follows IEEE. No counting of references:
+# kernels hold none and allocate nothing, and counting them cost as much as the laws.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+
+inlined = numba.njit(forceinline=True, **OPTIONS)
+"""Decorator for what is part of the step of a block."""
+
+compiled = numba.njit(**OPTIONS)
+"""Decorator for what is called once per block, or seldom."""
+
+
+def by_type(function: Any) -> Any:
+    """Decorator for what numba asks, given types, for the code that stands for `function`.
+
+    That code is part of the step, too: left to itself LLVM calls it, and every row goes through
+    memory on the way.
+    """
+    return overload(function, jit_options={"forceinline": True, **OPTIONS})
+
 
 DOUBLE_BYTES = 8
 

@@ -18,8 +18,17 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import at, each, fma, most, pick, put
-from drillctl.simulation.kernels.compiling import by_type, compiled, inlined
+from drillctl.simulation.kernels.arithmetic import (
+    at,
+    by_type,
+    compiled,
+    each,
+    fma,
+    inlined,
+    most,
+    pick,
+    put,
+)
 from drillctl.simulation.kernels.laws import law_at, mean_torque, torque_at
 from drillctl.simulation.kernels.program_step import NoProgram
 

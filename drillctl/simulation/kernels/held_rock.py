@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 from drillctl.rig.bit_rock import OverWeight
 from drillctl.rig.bit_rock.law import Exp
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import at, put
-from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.arithmetic import at, by_type, inlined, put
 from drillctl.simulation.kernels.laws import law_at
 from drillctl.simulation.kernels.weight_step import has_memory
 

@@ -25,13 +25,14 @@ from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import (
     any_of,
     at,
+    by_type,
     each,
     everywhere,
+    inlined,
     most,
     pick,
     put,
 )
-from drillctl.simulation.kernels.compiling import by_type, inlined
 from drillctl.simulation.kernels.drive_step import RealStep, SampledStep
 from drillctl.simulation.kernels.held_rock import rock
 from drillctl.simulation.kernels.laws import contact, kinetic_torque_at_rest, static_torque

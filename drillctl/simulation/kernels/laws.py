@@ -11,8 +11,7 @@ from typing import Any
 
 from numba import types
 
-from drillctl.simulation.kernels.arithmetic import at, exp, pick, put
-from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.arithmetic import at, by_type, exp, inlined, pick, put
 from drillctl.simulation.kernels.rows import MOST_FIELDS, WIDTH
 
 

@@ -5,8 +5,17 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import any_of, at, fma, least, most, pick, put
-from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.arithmetic import (
+    any_of,
+    at,
+    by_type,
+    fma,
+    inlined,
+    least,
+    most,
+    pick,
+    put,
+)
 from drillctl.simulation.kernels.weight_step import stays
 from drillctl.simulation.measures import NARROW_BAND, WIDE_BAND
 

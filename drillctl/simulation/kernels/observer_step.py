@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import at, put
-from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.arithmetic import at, by_type, inlined, put
 from drillctl.simulation.kernels.rows import WIDTH
 
 

@@ -8,8 +8,16 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import any_of, at, least, pick, put
-from drillctl.simulation.kernels.compiling import by_type, compiled, inlined
+from drillctl.simulation.kernels.arithmetic import (
+    any_of,
+    at,
+    by_type,
+    compiled,
+    inlined,
+    least,
+    pick,
+    put,
+)
 from drillctl.simulation.kernels.laws import contact, law_at, load_block, load_where, weight_at
 from drillctl.simulation.kernels.weight_step import acting
 

@@ -5,8 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import any_of, at, each, everywhere, least, most, pick
-from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.arithmetic import (
+    any_of,
+    at,
+    by_type,
+    each,
+    everywhere,
+    inlined,
+    least,
+    most,
+    pick,
+)
 from drillctl.simulation.kernels.held_rock import rock
 from drillctl.simulation.kernels.lane_step import Outcome, stick_or_slip
 from drillctl.simulation.kernels.laws import contact

@@ -18,8 +18,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import at, each, fma, put
-from drillctl.simulation.kernels.compiling import by_type, inlined
+from drillctl.simulation.kernels.arithmetic import at, by_type, each, fma, inlined, put
 from drillctl.simulation.kernels.lane_step import asks_for_top
 from drillctl.simulation.kernels.rows import WIDTH
 

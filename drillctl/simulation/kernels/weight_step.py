@@ -15,8 +15,10 @@ from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import (
     any_of,
     at,
+    by_type,
     exp,
     gather,
+    inlined,
     lane_number,
     least,
     most,
@@ -24,7 +26,6 @@ from drillctl.simulation.kernels.arithmetic import (
     put,
     rounded_down,
 )
-from drillctl.simulation.kernels.compiling import by_type, inlined
 from drillctl.simulation.kernels.laws import law_at, moves, weight_at
 from drillctl.simulation.kernels.observer_step import move_observer, read_observer, start_observer
 from drillctl.simulation.kernels.rows import WIDTH

@@ -49,7 +49,7 @@ def tables(result: Doctor) -> Iterator[Table]:
 
 def _scheme(scheme: dict[str, Any]) -> Table:
     from drillctl.store.tables import Column, Table
-    from drillctl.studies.doctor.scheme_reasons import FORMS
+    from drillctl.studies.doctor.scheme import FORMS
 
     rows = [["step", f"{1e3 * scheme['step']:.4g} ms", _why(scheme)]]
     for name, step in sorted(scheme["bounds"].items(), key=lambda bound: bound[1]):

@@ -28,14 +28,15 @@ from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
 from drillctl.store.labels import label
 from drillctl.store.result import Result
-from drillctl.studies.doctor.error_estimate import (
+from drillctl.studies.doctor.scheme import (
     PROMISES,
     REFINEMENTS,
     ErrorEstimate,
+    SchemeReasons,
     errors_of,
+    explain,
     refined,
 )
-from drillctl.studies.doctor.scheme_reasons import SchemeReasons, explain
 
 Array = NDArray[np.float64]
 

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import plots
-from drillctl.linear.boundary import WINDOW, Window, gain_boundary
+from drillctl.linear.boundary import WINDOW, Window, gain_boundary, root_locus
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_analysis import LoopAnalysis
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.response import FrequencyResponse, frequency_response, telling_frequencies
-from drillctl.linear.root_loci import root_locus
 from drillctl.linear.tuning import drive_impedance, stick_slip_frequency
 from drillctl.studies.base import Picture
 from drillctl.studies.loop.compute import large

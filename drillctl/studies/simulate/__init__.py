@@ -10,7 +10,7 @@ from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Study
 
 if TYPE_CHECKING:
     from drillctl.design import Design
-    from drillctl.simulation.trajectory import Simulation
+    from drillctl.simulation.run import Simulation
     from drillctl.store.tables import Table
 
 HIDDEN = ("j1_rate", "work_at_bit", "time_outside_table")
