@@ -48,12 +48,12 @@ def names(shelf: Shelf) -> list[str]:
 
 def entries(shelf: Shelf) -> list[Entry]:
     """The shipped models or designs with their titles, sorted by name."""
-    found = []
+    results = []
     for name in names(shelf):
         path = _folder(shelf) / f"{name}.toml"
         title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
-        found.append(Entry(name, title, path))
-    return found
+        results.append(Entry(name, title, path))
+    return results
 
 
 def find(name_or_path: str, shelves: tuple[Shelf, ...] = ("designs", "models")) -> Path:

@@ -16,9 +16,9 @@ PACKAGES = ("numpy", "scipy", "numba", "llvmlite")
 @cache
 def provenance() -> dict[str, str]:
     """Versions and processor, as stored with every result."""
-    found = {"drillctl": drillctl.__version__, "python": platform.python_version()}
-    found |= {name: version(name) for name in PACKAGES}
-    return found | {"processor": processor()}
+    results = {"drillctl": drillctl.__version__, "python": platform.python_version()}
+    results |= {name: version(name) for name in PACKAGES}
+    return results | {"processor": processor()}
 
 
 def processor() -> str:

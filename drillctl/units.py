@@ -15,8 +15,7 @@ from typing import Any, Literal
 
 from drillctl.errors import InputError, shown
 
-RPM = math.pi / 30.0
-"""One revolution a minute (rad/s)."""
+RPM = math.pi / 30.0  # one revolution a minute (rad/s)
 
 
 class SI(float):
@@ -245,8 +244,7 @@ def write(value: float, kind: Kind) -> str:
     return f"{value!r} {kind.si}"
 
 
-System = Literal["si", "field"]
-"""Units people read: rpm, kN, kN m, m; or rpm, klbf, klbf ft, ft."""
+System = Literal["si", "field"]  # units people read: rpm, kN, kN m, m; or rpm, klbf, klbf ft, ft
 
 _DISPLAY: dict[str, dict[str, tuple[str, str]]] = {
     "si": {

@@ -103,11 +103,6 @@ def progress() -> Iterator[Progress]:
         yield Bar(bar)
 
 
-def sized(value: float | None, digits: int = 5) -> str:
-    """Format a number for a table; a dash for None and NaN."""
-    return "-" if value is None or value != value else f"{value:.{digits}g}"
-
-
 @contextmanager
 def library_output_on_stderr() -> Iterator[None]:
     """Send what libraries print, from C or Python, to stderr: stdout is reserved for JSON."""

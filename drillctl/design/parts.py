@@ -15,14 +15,10 @@ from drillctl.rig.program import STILL, Program, Ramp
 from drillctl.rig.top_drive.constant_torque import ConstantTorqueTable
 from drillctl.rig.weight_on_bit.law import HEAVIEST, WeightLaw, weight_laws
 
-STEEL_SHEAR_MODULUS = 79.3e9
-"""Shear modulus (Pa) where a design gives none: drill-pipe steel."""
-STEEL_DENSITY = 7850.0
-"""Density (kg/m3) where a design gives none."""
-STEEL_POISSON_RATIO = 0.3
-"""Poisson's ratio where a design gives Young's modulus alone."""
-ELEMENT_LENGTH = 100.0
-"""Longest element (m) where a design does not say how many."""
+STEEL_SHEAR_MODULUS = 79.3e9  # shear modulus (Pa) where a design gives none: drill-pipe steel
+STEEL_DENSITY = 7850.0  # density (kg/m3) where a design gives none
+STEEL_POISSON_RATIO = 0.3  # poisson's ratio where a design gives Young's modulus alone
+ELEMENT_LENGTH = 100.0  # longest element (m) where a design does not say how many
 MOST_ELEMENTS = 10_000
 """Elements of a whole string: some metres each; beyond, matrices outgrow the memory."""
 

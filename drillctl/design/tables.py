@@ -335,12 +335,12 @@ class OwnTables(Table):
 
 def settings_of_studies() -> dict[str, type[Table]]:
     """Tables of the studies by key: `KEY` and `Settings` of the `settings.py` beside each."""
-    found: dict[str, type[Table]] = {}
+    results: dict[str, type[Table]] = {}
     for study in registry.STUDIES:
         if find_spec(f"{study}.settings") is not None:
             settings = import_module(f"{study}.settings")
-            found[settings.KEY] = settings.Settings
-    return found
+            results[settings.KEY] = settings.Settings
+    return results
 
 
 if TYPE_CHECKING:

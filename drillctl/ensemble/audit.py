@@ -19,12 +19,9 @@ from drillctl.store.labels import label
 
 Array = NDArray[np.float64]
 
-SEED = 20121
-"""Seed of the choice of cells: the same map is audited at the same cells."""
-WORST_ALLOWED = 1e-2
-"""Relative difference in J1 above which a map says `audit: check`."""
-TOLERANCE = 1e-7
-"""Tolerance of the reference solver in an audit: J1 to some 1e-7."""
+SEED = 20121  # seed of the choice of cells: the same map is audited at the same cells
+WORST_ALLOWED = 1e-2  # relative difference in J1 above which a map says `audit: check`
+TOLERANCE = 1e-7  # tolerance of the reference solver in an audit: J1 to some 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +47,8 @@ class Audit:
     @property
     def worst(self) -> float | None:
         """Largest relative difference; None if no cell was audited or none could be."""
-        found = self.differences[np.isfinite(self.differences)]
-        return float(found.max()) if found.size else None
+        result = self.differences[np.isfinite(self.differences)]
+        return float(result.max()) if result.size else None
 
     @property
     def verdict(self) -> str:
@@ -124,7 +121,7 @@ def references(
     if not designs:
         return np.empty(0)
     progress.begin("auditing cells", len(designs))
-    begin, found = time.perf_counter(), list[float]()
+    begin, result = time.perf_counter(), list[float]()
     # As many as the lanes may use, which is what `--threads` sets.
     workers = min(len(designs), numba.get_num_threads())
     at_a_time = len(designs) if math.isinf(seconds) else workers
@@ -134,9 +131,9 @@ def references(
                 break
             part = designs[first : first + at_a_time]
             for value in parallel(joblib.delayed(reference_j1)(d) for d in part):
-                found.append(value)
+                result.append(value)
                 progress.advance(1)
-    return np.array(found)
+    return np.array(result)
 
 
 def reference_j1(design: Design) -> float:

@@ -20,16 +20,12 @@ from drillctl.store.tables import Estimate, open_estimate
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
-CONFIDENCE = 0.95
-"""Of every interval."""
-TAIL = 0.5 * (1.0 - CONFIDENCE)
-"""Probability beyond each end of an interval."""
+CONFIDENCE = 0.95  # of every interval
+TAIL = 0.5 * (1.0 - CONFIDENCE)  # probability beyond each end of an interval
 RESAMPLES = 4000
 """Of the bootstrap of a mean: its own scatter is then a few percent of the interval's width."""
-OBJECTIVE_RESAMPLES = 1000
-"""Of the bootstrap of an objective, each of which sorts all draws."""
-AT_A_TIME = 2_000_000
-"""Numbers resampled at a time: bounds the memory."""
+OBJECTIVE_RESAMPLES = 1000  # of the bootstrap of an objective, each of which sorts all draws
+AT_A_TIME = 2_000_000  # numbers resampled at a time: bounds the memory
 QUANTILES = {"p05": 0.05, "p50": 0.5, "p95": 0.95}
 """Of the distribution of a measure over the draws."""
 
@@ -84,8 +80,8 @@ class Crossing(NamedTuple):
 
     def summary(self, name: str) -> dict[str, Any]:
         """As strict JSON values: the place by a name, and its interval."""
-        found = {name: self.at, "interval_95": list(self.interval)}
-        return found if self.within is None else {**found, "within": self.within}
+        results = {name: self.at, "interval_95": list(self.interval)}
+        return results if self.within is None else {**results, "within": self.within}
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,8 +163,8 @@ class Runs:
 
     def counts(self) -> dict[str, int]:
         """Number of draws by status, those that occur."""
-        found = {name: int((self.status == code).sum()) for code, name in enumerate(STATUSES)}
-        return {name: count for name, count in found.items() if count}
+        results = {name: int((self.status == code).sum()) for code, name in enumerate(STATUSES)}
+        return {name: count for name, count in results.items() if count}
 
 
 def joined(runs: Sequence[Runs], join: Callable[[list[NDArray[Any]]], NDArray[Any]]) -> Runs:
@@ -283,12 +279,12 @@ def crossing(axis: Array, values: Array, low: Array, high: Array) -> Crossing:
 
 def resampled_crossing(axis: Array, values: Array) -> Crossing:
     """The same of a difference and its resamples, shape (points, 1 + resamples)."""
-    found = [first_not_negative(axis, column) for column in values.T]
-    again = np.sort([np.inf if one is None else one for one in found[1:]])
+    results = [first_not_negative(axis, column) for column in values.T]
+    again = np.sort([np.inf if one is None else one for one in results[1:]])
     # Order statistics: between a place and none there is nothing to interpolate.
     ends = np.quantile(again, [TAIL, 1.0 - TAIL], method="inverted_cdf")
     low, high = (float(end) if np.isfinite(end) else None for end in ends)
-    return Crossing(found[0], (low, high), float(np.isfinite(again).mean()))
+    return Crossing(results[0], (low, high), float(np.isfinite(again).mean()))
 
 
 def first_not_negative(axis: Array, values: Array) -> float | None:

@@ -22,10 +22,8 @@ from drillctl.provenance import provenance
 if TYPE_CHECKING:
     from distributed import Client
 
-WAITING = 4
-"""Blocks that each thread of the cluster has before it: none idles, and few are lost."""
-DEATHS = 20
-"""Workers that may die over one block before it is taken to be the block's doing."""
+WAITING = 4  # blocks that each thread of the cluster has before it: none idles, and few are lost
+DEATHS = 20  # workers that may die over one block before it is taken to be the block's doing
 
 
 class Cluster:
@@ -71,14 +69,14 @@ class Cluster:
             if more is not None:
                 waiting.add(submit(more))
 
-    def _refuse_other(self, found: dict[str, str]) -> None:
+    def _refuse_other(self, result: dict[str, str]) -> None:
         here = provenance()
         for key, value in here.items():
-            if found.get(key) == value or (key == "processor" and self._allow_mixed):
+            if result.get(key) == value or (key == "processor" and self._allow_mixed):
                 continue
             hint = " (--allow-mixed lets it)" if key == "processor" else ""
             raise InputError(
-                f"a worker has {key} {found.get(key)}, this process {value}: results would differ "
+                f"a worker has {key} {result.get(key)}, this process {value}: results would differ "
                 f"in the last bits{hint}",
                 "--scheduler",
             )
@@ -87,8 +85,8 @@ class Cluster:
 @lru_cache(maxsize=4)
 def _job(sent: bytes) -> Job:
     """The job, with what a worker derived from it for earlier blocks."""
-    found: Job = pickle.loads(sent)
-    return found
+    result: Job = pickle.loads(sent)
+    return result
 
 
 def _run(sent: bytes, first: int, count: int) -> Block:
@@ -106,8 +104,7 @@ def _refuse_more(error: BaseException, times: int) -> None:
     raise error
 
 
-ANSWER = 10.0
-"""How long a scheduler may take to answer (s)."""
+ANSWER = 10.0  # how long a scheduler may take to answer (s)
 
 
 def connect(address: str) -> Client:

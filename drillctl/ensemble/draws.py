@@ -121,16 +121,11 @@ def told(errors: list[InputError]) -> tuple[Failures, ...]:
 
 Array = NDArray[np.float64]
 
-START_UP = 20.0
-"""Time (s) that `mean_weight_after_start` leaves out, of runs of 100 s and more."""
-START_UP_SHARE = 0.2
-"""And its largest share of shorter runs."""
-EQUAL_TO = 2e-3
-"""Largest relative difference of mean weights that are called equal."""
-SOUGHT_TO = 5e-4
-"""Relative difference that the search for equal weights stops at."""
-MOST_SHIFTS = 40
-"""Shifts of the nominal weight that are tried."""
+START_UP = 20.0  # time (s) that `mean_weight_after_start` leaves out, of runs of 100 s and more
+START_UP_SHARE = 0.2  # and its largest share of shorter runs
+EQUAL_TO = 2e-3  # largest relative difference of mean weights that are called equal
+SOUGHT_TO = 5e-4  # relative difference that the search for equal weights stops at
+MOST_SHIFTS = 40  # shifts of the nominal weight that are tried
 
 
 def start_up(duration: float) -> float:
@@ -208,10 +203,10 @@ def matching_shift(
     low, high = _allowed(drawn)
 
     def excess(shift: float) -> float:
-        found = run_draws(drawn, count, shift).measures[measure]
-        if np.isnan(found).all():
+        result = run_draws(drawn, count, shift).measures[measure]
+        if np.isnan(result).all():
             raise InputError("no draw gives a finite answer", "weight_on_bit")
-        return float(np.nanmean(found)) / target - 1.0
+        return float(np.nanmean(result)) / target - 1.0
 
     return _zero(excess, low, high, _nominal(drawn))
 

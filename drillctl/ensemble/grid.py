@@ -89,8 +89,7 @@ OF_THE_PROGRAM = ("speed_program.", "weight_program.", "rock_until")
 """Names of numbers that say when something jumps or turns."""
 TRACKING, TRACKED_BY = "drive.tracking", "controller.drive.tracking_time"
 """The one number that two usual axes have in common: it follows from both gains, unless given."""
-SEARCHED = 4096
-"""Lanes in which the steepest rock is looked for at a time."""
+SEARCHED = 4096  # lanes in which the steepest rock is looked for at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,17 +175,17 @@ def axis(design: Design, table: AxisTable) -> Axis:
     """The axis that a table asks for."""
     where = f"map.axes {table.path}"
     try:
-        found = parameter(design, table.path)
-        low, high = found.parse(table.min), found.parse(table.max)
+        result = parameter(design, table.path)
+        low, high = result.parse(table.min), result.parse(table.max)
     except InputError as error:
         raise InputError(error.problem, where) from None
     if not low < high:
         raise InputError(f"min {table.min} must be less than max {table.max}", where)
     values = np.linspace(low, high, table.points)
-    if found.whole and not np.array_equal(values, np.round(values)):
+    if result.whole and not np.array_equal(values, np.round(values)):
         first = next(v for v in values if v != round(v))
         raise InputError(f"{first:g} is not a whole number, and it takes no others", where)
-    return Axis(table.path, found.si_unit, values)
+    return Axis(table.path, result.si_unit, values)
 
 
 def axes_of(
@@ -215,9 +214,9 @@ def group_of(design: Design, axes: tuple[Axis, ...], pieces: tuple[slice, ...]) 
     own = tuple(Axis(a.path, a.unit, a.values[p]) for a, p in pairs if not a.shared)
     begins = tuple(piece.start for piece in pieces)
     shape = tuple(piece.stop - piece.start for piece in pieces)
-    found = Group(base, own, begins, shape, shape_of(axes))
-    _ = found.numbers  # impossible cells are refused here, not when lanes are made
-    return found
+    result = Group(base, own, begins, shape, shape_of(axes))
+    _ = result.numbers  # impossible cells are refused here, not when lanes are made
+    return result
 
 
 def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
@@ -275,11 +274,11 @@ def _numbers(design: Design, axes: tuple[Axis, ...]) -> NumberGrid:
 def _cell_by_cell(design: Design, axes: tuple[Axis, ...]) -> NumberGrid:
     """Lane numbers of every cell resolved by itself."""
     shape = shape_of(axes)
-    found: dict[str, Array] = {}
+    results: dict[str, Array] = {}
     for cell in range(int(np.prod(shape, dtype=int))):
         for key, value in lane_numbers(cell_design(design, axes, cell)).items():
-            found.setdefault(key, np.empty(shape)).ravel()[cell] = value
-    return NumberGrid(shape, compact(found))
+            results.setdefault(key, np.empty(shape)).ravel()[cell] = value
+    return NumberGrid(shape, compact(results))
 
 
 def _outer_product(design: Design, axes: tuple[Axis, ...]) -> NumberGrid | None:
@@ -290,7 +289,7 @@ def _outer_product(design: Design, axes: tuple[Axis, ...]) -> NumberGrid | None:
     """
     low = {a.path: a.values[0] for a in axes}
     base = lane_numbers(replaced(design, low) if axes else design)
-    found = {key: np.full((1,) * len(axes), value) for key, value in base.items()}
+    results = {key: np.full((1,) * len(axes), value) for key, value in base.items()}
     taken: set[str] = set()
     tracked = {TRACKING} & set(base) if TRACKED_BY not in low else set()
     for dimension, a in enumerate(axes):
@@ -301,11 +300,11 @@ def _outer_product(design: Design, axes: tuple[Axis, ...]) -> NumberGrid | None:
         taken |= touched
         along = [-1 if d == dimension else 1 for d in range(len(axes))]
         for key in touched:
-            found[key] = np.array([n[key] for n in column]).reshape(along)
-    if tracked and found["drive.kp"].size > 1 and found["drive.ki"].size > 1:
+            results[key] = np.array([n[key] for n in column]).reshape(along)
+    if tracked and results["drive.kp"].size > 1 and results["drive.ki"].size > 1:
         drive = design.tables.controller.drive
-        found[TRACKING] = tracking(found["drive.kp"], found["drive.ki"], drive)
-    grid = NumberGrid(shape_of(axes), found)
+        results[TRACKING] = tracking(results["drive.kp"], results["drive.ki"], drive)
+    grid = NumberGrid(shape_of(axes), results)
     return grid if _right_at_corners(design, axes, grid) else None
 
 
@@ -353,8 +352,8 @@ class NumberGrid:
 
     def varies(self, names: tuple[str, ...]) -> tuple[int, ...]:
         """Dimensions along which a number varies whose name begins with one of these."""
-        found = [v.shape for key, v in self.numbers.items() if key.startswith(names)]
-        return tuple(d for d in range(len(self.shape)) if any(shape[d] > 1 for shape in found))
+        results = [v.shape for key, v in self.numbers.items() if key.startswith(names)]
+        return tuple(d for d in range(len(self.shape)) if any(shape[d] > 1 for shape in results))
 
     def along(self, dimensions: tuple[int, ...]) -> tuple[int, ...]:
         """Shape of the part of the grid along some dimensions, the others at their first."""
@@ -384,8 +383,7 @@ def _compact(array: Array) -> Array:
 
 BYTES_PER_CELL, BYTES_PER_MEASURE = 80, 10
 """Memory that a cell takes in a sweep, its regions and its file, and each measure kept of it."""
-MEMORY_SHARE = 0.5
-"""Largest share of the free memory that a sweep may ask for."""
+MEMORY_SHARE = 0.5  # largest share of the free memory that a sweep may ask for
 
 
 def refuse_too_large(

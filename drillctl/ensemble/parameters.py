@@ -32,8 +32,7 @@ DEFAULT_COV = 0.05
 """Coefficient of variation of the rock where a design names nothing uncertain: lognormal draws of
 sliding and static torque about its own values."""
 
-FAR = 8.0
-"""Standard deviations beyond which a limit cuts nothing off a normal distribution."""
+FAR = 8.0  # standard deviations beyond which a limit cuts nothing off a normal distribution
 
 
 @dataclass(frozen=True)
@@ -64,8 +63,8 @@ class Uncertain:
         if self.samples:
             number = np.ceil(probabilities * len(self.samples)).astype(int) - 1
             return np.asarray(self.samples)[np.maximum(number, 0)]
-        found: Array = np.asarray(self.law().ppf(probabilities), dtype=float)
-        return found
+        result: Array = np.asarray(self.law().ppf(probabilities), dtype=float)
+        return result
 
     def _normal(self, stats: Any) -> Any:
         deviation = self.cov * abs(self.mean)  # type: ignore[operator, arg-type]
@@ -156,9 +155,9 @@ def refuse_dependent(design: Design) -> None:
 
 def drawing(design: Design, seed: int) -> Callable[[int, int], Draws]:
     """A function of count and first that draws; what it draws from is read once."""
-    found = uncertain_parameters(design)
+    result = uncertain_parameters(design)
     table = design.tables.uncertainty
-    paths = tuple(p.path for p in found)
+    paths = tuple(p.path for p in result)
     root = correlation_root(table, paths)
     sampling = sampling_of(table, seed)
 
@@ -166,7 +165,7 @@ def drawing(design: Design, seed: int) -> Callable[[int, int], Draws]:
         points = sampling.points(paths, count, first)
         if root is not None:
             points = correlated(points, root)
-        return Draws(seed, first, found, {p.path: p.values(points[p.path]) for p in found})
+        return Draws(seed, first, result, {p.path: p.values(points[p.path]) for p in result})
 
     return drawn
 
@@ -186,15 +185,15 @@ def uncertain_parameters(design: Design) -> tuple[Uncertain, ...]:
         that does not exist; or nothing named and no default for the law of the rock.
     """
     tables = design.tables.uncertain or _defaults(design)
-    found = []
+    results = []
     for path, table in tables.items():
         where = f"{design.origin}: uncertain.{path}" if design.origin else f"uncertain.{path}"
         try:
-            found.append(_read(design, path, table))
+            results.append(_read(design, path, table))
         except InputError as error:
             key = error.where if error.where != path else ""
             raise InputError(error.problem, f"{where}.{key}" if key else where) from None
-    return tuple(found)
+    return tuple(results)
 
 
 def _defaults(design: Design) -> dict[str, DistributionTable]:
@@ -251,11 +250,11 @@ def _number(target: Parameter, key: str, written: object) -> float | None:
 
 
 def _sample(target: Parameter, written: object) -> float:
-    found = _number(target, "samples", written)
-    problem = target.refusal(found or 0.0)
+    result = _number(target, "samples", written)
+    problem = target.refusal(result or 0.0)
     if problem:
         raise InputError(f"{written}: {problem}", "samples")
-    return found or 0.0
+    return result or 0.0
 
 
 def _limits(

@@ -151,12 +151,9 @@ def probability_map(j1: Array, level: float, scatter: Scatter) -> ProbabilityMap
     return ProbabilityMap(level, by_replicate.sum(axis=0), by_replicate, len(j1))
 
 
-RESAMPLES = 2000
-"""Of the bootstrap of an area."""
-AT_A_TIME = 4_000_000
-"""Weights of realizations held at a time: bounds the memory."""
-NEVER = 1e-10
-"""Probability below which a cell is taken not to change side in a resample."""
+RESAMPLES = 2000  # of the bootstrap of an area
+AT_A_TIME = 4_000_000  # weights of realizations held at a time: bounds the memory
+NEVER = 1e-10  # probability below which a cell is taken not to change side in a resample
 
 
 class Area(NamedTuple):
@@ -179,15 +176,15 @@ def region_areas(
     else:
         intervals = [_jackknife(one, bound, scatter, confidence) for one, bound in asked]
     areas = []
-    for (one, bound), found in zip(asked, intervals, strict=True):
+    for (one, bound), result in zip(asked, intervals, strict=True):
         value = float(one.region(bound).mean())
-        areas.append(Area(value, _hull(value, found, _of_cells(one, bound, confidence))))
+        areas.append(Area(value, _hull(value, result, _of_cells(one, bound, confidence))))
     return areas
 
 
-def _of_cells(found: ProbabilityMap, probability: float, confidence: float) -> Interval:
+def _of_cells(result: ProbabilityMap, probability: float, confidence: float) -> Interval:
     """Shares of the cells whose own interval lies above a probability, and reaches it."""
-    low, high = found.interval_at(confidence)
+    low, high = result.interval_at(confidence)
     return float((low >= probability).mean()), float((high >= probability).mean())
 
 
@@ -241,16 +238,16 @@ def _may_change(counts: NDArray[np.int64], total: int, least: int) -> Mask:
 
 
 def _jackknife(
-    found: ProbabilityMap, probability: float, scatter: Scatter, confidence: float
+    result: ProbabilityMap, probability: float, scatter: Scatter, confidence: float
 ) -> Interval:
     """Interval by leaving out one replicate at a time, with Student's t."""
-    left = found.total - found.total // scatter.replicates
+    left = result.total - result.total // scatter.replicates
     least = needed(probability, left)
     without = np.array([
-        float((found.counts - own >= least).mean()) for own in found.by_replicate
+        float((result.counts - own >= least).mean()) for own in result.by_replicate
     ])  # fmt: skip
     replicates = scatter.replicates
     spread = (replicates - 1) / replicates * ((without - without.mean()) ** 2).sum()
     half = scatter.quantile(confidence) * float(np.sqrt(spread))
-    value = float(found.region(probability).mean())
+    value = float(result.region(probability).mean())
     return max(value - half, 0.0), min(value + half, 1.0)

@@ -36,10 +36,8 @@ from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 
 Array = NDArray[np.float64]
 
-LANES = 2**17
-"""Lanes of a block: some seconds' work at most."""
-MOST = 4096
-"""Realizations of a block at most."""
+LANES = 2**17  # lanes of a block: some seconds' work at most
+MOST = 4096  # realizations of a block at most
 
 Drawing = Callable[[int, int], dict[str, Array]]
 
@@ -116,8 +114,8 @@ class Realizations:
         values = self._drawn(count, first)
         runs = itertools.chain.from_iterable(part.runs(values) for part in self._parts)
         censor = math.inf if self.censor is None else self.censor
-        found = collect(runs, count * self.width, self.measures, censor)
-        return Block.of(first, self.width, found)
+        result = collect(runs, count * self.width, self.measures, censor)
+        return Block.of(first, self.width, result)
 
     @cached_property
     def _drawn(self) -> Drawing:
@@ -127,21 +125,21 @@ class Realizations:
     def _parts(self) -> list[_Part]:
         paths = tuple(self._drawn(1, 0))
         design = beyond_the_table(_rig(self.design), paths)
-        found = [_Part(group, paths) for group in groups(design, self.axes)]
+        results = [_Part(group, paths) for group in groups(design, self.axes)]
         for number, prepared in self.strings.items():
-            found[number].give(prepared)
-        return found
+            results[number].give(prepared)
+        return results
 
     def prepared(self, strings: Strings) -> Realizations:
         """The job with the strings of the design itself, and its kernels loaded."""
-        found = {}
+        results = {}
         for number, part in enumerate(self._parts):
             lanes = part.nominal_lanes
             ready = strings(number, partial(prepare, lanes, part.group.design.tables.simulation))
             load_kernel(lanes, ready)
             if not part.own_strings:
-                found[number] = ready
-        return replace(self, strings=found)
+                results[number] = ready
+        return replace(self, strings=results)
 
 
 STUDIES = ("map", "uncertain", "uncertainty", "compare", "weight_delay", "tune", "advantage")
@@ -224,14 +222,14 @@ class _Part:
         alike: dict[tuple[Any, ...], list[_Resolved]] = {}
         for row in range(len(next(iter(values.values())))):
             drawn = {path: units.SI(column[row]) for path, column in values.items()}
-            found = self._resolved(row, drawn)
-            if isinstance(found, list):
-                yield from (self._apart(one) for one in found)
+            result = self._resolved(row, drawn)
+            if isinstance(result, list):
+                yield from (self._apart(one) for one in result)
             elif self.own_strings:
-                lanes = lanes_of(found.design, self._columns([found], slice(None)))
-                yield self._run([found], lanes, prepare(lanes, _simulation(found.design)))
+                lanes = lanes_of(result.design, self._columns([result], slice(None)))
+                yield self._run([result], lanes, prepare(lanes, _simulation(result.design)))
             else:
-                alike.setdefault(kinds(found.design), []).append(found)
+                alike.setdefault(kinds(result.design), []).append(result)
         for group in alike.values():
             yield from self._by_string(group)
 
@@ -292,7 +290,7 @@ class _Part:
             like = self.group.design.replace(drawn)
             return [_CellByCell(row, like, numbers, np.arange(len(self.group.cells)))]
         shape = tuple(len(a) for a in axes)
-        found: dict[Hashable, tuple[Design, list[int], list[dict[str, float]]]] = {}
+        results: dict[Hashable, tuple[Design, list[int], list[dict[str, float]]]] = {}
         for place in range(len(self.group.cells)):
             where = np.unravel_index(place, shape)
             at = {a.path: units.SI(a.values[k]) for a, k in zip(axes, where, strict=True)}
@@ -301,7 +299,7 @@ class _Part:
                 lane = lane_numbers(design)
             except InputError:
                 continue
-            _, places, rows = found.setdefault(kinds(design), (design, [], []))
+            _, places, rows = results.setdefault(kinds(design), (design, [], []))
             places.append(place)
             rows.append(lane)
         return [
@@ -309,13 +307,13 @@ class _Part:
                 row, design, {key: np.array([lane[key] for lane in rows]) for key in rows[0]},
                 np.array(places),
             )
-            for design, places, rows in found.values()
+            for design, places, rows in results.values()
         ]  # fmt: skip
 
-    def _apart(self, found: _CellByCell) -> Run:
-        lanes = lanes_of(found.design, found.numbers)
-        ready = prepare(lanes, _simulation(found.design))
-        return Run(lanes, ready, found.row * self._width + self.group.cells[found.places])
+    def _apart(self, result: _CellByCell) -> Run:
+        lanes = lanes_of(result.design, result.numbers)
+        ready = prepare(lanes, _simulation(result.design))
+        return Run(lanes, ready, result.row * self._width + self.group.cells[result.places])
 
     @property
     def _width(self) -> int:

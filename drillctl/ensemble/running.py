@@ -122,8 +122,7 @@ class Block:
 Make = Callable[[], Prepared]
 Strings = Callable[[int, Make], Prepared]
 """Gives the string of a number as it was first made, that a resumed run has the same bits."""
-Pieces = list[tuple[int, int]]
-"""First row and number of rows of blocks."""
+Pieces = list[tuple[int, int]]  # first row and number of rows of blocks
 
 
 class Job(Protocol):
@@ -154,12 +153,12 @@ class Job(Protocol):
 
 def pieces(done: NDArray[np.bool_], size: int) -> Pieces:
     """Rows that are not done, cut at multiples of the size of a block."""
-    found = []
+    results = []
     for begin in range(0, len(done), size):
         lacking = np.flatnonzero(~done[begin : begin + size])
         if lacking.size:  # from the first that is lacking on: those behind it lack with it
-            found.append((begin + int(lacking[0]), int(lacking[-1] - lacking[0] + 1)))
-    return found
+            results.append((begin + int(lacking[0]), int(lacking[-1] - lacking[0] + 1)))
+    return results
 
 
 class Blocks(Protocol):

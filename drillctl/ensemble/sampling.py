@@ -22,12 +22,9 @@ from drillctl.errors import InputError
 
 Array = NDArray[np.float64]
 
-_PER_COUNTER = 4
-"""Numbers that Philox makes of one state of its counter."""
-_BITS = 30
-"""Of a Sobol point; of more, SciPy does not skip any."""
-_EDGE = 2.0**-53
-"""Nearest to 0 and to 1 that a number comes, where quantiles are infinite."""
+_PER_COUNTER = 4  # numbers that Philox makes of one state of its counter
+_BITS = 30  # of a Sobol point; of more, SciPy does not skip any
+_EDGE = 2.0**-53  # nearest to 0 and to 1 that a number comes, where quantiles are infinite
 
 
 @dataclass(frozen=True)
@@ -138,11 +135,11 @@ def correlated(points: Mapping[str, Array], root: Array) -> dict[str, Array]:
     from scipy.special import ndtr, ndtri
 
     scores = [ndtri(column) for column in points.values()]
-    found = {}
+    results = {}
     for path, weights in zip(points, root, strict=True):
         # Term by term: a matrix product would round by the number of rows.
         total = np.zeros_like(scores[0])
         for weight, score in zip(weights, scores, strict=True):
             total += weight * score
-        found[path] = np.clip(ndtr(total), _EDGE, 1.0 - _EDGE)
-    return found
+        results[path] = np.clip(ndtr(total), _EDGE, 1.0 - _EDGE)
+    return results

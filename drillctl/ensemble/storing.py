@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NOT_RUN = -1
-"""Status of a lane that was not run yet."""
+NOT_RUN = -1  # status of a lane that was not run yet
 FILES = {"realizations": "data.zarr", "sensitivity": "sensitivity.zarr"}
 """Where the realizations of a study are, in the folder of its run."""
 
@@ -110,9 +109,9 @@ class MemoryBlocks:
 
 
 def _longer(values: NDArray[Any], rows: int) -> NDArray[Any]:
-    found = np.empty((rows, values.shape[1]), dtype=values.dtype)
-    found[: len(values)] = values
-    return found
+    result = np.empty((rows, values.shape[1]), dtype=values.dtype)
+    result[: len(values)] = values
+    return result
 
 
 class FileBlocks(MemoryBlocks):

@@ -172,17 +172,17 @@ def sweep(
     progress.begin("loading kernels", 1)
     cells = math.prod(shape_of(axes))
     times = run(job.prepared(blocks.prepared), cells, blocks, workers, progress)
-    found, status = blocks.read(cells)
-    found, status = {name: job.over_grid(v) for name, v in found.items()}, job.over_grid(status)
+    result, status = blocks.read(cells)
+    result, status = {name: job.over_grid(v) for name, v in result.items()}, job.over_grid(status)
     count = table.audit_cells if audit_cells is None else audit_cells
     step, modes = next(iter(blocks.schemes)) if len(blocks.schemes) == 1 else (None, None)
     return Sweep(
         design=design,
         axes=axes,
         levels=table.levels,
-        measures=found,
+        measures=result,
         status=status,
-        audit=auditing.audit(design, axes, found["j1"], table.levels, count, progress),
+        audit=auditing.audit(design, axes, result["j1"], table.levels, count, progress),
         step=step,
         modes=modes,
         seconds=times.lanes,
@@ -242,10 +242,10 @@ class Cells:
 
     def pieces(self, done: NDArray[np.bool_]) -> Pieces:
         """Blocks of the cells that are not done; none reaches over two groups."""
-        found = []
+        results = []
         for begin, end in itertools.pairwise([*self._begins.tolist(), len(done)]):
-            found += [(begin + at, n) for at, n in pieces(done[begin:end], CHUNK)]
-        return found
+            results += [(begin + at, n) for at, n in pieces(done[begin:end], CHUNK)]
+        return results
 
     def prepared(self, strings: Strings) -> Cells:
         """The job that takes its strings from elsewhere, with the kernel of the first loaded."""

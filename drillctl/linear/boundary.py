@@ -38,12 +38,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FINEST = 1.0 / 800.0
-"""Longest piece of a curve, over the window."""
+FINEST = 1.0 / 800.0  # longest piece of a curve, over the window
 CLOSE = 1e-3
 """Faces whose slope margin is as near to the slope as this are asked again, to all digits."""
-HALVINGS = 60
-"""Most halvings of an interval of frequency."""
+HALVINGS = 60  # most halvings of an interval of frequency
 
 Window = tuple[tuple[float, float], tuple[float, float]]
 WINDOW: Window = ((0.0, 1000.0), (0.0, 500.0))
@@ -286,7 +284,7 @@ def root_locus(design: Design, path: str, values: ArrayLike, count: int = 12) ->
     InputError
         Unknown path, a value that is impossible or has no operating point, no values.
     """
-    found = parameter(design, path)
+    result = parameter(design, path)
     points = np.atleast_1d(np.asarray(values, dtype=float))
     if points.ndim != 1 or points.size == 0:
         raise InputError("needs a list of one value or more", path)
@@ -296,7 +294,7 @@ def root_locus(design: Design, path: str, values: ArrayLike, count: int = 12) ->
     table[0, : len(rows[0])] = rows[0]
     for i in range(1, len(rows)):
         table[i] = _followed(table[i - 1], rows[i], width)
-    return RootLocus(design, path, found.si_unit, points, table[:, : min(count, width)])
+    return RootLocus(design, path, result.si_unit, points, table[:, : min(count, width)])
 
 
 def _lowest(design: Design, count: int) -> ComplexArray:

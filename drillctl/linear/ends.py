@@ -34,10 +34,8 @@ from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeigh
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-WAVE_MODES = 40
-"""Modes of a continuum that are looked at; it has no end of them."""
-BETWEEN = 24
-"""Frequencies between two neighbouring natural frequencies."""
+WAVE_MODES = 40  # modes of a continuum that are looked at; it has no end of them
+BETWEEN = 24  # frequencies between two neighbouring natural frequencies
 
 
 class Ends(Protocol):

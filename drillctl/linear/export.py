@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-WIDTH = 0.05
-"""Speed (rad/s) over which the regularised friction changes sign."""
+WIDTH = 0.05  # speed (rad/s) over which the regularised friction changes sign
 
 
 def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearIOSystem:

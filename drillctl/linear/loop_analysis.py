@@ -25,8 +25,7 @@ from drillctl.store.result import Result
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-ROUNDING = 1e-11
-"""Real part of a pole over the largest pole that is rounding."""
+ROUNDING = 1e-11  # real part of a pole over the largest pole that is rounding
 SPEEDS = np.geomspace(1e-3, 20.0, 401)
 """Speeds at which a critical one is looked for, over the set speed."""
 WEIGHTS = np.geomspace(1e-3, 20.0, 201)
@@ -87,7 +86,7 @@ class LoopAnalysis(Result):
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI; None where something is undefined."""
-        found = self.margins
+        result = self.margins
         return {
             "stable": self.stable,
             "spectral_abscissa": self.spectral_abscissa,
@@ -95,13 +94,13 @@ class LoopAnalysis(Result):
             "slope_margin": _finite(self.slope_margin),
             "deciding_frequency_hz": _finite(self.deciding_frequency_hz),
             "disk_margin": None
-            if found is None
-            else {"gain_db": _finite(found.gain_db), "phase_deg": found.phase_deg},
-            "peak_sensitivity": None if found is None else found.peak_sensitivity,
-            "delay_margin": None if found is None else _finite(found.delay),
+            if result is None
+            else {"gain_db": _finite(result.gain_db), "phase_deg": result.phase_deg},
+            "peak_sensitivity": None if result is None else result.peak_sensitivity,
+            "delay_margin": None if result is None else _finite(result.delay),
             "margins": None
-            if found is None
-            else {name: _finite(value) for name, value in asdict(found).items()},
+            if result is None
+            else {name: _finite(value) for name, value in asdict(result).items()},
             "continuum_slope_margin": self.continuum_slope_margin,
             "weight_delay_margin": _finite(self.weight_delay_margin),
             "critical_speed": self.critical_speed,
@@ -204,11 +203,11 @@ def tolerated_slope(design: Design, speed: float) -> tuple[float, float]:
     poles = model_poles(design, bit)
     if poles.real.max() >= ROUNDING * np.abs(poles).max():
         return math.nan, math.nan
-    found = whole_crossings(ends, design.top_drive, bit)
-    over = np.flatnonzero(found.slope > 0.0)
+    result = whole_crossings(ends, design.top_drive, bit)
+    over = np.flatnonzero(result.slope > 0.0)
     if len(over) == 0:
         return math.inf, math.nan
-    return float(found.slope[over[0]]), float(found.omega[over[0]])
+    return float(result.slope[over[0]]), float(result.omega[over[0]])
 
 
 def _delay_margin(design: Design, point: OperatingPoint) -> float | None:

@@ -41,12 +41,9 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 CLUSTER = np.geomspace(0.03, 1e7, 90)
 """Distances from a pole at which a response is looked at, over that of the pole from the axis."""
-COARSE = np.geomspace(0.1, 1e6, 29)
-"""The same where many loops are looked at."""
-SLOWEST = 1e-3
-"""Lowest frequency looked at, over the magnitude of the smallest pole."""
-NEAREST = 1e-13
-"""Least distance from the axis that a pole is taken to have, over its frequency."""
+COARSE = np.geomspace(0.1, 1e6, 29)  # the same where many loops are looked at
+SLOWEST = 1e-3  # lowest frequency looked at, over the magnitude of the smallest pole
+NEAREST = 1e-13  # least distance from the axis that a pole is taken to have, over its frequency
 
 
 @dataclass(frozen=True)
@@ -176,13 +173,13 @@ def _largest(function: Callable[[Array], Array], grid: Array) -> tuple[float, fl
     top = top[values[top] > 0.5 * values[best]]
     if len(top) == 0:
         return float(values[best]), float(grid[best])
-    found = elementwise.find_minimum(
+    result = elementwise.find_minimum(
         lambda w: -function(w), (grid[top - 1], grid[top], grid[top + 1])
     )
-    peak = int(np.argmin(found.f_x))
-    if -found.f_x[peak] < values[best]:
+    peak = int(np.argmin(result.f_x))
+    if -result.f_x[peak] < values[best]:
         return float(values[best]), float(grid[best])
-    return float(-found.f_x[peak]), float(found.x[peak])
+    return float(-result.f_x[peak]), float(result.x[peak])
 
 
 def peak_sensitivities(
@@ -202,8 +199,8 @@ def peak_sensitivities(
         grid = np.unique(np.concatenate([between, _around(poles[i], COARSE, between)]))
         best = 1 + int(np.argmin(small(grid, kp[i], ki[i], slope[i])[1:-1]))
         bracket[:, i] = grid[best - 1 : best + 2]
-    found = elementwise.find_minimum(small, tuple(bracket), args=(kp, ki, slope))
-    level = np.fmin(found.f_x, small(bracket[1], kp, ki, slope))
+    result = elementwise.find_minimum(small, tuple(bracket), args=(kp, ki, slope))
+    level = np.fmin(result.f_x, small(bracket[1], kp, ki, slope))
     # Far above all modes L vanishes and S tends to 1.
     return np.asarray(np.maximum(-level, 1.0))
 
@@ -224,8 +221,7 @@ def _delay_margin(loop: _Loop, grid: Array) -> tuple[float, float | None]:
     return float(turn[first]), float(omega[first])
 
 
-TURNS = 16
-"""Frequencies per turn of a delay's phase."""
+TURNS = 16  # frequencies per turn of a delay's phase
 REAL = 1e-6
 """Imaginary part over magnitude at which an impedance counts as real; more is a pole of it."""
 
@@ -239,9 +235,9 @@ def whole_crossings(ends: Ends, drive: TopDriveLaw, bit: BitSide) -> Crossings:
 
     grid = _grid(ends, bit)
     omega = _zeros(lambda w: impedance(w).imag, grid)
-    found = impedance(omega)
-    real = np.abs(found.imag) <= REAL * np.maximum(np.abs(found), 1.0)
-    slope, omega = found.real[real], omega[real]
+    result = impedance(omega)
+    real = np.abs(result.imag) <= REAL * np.maximum(np.abs(result), 1.0)
+    slope, omega = result.real[real], omega[real]
     _, ki = drive.gains()
     if ki == 0.0:  # a real pole, at rest of everything
         slope = np.append(slope, impedance(grid[:1]).real)

@@ -37,10 +37,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-PADE = 6
-"""Order of the rational function that stands for the delay of a weight path."""
-HELD_PADE = 3
-"""The same for the mean delay of a sampled controller, which is short."""
+PADE = 6  # order of the rational function that stands for the delay of a weight path
+HELD_PADE = 3  # the same for the mean delay of a sampled controller, which is short
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,8 +249,7 @@ def model_poles(design: Design, bit: BitSide) -> ComplexArray:
     return np.asarray(poles[np.argsort(np.abs(poles), kind="stable")])
 
 
-STACK = 2**22
-"""Entries of the matrices that are solved together, 32 MB of them."""
+STACK = 2**22  # entries of the matrices that are solved together, 32 MB of them
 
 
 def with_slope(matrices: StateMatrices, slope: float) -> StateMatrices:

@@ -25,10 +25,8 @@ from drillctl.store.result import Result
 
 Array = NDArray[np.float64]
 
-COUNT = 10
-"""Modes of each list unless others are requested."""
-RIGID_TWIST = 1e-12
-"""Twist of an element taken as rounding, over the largest angle of the string."""
+COUNT = 10  # modes of each list unless others are requested
+RIGID_TWIST = 1e-12  # twist of an element taken as rounding, over the largest angle of the string
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +94,9 @@ class Modes(Result):
         """Frequencies and damping ratios, NaN where there is none."""
         made: dict[str, Any] = {}
         for support in ("free_free", "fixed_top"):
-            dim, found = f"{support}_mode", getattr(self, support)
-            ratios = [math.nan if m.damping_ratio is None else m.damping_ratio for m in found]
-            hertz = [m.frequency_hz for m in found]
+            dim, result = f"{support}_mode", getattr(self, support)
+            ratios = [math.nan if m.damping_ratio is None else m.damping_ratio for m in result]
+            hertz = [m.frequency_hz for m in result]
             made[f"{support}_frequency"] = (dim, hertz, {"units": "Hz"})
             made[f"{support}_damping_ratio"] = (dim, ratios, {"units": "1"})
         return made
@@ -184,8 +182,7 @@ def _entry(mode: Mode) -> dict[str, Any]:
 
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-CHUNK = 256
-"""Frequencies solved at a time where the modes are coupled."""
+CHUNK = 256  # frequencies solved at a time where the modes are coupled
 
 
 class Expansion:
@@ -256,17 +253,17 @@ class Expansion:
             column = flat[:, None]
             each = column / (column**2 + column * np.diagonal(damping)[1:] + frequency[1:] ** 2)
             elastic = np.einsum("am,fm,bm->fab", seen[:, 1:], each, driven[:, 1:], optimize=True)
-            found = elastic + rigid[:, None, None] * np.outer(seen[:, 0], driven[:, 0])
+            result = elastic + rigid[:, None, None] * np.outer(seen[:, 0], driven[:, 0])
             t, b = driven[:, 0]
             ends = elastic[:, [0, 2]]
             mixed = t * t * ends[:, 1, 1] + b * b * ends[:, 0, 0] - 2.0 * t * b * ends[:, 1, 0]
             determinant = rigid * mixed + np.linalg.det(ends)
         else:
-            found = np.concatenate(
+            result = np.concatenate(
                 [self._solved(flat[i : i + CHUNK]) for i in range(0, len(flat), CHUNK)]
             )
-            determinant = np.linalg.det(found[:, [0, 2]])
-        return np.asarray(found).reshape(*s.shape, 3, 2), np.reshape(determinant, s.shape)
+            determinant = np.linalg.det(result[:, [0, 2]])
+        return np.asarray(result).reshape(*s.shape, 3, 2), np.reshape(determinant, s.shape)
 
     def _solved(self, s: ComplexArray) -> ComplexArray:
         frequency, shapes = self.string.undamped_modes

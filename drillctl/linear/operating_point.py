@@ -17,10 +17,8 @@ from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
 
 Array = NDArray[np.float64]
 
-FASTEST = 1e4
-"""Highest speed that is looked at (rad/s)."""
-SCAN = 4000
-"""Speeds at which the balance is looked at before its zeros are located."""
+FASTEST = 1e4  # highest speed that is looked at (rad/s)
+SCAN = 4000  # speeds at which the balance is looked at before its zeros are located
 
 
 @dataclass(frozen=True)
@@ -56,14 +54,14 @@ def operating_point(design: Design) -> OperatingPoint:
     InputError
         There is none: the drive cannot turn the bit, or nothing limits its speed.
     """
-    found = equilibria(design)
-    if not found:
+    result = equilibria(design)
+    if not result:
         raise InputError(
             "no speed at which the torque of the drive equals that of rock and drag", "controller"
         )
     if not any(design.top_drive.gains()):  # no set speed to be near to
-        return found[-1]
-    return min(found, key=lambda point: abs(point.speed - design.speed))
+        return result[-1]
+    return min(result, key=lambda point: abs(point.speed - design.speed))
 
 
 def equilibria(design: Design) -> tuple[OperatingPoint, ...]:
@@ -98,7 +96,7 @@ def _folds(design: Design, speeds: Array, surplus: Array) -> list[tuple[float, f
     """Brackets of pairs of steady states so close that no two of the speeds part them."""
     from scipy.optimize import minimize_scalar
 
-    found = []
+    results = []
     low, middle, high = surplus[:-2], surplus[1:-1], surplus[2:]
     for sign in (1.0, -1.0):
         near = (sign * middle < 0.0) & (sign * middle > sign * low) & (sign * middle >= sign * high)
@@ -111,8 +109,8 @@ def _folds(design: Design, speeds: Array, surplus: Array) -> list[tuple[float, f
             top = minimize_scalar(depth, bounds=(begin, end), method="bounded",
                                   options={"xatol": 1e-12 * end})  # fmt: skip
             if top.fun < 0.0:
-                found += [(begin, float(top.x)), (float(top.x), end)]
-    return found
+                results += [(begin, float(top.x)), (float(top.x), end)]
+    return results
 
 
 def at_speed(design: Design, speed: float) -> OperatingPoint:

@@ -37,8 +37,8 @@ def free_free_poles(string: Drillstring) -> list[Pole]:
     rigid = Pole(0.0, shapes[:, 0].astype(complex))
     braked = bool(string.ground_damping.any())
     kept = slice(0 if braked else 1, None)
-    found = _poles(frequency[kept], damping[kept, kept], shapes[:, kept])
-    return [rigid, *sorted(found, key=_size)]
+    result = _poles(frequency[kept], damping[kept, kept], shapes[:, kept])
+    return [rigid, *sorted(result, key=_size)]
 
 
 def fixed_top_poles(string: Drillstring) -> list[Pole]:

@@ -28,8 +28,7 @@ from drillctl.linear.ends import Ends, telling_grid
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-CHUNK = 256
-"""Gain pairs looked at together: their signs on the grid fit the second-level cache."""
+CHUNK = 256  # gain pairs looked at together: their signs on the grid fit the second-level cache
 CANDIDATES = 5
 """Crossings of a gain pair that are refined in a map: those that look lowest on the grid, and
 the one of lowest frequency."""
@@ -73,10 +72,10 @@ def slope_margin(ends: Ends, kp: float, ki: float) -> tuple[float, float]:
 
     A loop that tolerates any slope has an infinite D*, at no frequency (NaN).
     """
-    found = crossings(ends, kp, ki)
-    if len(found.slope) == 0:
+    result = crossings(ends, kp, ki)
+    if len(result.slope) == 0:
         return math.inf, math.nan
-    return float(found.slope[0]), float(found.omega[0])
+    return float(result.slope[0]), float(result.omega[0])
 
 
 def slope_margins(
@@ -109,13 +108,13 @@ def slope_margins(
         part = gains[first : first + CHUNK]
         pair, place = search.brackets(part)
         pair, place = search.lowest(part, pair, place)
-        found = search.refined(place, part[pair])
-        level = np.maximum(search.impedance(found, part[pair, 0], part[pair, 1]).real, 0.0)
+        result = search.refined(place, part[pair])
+        level = np.maximum(search.impedance(result, part[pair, 0], part[pair, 1]).real, 0.0)
         level[(part[pair, 0] == 0.0) & (not search.lossy)] = ends.parts.bit_damping
         # The last write wins: written from the highest to the lowest.
-        order = np.lexsort([-found, -level])
+        order = np.lexsort([-result, -level])
         slope[first + pair[order]] = level[order]
-        omega[first + pair[order]] = found[order]
+        omega[first + pair[order]] = result[order]
     at_rest = np.where(gains[:, 1] == 0.0, gains[:, 0] + search.rigid, np.inf)
     real = at_rest < slope
     slope, omega = np.where(real, at_rest, slope), np.where(real, 0.0, omega)
@@ -222,10 +221,10 @@ class _Search:
             return np.asarray(self.impedance(omega, kp, ki).imag)
 
         drive = (gains[:, 0], gains[:, 1])
-        found = elementwise.find_root(reactance, (low, high), args=drive)
+        result = elementwise.find_root(reactance, (low, high), args=drive)
         # A crossing within rounding of a grid point may not be bracketed: it is that point.
         nearer_low = np.abs(reactance(low, *drive)) < np.abs(reactance(high, *drive))
-        return np.where(found.success, found.x, np.where(nearer_low, low, high))
+        return np.where(result.success, result.x, np.where(nearer_low, low, high))
 
 
 def _features(gains: Array) -> Array:

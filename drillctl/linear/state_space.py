@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-INPUTS = ("top_torque", "bit_torque")
-"""Inputs of the plant (N m); positive bit torque brakes."""
+INPUTS = ("top_torque", "bit_torque")  # inputs of the plant (N m); positive bit torque brakes
 OUTPUTS = ("top_speed", "bit_speed", "pipe_torque", "twist")
 """Outputs of the plant (rad/s, rad/s, N m, rad)."""
 LOOP_OUTPUTS = (*OUTPUTS, "top_torque")

@@ -44,19 +44,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-UNBEATEN = "unbeaten in both"
-"""Legend of the cases that no other beats."""
+UNBEATEN = "unbeaten in both"  # legend of the cases that no other beats
 NO_DRAWS = "Each case at its own values, without draws."
-WIDEST = 110
-"""Longest line of a caption (characters)."""
+WIDEST = 110  # longest line of a caption (characters)
 LEVEL_COLOUR = "#888888"
 """Of the levels of J1: in the background, yet legible."""
 OUTLINES = (3.2, 1.7)
 """Outline of the first and the last case (points): under a later one an equal one is seen."""
-TRACES = (2.0, 1.1)
-"""Line of the first and the last case, likewise."""
-FILL = 0.10
-"""How much of its colour fills a region: enough to tell inside from outside."""
+TRACES = (2.0, 1.1)  # line of the first and the last case, likewise
+FILL = 0.10  # how much of its colour fills a region: enough to tell inside from outside
 
 
 def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
@@ -377,10 +373,10 @@ def _axes(result: Comparison) -> tuple[Axis, ...]:
 def _outline(
     ax: Axes, case: ComparedCase, level: float, number: int, width: float, scales: Array
 ) -> None:
-    found = case.region(level)
-    share = "no map" if found is None else f"{found.area_fraction:.1%} of the cells"
+    result = case.region(level)
+    share = "no map" if result is None else f"{result.area_fraction:.1%} of the cells"
     colour = _colour(number)
-    parts = [] if found is None or found.polygons is None else found.polygons.geoms
+    parts = [] if result is None or result.polygons is None else result.polygons.geoms
     rings = [ring * scales for polygon in parts for ring in _rings(polygon)]
     # An empty region has its entry in the legend too.
     path = Path.make_compound_path(*map(Path, rings)) if rings else Path(np.empty((0, 2)))

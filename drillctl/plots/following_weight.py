@@ -37,16 +37,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-WIDEST = 110
-"""Longest line of a caption (characters)."""
-BAND = 0.18
-"""How much of its colour fills an interval."""
-MARKS = "osD^vP"
-"""Of gains and policies, with the colours."""
+WIDEST = 110  # longest line of a caption (characters)
+BAND = 0.18  # how much of its colour fills an interval
+MARKS = "osD^vP"  # of gains and policies, with the colours
 APART = 0.006
 """Shares of gains are set apart by this much of the axis, lest their bars hide each other."""
-HARM = 0.6
-"""Harm that is shown, over the objective of the constant weight."""
+HARM = 0.6  # harm that is shown, over the objective of the constant weight
 
 
 def weight_delay(
@@ -367,12 +363,12 @@ def advantage_cases(result: Advantage, ax: Axes | None = None) -> Figure:
     return figure
 
 
-def _vanishes(found: Crossing, level: float) -> str:
+def _vanishes(result: Crossing, level: float) -> str:
     what = "none" if level == 0.0 else f"under {level:.2g} s"
-    if found.at is None:
+    if result.at is None:
         return f"never {what} up to the longest delay"
-    low, high = ("beyond" if end is None else f"{end:.2f}" for end in found.interval)
-    return f"{what} from {found.at:.2f} s ({low} to {high})"
+    low, high = ("beyond" if end is None else f"{end:.2f}" for end in result.interval)
+    return f"{what} from {result.at:.2f} s ({low} to {high})"
 
 
 def _draws(result: Advantage, more: str = "") -> str:

@@ -15,10 +15,8 @@ from drillctl.plots import style
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.units import RPM, SI
 
-BACKWARD = -20.0
-"""Slowest speed drawn (rpm): enough to show that the torque changes sign."""
-FORWARD = 250.0
-"""Highest speed drawn (rpm), unless the rig is set to turn faster."""
+BACKWARD = -20.0  # slowest speed drawn (rpm): enough to show that the torque changes sign
+FORWARD = 250.0  # highest speed drawn (rpm), unless the rig is set to turn faster
 WEIGHT = "operating_point.weight_on_bit"
 
 Array = NDArray[np.float64]

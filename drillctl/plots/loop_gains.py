@@ -241,8 +241,7 @@ def shown_gains(kp: Any, ki: Any, system: units.System) -> tuple[Any, Any]:
 
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-LINE_APART = 0.035
-"""Least distance between two lines of text, over the height of the window."""
+LINE_APART = 0.035  # least distance between two lines of text, over the height of the window
 TELLING = 0.02
 """A track is looked at if it goes this far from the imaginary axis, over the farthest."""
 
@@ -345,14 +344,14 @@ def _crossings(ax: Axes, tracks: ComplexArray, values: Array, top: float) -> Non
 
 def _crossed(tracks: ComplexArray, values: Array) -> list[tuple[float, float]]:
     """Frequency (Hz) and value of the parameter of each crossing, linear between values."""
-    found: dict[str, tuple[float, float]] = {}  # two tracks that part later cross as one
+    results: dict[str, tuple[float, float]] = {}  # two tracks that part later cross as one
     for track in tracks.T:
         for i in np.flatnonzero(track.real[:-1] * track.real[1:] < 0.0):
             share = track.real[i] / (track.real[i] - track.real[i + 1])
             omega = track.imag[i] + share * (track.imag[i + 1] - track.imag[i])
             value = values[i] + share * (values[i + 1] - values[i])
-            found[f"{omega:.6g} {value:.6g}"] = (float(omega) / (2.0 * np.pi), float(value))
-    return list(found.values())
+            results[f"{omega:.6g} {value:.6g}"] = (float(omega) / (2.0 * np.pi), float(value))
+    return list(results.values())
 
 
 def _window(tracks: ComplexArray) -> tuple[float, float, float]:

@@ -44,16 +44,11 @@ SHADE = "#F3C9A5"
 """Disk of the disk margin: what L may not enter."""
 WINDOW = (-2.6, 0.8, 1.7)
 """Lowest and highest real part, and highest imaginary part, of the Nyquist picture."""
-LEVELS_DB = (-30.0, 30.0)
-"""Magnitudes of L (dB) within the Nichols picture."""
-PEAKS = (1.4, 2.0, 4.0)
-"""Magnitudes of the sensitivity drawn as curves on the Nichols picture."""
-APART = 0.2
-"""Least distance in the plane of L between two frequencies that are written beside it."""
-LOW = 10.0
-"""The curve is heavy up to this many times the frequency at which it is nearest to -1."""
-SHOWN_HZ = (0.01, 5.0)
-"""Frequencies (Hz) within the picture of the sensitivities."""
+LEVELS_DB = (-30.0, 30.0)  # magnitudes of L (dB) within the Nichols picture
+PEAKS = (1.4, 2.0, 4.0)  # magnitudes of the sensitivity drawn as curves on the Nichols picture
+APART = 0.2  # least distance in the plane of L between two frequencies that are written beside it
+LOW = 10.0  # the curve is heavy up to this many times the frequency at which it is nearest to -1
+SHOWN_HZ = (0.01, 5.0)  # frequencies (Hz) within the picture of the sensitivities
 
 
 def nyquist(

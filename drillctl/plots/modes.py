@@ -28,8 +28,7 @@ from drillctl.linear.modal import Mode, Modes
 from drillctl.linear.response import FrequencyResponse
 from drillctl.plots import style
 
-SHOWN = 4
-"""Modes drawn of each boundary condition: more cannot be told apart."""
+SHOWN = 4  # modes drawn of each boundary condition: more cannot be told apart
 
 
 def mode_shapes(
@@ -105,8 +104,7 @@ def _name(mode: Mode) -> str:
     return f"{mode.frequency_hz:.4g} Hz{damping}"
 
 
-PER_TORQUE = 1e3 / units.RPM
-"""Revolutions a minute per kN m in one rad/s per N m."""
+PER_TORQUE = 1e3 / units.RPM  # revolutions a minute per kN m in one rad/s per N m
 UNIT = "rpm/(kN m)"
 ENDS = (("bit", "bit_torque", "bit_speed"), ("top", "top_torque", "top_speed"))
 """Name, input and output of each end."""
@@ -175,8 +173,7 @@ def _draw_mobility(
     )
 
 
-TARGETS = ("top_speed", "bit_speed")
-"""Outputs that are drawn unless others are named."""
+TARGETS = ("top_speed", "bit_speed")  # outputs that are drawn unless others are named
 WIDTHS = (2.8, 1.6, 1.1, 0.8)
 """Widths (points) of one response after another, so that equal ones show through."""
 

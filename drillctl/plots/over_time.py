@@ -89,8 +89,8 @@ def _title(run: Simulation, paths: Sequence[str]) -> str:
 
 def _named(run: Simulation, path: str) -> str:
     """A parameter of the run's design by its usual name, in the units people read."""
-    found = parameter(run.design, path)
-    value, unit = units.displayed(found.value, found.si_unit)
+    result = parameter(run.design, path)
+    value, unit = units.displayed(result.value, result.si_unit)
     return f"{NAMES.get(path, path.rpartition('.')[2])} {value:g} {unit}".rstrip()
 
 

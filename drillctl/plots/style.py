@@ -41,14 +41,10 @@ COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", "--", "-.", ":")
 """Line styles that go with the colours, so that grey print can be read too."""
 
-TITLE = 11.0
-"""Size of titles (points)."""
-LABEL = 10.0
-"""Size of axis labels (points)."""
-SMALL = 9.0
-"""Size of tick labels and legends (points)."""
-LINE = 1.6
-"""Width of a curve (points)."""
+TITLE = 11.0  # size of titles (points)
+LABEL = 10.0  # size of axis labels (points)
+SMALL = 9.0  # size of tick labels and legends (points)
+LINE = 1.6  # width of a curve (points)
 GRID = "#DDDDDD"
 """Colour of grid and zero lines."""
 

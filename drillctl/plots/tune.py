@@ -34,10 +34,8 @@ if TYPE_CHECKING:
     from drillctl.studies.tune.certificate import FreshRuns
     from drillctl.studies.tune.compute import Tune
 
-ROW = 0.42
-"""Height of a row (inches)."""
-WIDEST = 120
-"""Longest line of a caption (characters)."""
+ROW = 0.42  # height of a row (inches)
+WIDEST = 120  # longest line of a caption (characters)
 
 
 def tune_baselines(result: Tune, ax: Sequence[Axes] | None = None) -> Figure:
@@ -85,19 +83,18 @@ def tune_baselines(result: Tune, ax: Sequence[Axes] | None = None) -> Figure:
 
 def _spread(ax: Axes, place: int, runs: FreshRuns, colour: str) -> None:
     """Quantiles of J1 on a row, those that are finite."""
-    found = {name: value for name, value in runs.quantiles.items() if np.isfinite(value)}
+    results = {name: value for name, value in runs.quantiles.items() if np.isfinite(value)}
     for low, high, width in (("q05", "q95", 1.6), ("q25", "q75", 7.0)):
-        if low in found and high in found:
+        if low in results and high in results:
             ax.plot(
-                [found[low], found[high]], [place, place], "-", color=colour, linewidth=width,
+                [results[low], results[high]], [place, place], "-", color=colour, linewidth=width,
                 solid_capstyle="butt", alpha=0.55 if width > 2.0 else 1.0,
             )  # fmt: skip
-    if "q50" in found:
-        ax.plot(found["q50"], place, "o", color=colour, markeredgecolor="white", markersize=6.5)
+    if "q50" in results:
+        ax.plot(results["q50"], place, "o", color=colour, markeredgecolor="white", markersize=6.5)
 
 
-WIDEST_NEIGHBOURHOOD = 105
-"""Longest line of a caption (characters)."""
+WIDEST_NEIGHBOURHOOD = 105  # longest line of a caption (characters)
 
 
 def tune_neighbourhood(result: Tune, ax: Axes | None = None, system: units.System = "si") -> Figure:

@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from drillctl.studies import Uncertainty
 
 
-BEST = ("mean", "q95")
-"""Objectives whose best cells are shown unless others are chosen."""
+BEST = ("mean", "q95")  # objectives whose best cells are shown unless others are chosen
 
 
 def area_convergence(result: Uncertainty, ax: Axes | None = None) -> Figure:
@@ -131,15 +130,15 @@ def cell_distributions(
 
 def _named(result: Uncertainty) -> dict[int, str]:
     """Cells worth a look, with what they are best by."""
-    found: dict[int, list[str]] = {}
+    results: dict[int, list[str]] = {}
     if not np.isnan(result.nominal).all():
-        found.setdefault(int(np.nanargmin(result.nominal)), []).append("J1 without draws")
+        results.setdefault(int(np.nanargmin(result.nominal)), []).append("J1 without draws")
     for name in BEST:
         try:
-            found.setdefault(result.best(name).cell, []).append(name)
+            results.setdefault(result.best(name).cell, []).append(name)
         except InputError:  # not known without --full
             continue
-    return {cell: f"best by {', '.join(names)}" for cell, names in found.items()}
+    return {cell: f"best by {', '.join(names)}" for cell, names in results.items()}
 
 
 def _shown(result: Uncertainty, cell: int, path: str, system: units.System) -> str:
@@ -209,8 +208,7 @@ def _short(of: str) -> str:
 
 SHADES = {OUTER: "#D6E6F2", MEDIAN: "#8FBFE0", INNER: BLUE}
 """Colour of the region of each probability."""
-FEW = 20
-"""Realizations up to which the outline of every one is drawn."""
+FEW = 20  # realizations up to which the outline of every one is drawn
 
 
 def uncertain_regions(

@@ -27,12 +27,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 FILE = "cells.json"
-MOST = 200
-"""Most cells with stored time responses."""
-SAMPLES = 300
-"""Intervals of a time response."""
-PART = 10
-"""Speeds are stored in units of 1 / PART rpm."""
+MOST = 200  # most cells with stored time responses
+SAMPLES = 300  # intervals of a time response
+PART = 10  # speeds are stored in units of 1 / PART rpm
 
 
 def traced(design: Design, run: Run) -> dict[str, Any]:

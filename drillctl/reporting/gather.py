@@ -46,8 +46,8 @@ class Study:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """Its `summary.json`."""
-        found: dict[str, Any] = read_json(self.folder / "summary.json")
-        return found
+        result: dict[str, Any] = read_json(self.folder / "summary.json")
+        return result
 
     @cached_property
     def result(self) -> Any:
@@ -114,20 +114,22 @@ def gather(
     """Read or run the studies of a report."""
     cut = profile.applied(design)
     names = _with_needs(wanted)
-    found: dict[str, Study] = {}
+    results: dict[str, Study] = {}
     interrupted = False
     for study, recipe in RECIPES.values():
         place = folder / recipe.name
         if recipe.name not in names:
             why = "it was not requested"
-            found[recipe.name] = Study(recipe.name, recipe.title, "not_requested", why, place)
+            results[recipe.name] = Study(recipe.name, recipe.title, "not_requested", why, place)
         elif interrupted and not _finished(place):
-            found[recipe.name] = Study(recipe.name, recipe.title, "interrupted", INTERRUPTED, place)
+            results[recipe.name] = Study(
+                recipe.name, recipe.title, "interrupted", INTERRUPTED, place
+            )
         else:
-            requested = Requested(cut, profile, found)
-            found[recipe.name] = _study(study, recipe, requested, place, progress)
-            interrupted |= found[recipe.name].state == "interrupted"
-    return Gathered(cut, design, profile, words, found)
+            requested = Requested(cut, profile, results)
+            results[recipe.name] = _study(study, recipe, requested, place, progress)
+            interrupted |= results[recipe.name].state == "interrupted"
+    return Gathered(cut, design, profile, words, results)
 
 
 def _with_needs(wanted: Iterable[str]) -> set[str]:

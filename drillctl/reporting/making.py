@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from drillctl import units
     from drillctl.reporting.blocks import Document
 
-NAMES = {"html": "report.html", "pdf": "report.pdf", "md": "report.md"}
-"""Files by format."""
+NAMES = {"html": "report.html", "pdf": "report.pdf", "md": "report.md"}  # files by format
 
 
 def write(

@@ -35,8 +35,7 @@ _UNIT = re.compile(
 )
 _NUMBER = re.compile(r"^[−-]?[\d.]+( × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?( [%°]| s| Hz| ms)?$|^–$|^∞$")
 
-SHORT = 26
-"""Longest text (characters) of a cell kept on one line."""
+SHORT = 26  # longest text (characters) of a cell kept on one line
 
 
 def html_page(document: Document, files: FigureFiles) -> str:
@@ -93,10 +92,8 @@ BROWSERS = (
     "microsoft-edge",
 )  # fmt: skip
 """Browsers that print, in order of preference."""
-CHOICE = "DRILLCTL_BROWSER"
-"""Environment variable that names another command."""
-PATIENCE = 120.0
-"""Longest time for printing (s)."""
+CHOICE = "DRILLCTL_BROWSER"  # environment variable that names another command
+PATIENCE = 120.0  # longest time for printing (s)
 OPTIONS = (
     "--headless", "--disable-gpu", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--disable-extensions", "--disable-quic",
@@ -109,7 +106,7 @@ def browser() -> str | None:
     chosen = os.environ.get(CHOICE)
     if chosen is not None:
         return shutil.which(chosen)
-    return next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    return next((result for name in BROWSERS if (result := shutil.which(name))), None)
 
 
 def printed(html_page: Path, target: Path) -> Path:

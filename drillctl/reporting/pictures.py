@@ -16,8 +16,7 @@ from drillctl.store.json_files import read_json, write_json, write_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
-DPI = 110
-"""Of PNG files, and of bitmaps within an SVG."""
+DPI = 110  # of PNG files, and of bitmaps within an SVG
 MOST_SHAPES = 500
 """Most shapes of one kind in an SVG; more are rasterised, as they make it slow and large."""
 INDEX = "index.json"
@@ -128,7 +127,7 @@ def _blank() -> Drawn:
 def _small(svg: str) -> str:
     """Remove metadata, and round curves to a hundredth of a point."""
     svg = _METADATA.sub("", svg)
-    return _PATHS.sub(lambda found: _DIGITS.sub(r"\1", found[0]), svg)
+    return _PATHS.sub(lambda result: _DIGITS.sub(r"\1", result[0]), svg)
 
 
 # Colours of `plots.style` on light and on dark background.

@@ -84,8 +84,7 @@ FULL = Profile(
     drawn_audit=None, sensitivity=True, compared=True, tuned=True,
 )  # fmt: skip
 
-PROFILES = {profile.name: profile for profile in (QUICK, STANDARD, FULL)}
-"""Profiles by name."""
+PROFILES = {profile.name: profile for profile in (QUICK, STANDARD, FULL)}  # profiles by name
 
 
 def _recipes() -> dict[str, tuple[Study, Recipe]]:

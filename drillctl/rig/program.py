@@ -44,8 +44,7 @@ class Ramp(NamedTuple):
         return float(total)
 
 
-STILL = Ramp(0.0, 0.0, 0.0)
-"""A value that does not move."""
+STILL = Ramp(0.0, 0.0, 0.0)  # A value that does not move
 
 
 class Program(NamedTuple):
@@ -79,5 +78,4 @@ class Program(NamedTuple):
         return sorted(float(t) for t in times if 0.0 < t < math.inf)
 
 
-NONE = Program(STILL, STILL, 0.0)
-"""Nothing changes by the clock."""
+NONE = Program(STILL, STILL, 0.0)  # nothing changes by the clock

@@ -18,8 +18,7 @@ from drillctl.units import Kind
 Check = Callable[[float, object], None]
 """Refuses a number (SI) out of its range, telling what was written."""
 
-LARGEST_COUNT = 10**9
-"""Of anything that is counted: what is larger is a slip of the pen."""
+LARGEST_COUNT = 10**9  # of anything that is counted: what is larger is a slip of the pen
 
 
 def _any(si: float, written: object) -> None:
@@ -85,8 +84,7 @@ def _count(check: Check) -> BeforeValidator:
 
 SHORTEST_LAG = 1e-4
 """Shortest time constant (s) but for none: less would cost the solvers much and change nothing."""
-SHORTEST_PERIOD = 1e-3
-"""Shortest sampling period (s) but for none."""
+SHORTEST_PERIOD = 1e-3  # shortest sampling period (s) but for none
 
 
 def _none_or_lag(si: float, written: object) -> None:

@@ -93,8 +93,8 @@ def _turns(lanes: Lanes) -> Array:
     moments = [np.where(program.rock_until > 0.0, program.rock_until, 0.0)]
     for ramp in (program.speed, program.weight):
         moments += [np.where(ramp.first != 0.0, time, 0.0) for time in (ramp.begin, ramp.end)]
-    found = np.unique(np.concatenate(moments))
-    return found[found > 0.0]
+    result = np.unique(np.concatenate(moments))
+    return result[result > 0.0]
 
 
 def run_batch(lanes: Lanes, prepared: Prepared, give_up: float = math.inf) -> Batch:

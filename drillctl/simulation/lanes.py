@@ -60,8 +60,7 @@ def start(
     return Start(compliance, -static_torque, compliance / compliance[-1], -set_speed)
 
 
-SPEEDS = 161
-"""Speeds at which a slope is looked for, from rest to eight times the set speed."""
+SPEEDS = 161  # speeds at which a slope is looked for, from rest to eight times the set speed
 
 
 @dataclass(frozen=True, eq=False)

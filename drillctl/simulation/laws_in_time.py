@@ -140,12 +140,9 @@ class _Sampled:
         return sample(self.law, memory, top.speed, lead, top.speed + self.set_speed)
 
 
-Past = Callable[[Any], Array]
-"""Times (s) to the signal that stood for the bit speed then (rad/s)."""
-READ_EVERY = 0.01
-"""Interval (s) at which the extremes of a window are looked for."""
-LATE = 1e-9
-"""How much after its time (s) a stop is taken to be at it."""
+Past = Callable[[Any], Array]  # times (s) to the signal that stood for the bit speed then (rad/s)
+READ_EVERY = 0.01  # interval (s) at which the extremes of a window are looked for
+LATE = 1e-9  # how much after its time (s) a stop is taken to be at it
 
 
 class Moment(NamedTuple):
@@ -239,8 +236,7 @@ class _AtOnce:
 class _Hoisted:
     """What all laws with a memory share. The last two numbers: the reading held, the weight."""
 
-    first = 1
-    """Numbers of memory of the signal itself."""
+    first = 1  # numbers of memory of the signal itself
 
     def __init__(self, law: Any, program: Ramp) -> None:
         self.own, self.program = law, program

@@ -6,14 +6,11 @@ import math
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, NamedTuple
 
-WINDOW = 20.0
-"""Length of the window at the end of a run in which sticking and SSI are judged (s)."""
+WINDOW = 20.0  # length of the window at the end of a run in which sticking and SSI are judged (s)
 SETTLED_FOR = 5.0
 """A run has settled when it stays in the band for at least this long at its end (s)."""
-WIDE_BAND = 0.05
-"""Settling bands as a share of the set speed: 5 % decides the status ..."""
-NARROW_BAND = 0.02
-"""... and 2 % gives `settling_time`."""
+WIDE_BAND = 0.05  # settling bands as a share of the set speed: 5 % decides the status
+NARROW_BAND = 0.02  # ... and 2 % gives `settling_time`.
 
 STATUSES = ("ok", "sticking", "stalled", "not_settled", "censored", "failed")
 """What a run can end as.

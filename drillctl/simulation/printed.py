@@ -28,10 +28,8 @@ Array = NDArray[np.float64]
 
 CREEPING, PUSHED, FORWARD_EDGE, BACKWARD_EDGE = 2, 3, 4, 5
 """Phases of a bit within the tolerance, beside +1 and -1 of one that turns."""
-EDGES = {FORWARD_EDGE: 1, BACKWARD_EDGE: -1}
-"""Side of the tolerance of each edge."""
-EDGE_OF = {side: edge for edge, side in EDGES.items()}
-"""Edge of each side."""
+EDGES = {FORWARD_EDGE: 1, BACKWARD_EDGE: -1}  # side of the tolerance of each edge
+EDGE_OF = {side: edge for edge, side in EDGES.items()}  # edge of each side
 WITHIN_STEP = 2e-3
 """Longest step (s) within the tolerance: a bit passes through it in some milliseconds."""
 AHEAD = 1e-6

@@ -35,8 +35,7 @@ from drillctl.simulation.lanes import Start
 
 Array = NDArray[np.float64]
 
-WEAKEST_TOP = 1e-6
-"""Smallest share of the largest amplitude at the top that a mode can be told by."""
+WEAKEST_TOP = 1e-6  # smallest share of the largest amplitude at the top that a mode can be told by
 LARGEST_TURN = 2.5
 """Turn in a step (rad) up to which the two coordinates tell angle and speed of a mode apart."""
 
@@ -172,13 +171,13 @@ def _stepped(
     """The simplest form that is fit: its kind, its fields, and its states per modal state."""
     if string.undamped:
         top, below, bit = shapes[0], shapes[1], shapes[-1]
-        found = undamped_step(frequency, top, bit, below, string.element_stiffness[0], step)
-        if found is not None:
-            return UndampedString, *found
+        result = undamped_step(frequency, top, bit, below, string.element_stiffness[0], step)
+        if result is not None:
+            return UndampedString, *result
     modal = _modal(string, frequency, shapes)
-    found = _blocks(modal, step)
-    if found is not None:
-        return BlockString, *found
+    result = _blocks(modal, step)
+    if result is not None:
+        return BlockString, *result
     return DenseString, *_dense(modal, step)
 
 
@@ -228,10 +227,10 @@ def _held(a: Array, b: Array, step: float) -> tuple[Array, Array]:
 
 def _blocks(modal: _Modal, step: float) -> tuple[dict[str, Any], Array] | None:
     """Fields of a `BlockString` and the matrix from modal to block states; None if unfit."""
-    found = _block_basis(modal)
-    if found is None:
+    result = _block_basis(modal)
+    if result is None:
         return None
-    basis, inverse = found
+    basis, inverse = result
     count = len(basis) // 2
     pairs = range(count)
     a = inverse @ modal.a @ basis

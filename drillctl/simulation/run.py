@@ -20,13 +20,10 @@ from drillctl.store.result import Result
 
 Array = NDArray[np.float64]
 
-FINE = 0.01
-"""Interval (s) on which what is not located is measured, whatever the signals' own."""
-FEWEST_SAMPLES = 500
-"""Fewest intervals in a run for that; it is finer in a short run."""
+FINE = 0.01  # interval (s) on which what is not located is measured, whatever the signals' own
+FEWEST_SAMPLES = 500  # fewest intervals in a run for that; it is finer in a short run
 
-MOST_EVENTS = 200
-"""Events of a kind that a summary lists; the data hold all."""
+MOST_EVENTS = 200  # events of a kind that a summary lists; the data hold all
 
 SIGNALS = {
     "top_speed": ("rad/s", "speed of the top drive"),
@@ -178,10 +175,10 @@ def _one_by_one(
     motion: Motion, time: Array, state: Array, phase: Array
 ) -> tuple[Array, Array, Array]:
     """Top torque, weight and bit torque of a rig with memory, program or phases of its own."""
-    found = np.empty((3, len(time)))
+    result = np.empty((3, len(time)))
     for i, moment in enumerate(time):
-        found[:, i] = motion.system.told(moment, state[:, i], int(phase[i]))
-    return found[0], found[1], found[2]
+        result[:, i] = motion.system.told(moment, state[:, i], int(phase[i]))
+    return result[0], result[1], result[2]
 
 
 def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measures:

@@ -15,8 +15,7 @@ from drillctl.rig.drillstring import Drillstring
 Array = NDArray[np.float64]
 
 NO_TURNS: Array = np.empty(0)
-WHOLE = 1e-7
-"""How far from a whole number of steps a moment may be that falls on the end of one."""
+WHOLE = 1e-7  # how far from a whole number of steps a moment may be that falls on the end of one
 STEEPEST = 0.5
 """Largest product of bit mobility over a step and falling slope: beyond it the inclusion at
 the bit could have more than one root."""

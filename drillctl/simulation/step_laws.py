@@ -17,8 +17,7 @@ from drillctl.simulation.lanes import Start
 Array = NDArray[np.float64]
 
 
-INSTANT = 700.0
-"""Exponent of a hoist without lag: nothing is left."""
+INSTANT = 700.0  # exponent of a hoist without lag: nothing is left
 
 
 def kept(lag: Array, step: float | Array) -> Array:

@@ -23,10 +23,8 @@ Method = Literal["DOP853", "RK45", "Radau", "BDF"]
 """Integrators of SciPy; not LSODA, whose dense output does not meet its own steps closely
 enough to locate events on."""
 
-LONGEST_STEP = 0.05
-"""Longest step (s): a touch of zero speed shorter than that could go unseen."""
-WORKS = 3
-"""Integrals of power that every state carries: work of the drive, of the bit, of damping."""
+LONGEST_STEP = 0.05  # longest step (s): a touch of zero speed shorter than that could go unseen
+WORKS = 3  # integrals of power that every state carries: work of the drive, of the bit, of damping
 
 
 class Forces(NamedTuple):

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 
 TREE = "result.json"
 DATA = "data.zarr"
-MARK = "$"
-"""Key of a JSON object that encodes a type missing in JSON."""
+MARK = "$"  # key of a JSON object that encodes a type missing in JSON
 _PLAIN = Label()
 
 
@@ -92,16 +91,18 @@ class _Encoder:
     def _parts(self, value: Any, name: str, label: Label, owner: Any) -> list[Any]:
         if not label.over:
             return [self.tree(v, _joined(name, k), label, owner) for k, v in enumerate(value)]
-        found = []
+        results = []
         for one in value:
             apart = _Encoder()
-            found.append((apart, apart.tree(one, name, label, owner)))
-        return self._stacked(found, label.over, [getattr(one, "name", None) for one in value])
+            results.append((apart, apart.tree(one, name, label, owner)))
+        return self._stacked(results, label.over, [getattr(one, "name", None) for one in value])
 
-    def _stacked(self, found: list[tuple[_Encoder, Any]], over: str, names: list[Any]) -> list[Any]:
+    def _stacked(
+        self, result: list[tuple[_Encoder, Any]], over: str, names: list[Any]
+    ) -> list[Any]:
         """Stack equal shapes in one variable along a new dimension; keep others separate."""
-        for key in dict.fromkeys(key for apart, _ in found for key in apart.variables):
-            held = [apart.variables.get(key) for apart, _ in found]
+        for key in dict.fromkeys(key for apart, _ in result for key in apart.variables):
+            held = [apart.variables.get(key) for apart, _ in result]
             first = next(one for one in held if one is not None)
             if key in first.dims:  # a coordinate, shared or one per object
                 continue
@@ -121,7 +122,7 @@ class _Encoder:
                     self.variables[f"{key}.{k}"] = _Variable(dims, one.values, one.attributes)
         if names and all(isinstance(name, str) for name in names):
             self.variables[over] = _Variable((over,), np.array(names, dtype=object), {})
-        return [self._placed(tree, apart, k) for k, (apart, tree) in enumerate(found)]
+        return [self._placed(tree, apart, k) for k, (apart, tree) in enumerate(result)]
 
     def _placed(self, tree: Any, apart: _Encoder, k: int) -> Any:
         """The tree of one stacked object, with the new places of its arrays."""
@@ -170,8 +171,8 @@ class _Owner:
     above: Any
 
     def get(self, name: str) -> Any:
-        found = getattr(self.value, name, None)
-        return found if found is not None or self.above is None else self.above.get(name)
+        result = getattr(self.value, name, None)
+        return result if result is not None or self.above is None else self.above.get(name)
 
 
 class _Attributes(dict[str, Any]):
@@ -337,7 +338,7 @@ def _class(path: str) -> Any:
     module, _, name = path.partition(":")
     if not module.startswith("drillctl."):
         raise ValueError(f"{path} is not a class of drillctl")
-    found = getattr(import_module(module), name)
-    if not (dataclasses.is_dataclass(found) or issubclass(found, tuple)):
+    result = getattr(import_module(module), name)
+    if not (dataclasses.is_dataclass(result) or issubclass(result, tuple)):
         raise ValueError(f"{path} is neither a dataclass nor a named tuple")
-    return found
+    return result

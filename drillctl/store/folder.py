@@ -22,10 +22,8 @@ from drillctl.errors import InputError, shown
 from drillctl.provenance import provenance
 from drillctl.store.json_files import read_json, write_json, write_text
 
-MOST = 3
-"""Largest number of keys in a message."""
-LONGEST = 57
-"""Longest list printed in full (characters)."""
+MOST = 3  # largest number of keys in a message
+LONGEST = 57  # longest list printed in full (characters)
 
 
 def difference(path: Path, design: Design, grown: tuple[str, ...] = ()) -> str:
@@ -58,18 +56,18 @@ def _value(leaves: dict[str, Any], key: str) -> str:
 
 def _leaves(tree: Any, prefix: str = "") -> dict[str, Any]:
     """Values by dotted path; those of named tables in a list by their names."""
-    found: dict[str, Any] = {}
+    results: dict[str, Any] = {}
     for key, value in tree.items():
         path = f"{prefix}{key}"
         if isinstance(value, dict):
-            found |= _leaves(value, f"{path}.")
+            results |= _leaves(value, f"{path}.")
         elif isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
             for number, item in enumerate(value, start=1):
                 name = item.get("name") or item.get("path") or number
-                found |= _leaves(item, f"{path}.{name}.")
+                results |= _leaves(item, f"{path}.{name}.")
         else:
-            found[path] = value
-    return found
+            results[path] = value
+    return results
 
 
 @dataclass(frozen=True)
@@ -112,8 +110,7 @@ def refuse_other_machine(held: dict[str, str], where: str, allow_mixed: bool) ->
         )
 
 
-RUNS = Path("runs")
-"""Parent folder of runs without --out."""
+RUNS = Path("runs")  # parent folder of runs without --out
 
 
 def identity(verb: str, design: Design, **settings: Any) -> str:
@@ -145,8 +142,8 @@ class RunFolder:
 
     def summary(self) -> dict[str, Any]:
         """The summary of a finished run."""
-        found: dict[str, Any] = read_json(self.path / "summary.json")
-        return found
+        result: dict[str, Any] = read_json(self.path / "summary.json")
+        return result
 
     def finish(self, summary: dict[str, Any]) -> None:
         """Write the summary, mark the run finished and drop its blocks."""

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 class Result:
     """Base class of results: frozen dataclasses with a design and labelled arrays."""
 
-    kind: ClassVar[str]
-    """Name of the study that computes it, which is its command."""
+    kind: ClassVar[str]  # name of the study that computes it, which is its command
 
     def __init_subclass__(cls) -> None:
         """Document the fields of a result from their labels, for `help` and the reference."""

@@ -20,10 +20,8 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.store.json_files import write_text
 
-NOTHING = "–"
-"""Shown in place of a missing number."""
-GAIN_OF_WEIGHT = "N*s/rad"
-"""Of a weight on bit per bit speed: read in the unit of the weight."""
+NOTHING = "–"  # shown in place of a missing number
+GAIN_OF_WEIGHT = "N*s/rad"  # of a weight on bit per bit speed: read in the unit of the weight
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -63,8 +61,7 @@ class Quantity(NamedTuple):
     unit: str
 
 
-Cell = Any
-"""Text, a number (SI), an `Estimate`, a `Quantity`, or None."""
+Cell = Any  # text, a number (SI), an `Estimate`, a `Quantity`, or None
 
 
 @dataclass(frozen=True)
@@ -180,8 +177,8 @@ def texts(values: NDArray[np.float64]) -> list[str]:
         different, at = np.unique(values, return_inverse=True)
         made = np.array([*map(repr, different.tolist())], dtype=object)
         made[np.isnan(different)] = ""
-        found: list[str] = made[at.ravel()].tolist()
-        return found
+        result: list[str] = made[at.ravel()].tolist()
+        return result
     return ["" if v != v else repr(v) for v in values.ravel().tolist()]
 
 

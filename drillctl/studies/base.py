@@ -98,8 +98,8 @@ class Requested:
 
     def summary(self, name: str) -> dict[str, Any]:
         """Summary of a study before it."""
-        found: dict[str, Any] = self.done[name].summary
-        return found
+        result: dict[str, Any] = self.done[name].summary
+        return result
 
 
 def _applies(request: Requested) -> str:
@@ -213,5 +213,5 @@ class Study:
 @cache
 def studies() -> dict[str, Study]:
     """Every registered study by name, in the order of the registry."""
-    found = [import_module(module).STUDY for module in registry.STUDIES]
-    return {study.name: study for study in found}
+    results = [import_module(module).STUDY for module in registry.STUDIES]
+    return {study.name: study for study in results}

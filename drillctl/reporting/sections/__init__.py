@@ -81,5 +81,4 @@ def _sections() -> dict[str, Kind]:
     return {kind.name: kind for _, kind in sorted(placed, key=lambda pair: pair[0])}
 
 
-SECTIONS = _sections()
-"""Sections by name."""
+SECTIONS = _sections()  # sections by name

@@ -11,8 +11,7 @@ from drillctl.reporting.blocks import Block, Check, Checks, Code, Figure, Table
 from drillctl.reporting.gather import Gathered
 from drillctl.reporting.words import NOTHING, number, percent
 
-BALANCED = 1e-6
-"""Largest relative residual of a balanced run."""
+BALANCED = 1e-6  # largest relative residual of a balanced run
 
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
@@ -53,15 +52,15 @@ def _checks(gathered: Gathered) -> list[Check]:
             checks.append(Check(question, audit["verdict"] == "ok", text))
     doctor = gathered.have("doctor")
     if doctor is not None and doctor.summary["refused"] is None:
-        found = doctor.summary
-        text = f"median {number(found['estimate']['median'], 2)}, "
-        text += f"99th percentile {number(found['estimate']['p99'], 2)} over "
-        text += f"{found['estimate']['lanes']} cells"
-        if found["advice"]:
-            text += f"; better: {found['advice']}"
+        result = doctor.summary
+        text = f"median {number(result['estimate']['median'], 2)}, "
+        text += f"99th percentile {number(result['estimate']['p99'], 2)} over "
+        text += f"{result['estimate']['lanes']} cells"
+        if result["advice"]:
+            text += f"; better: {result['advice']}"
         accuracy = gathered.design.tables.simulation.accuracy
         question = f"Is the accuracy {accuracy!r} reached?"
-        checks.append(Check(question, found["verdict"] in ("ok", "check"), text))
+        checks.append(Check(question, result["verdict"] in ("ok", "check"), text))
     return checks
 
 
@@ -101,11 +100,11 @@ def _convergence(gathered: Gathered) -> Table | None:
     return Table("convergence-of-this-run", caption, heads, tuple(rows))
 
 
-def _row(text: str, found: dict[str, Any], base: dict[str, Any]) -> tuple[str, ...]:
-    j1, own = found["measures"]["j1"], base["measures"]["j1"]
-    apart = NOTHING if not own or j1 is None or found is base else percent(j1 / own - 1.0, 2)
-    step = NOTHING if found["step"] is None else number(1e3 * found["step"])
-    modes = NOTHING if found["modes"] is None else str(found["modes"])
+def _row(text: str, result: dict[str, Any], base: dict[str, Any]) -> tuple[str, ...]:
+    j1, own = result["measures"]["j1"], base["measures"]["j1"]
+    apart = NOTHING if not own or j1 is None or result is base else percent(j1 / own - 1.0, 2)
+    step = NOTHING if result["step"] is None else number(1e3 * result["step"])
+    modes = NOTHING if result["modes"] is None else str(result["modes"])
     return text, step, modes, number(j1, 7), apart
 
 
@@ -113,13 +112,13 @@ def _engine(gathered: Gathered) -> Table | None:
     study = gathered.have("doctor")
     if study is None or study.summary["scheme"] is None:
         return None
-    found = study.summary
+    result = study.summary
     rows = [
-        ("step", f"{number(1e3 * found['scheme']['step'])} ms"),
-        ("modes", str(found["scheme"]["modes"])),
-        ("median of the estimated errors", number(found["estimate"]["median"], 2)),
-        ("99th percentile", number(found["estimate"]["p99"], 2)),
-        ("observed order", number(found["estimate"]["order"], 2)),
+        ("step", f"{number(1e3 * result['scheme']['step'])} ms"),
+        ("modes", str(result["scheme"]["modes"])),
+        ("median of the estimated errors", number(result["estimate"]["median"], 2)),
+        ("99th percentile", number(result["estimate"]["p99"], 2)),
+        ("observed order", number(result["estimate"]["order"], 2)),
     ]
     return Table("engine", "The batch engine over the map (errors of J1, relative)",
                  ("quantity", "value"), tuple(rows))  # fmt: skip

@@ -19,12 +19,9 @@ from drillctl.reporting.gather import Gathered
 from drillctl.reporting.words import NOTHING, Words, number
 from drillctl.rig.drillstring import PIPES
 
-LUMPED = 0.12
-"""Height of a lumped spring as a share of the drawing."""
-WIDEST = 0.16
-"""Half the width of the widest section, as a share of the drawing's width."""
-LEAST = 0.055
-"""Smallest share of the height for a section, so that its name fits."""
+LUMPED = 0.12  # height of a lumped spring as a share of the drawing
+WIDEST = 0.16  # half the width of the widest section, as a share of the drawing's width
+LEAST = 0.055  # smallest share of the height for a section, so that its name fits
 
 
 class _Part(NamedTuple):

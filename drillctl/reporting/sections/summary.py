@@ -48,13 +48,13 @@ def _stable(gathered: Gathered) -> Check | None:
     study = gathered.have("loop")
     if study is None:
         return None
-    found, words = study.summary, gathered.words
-    margin = found["slope_margin"]
-    tolerated = "any slope" if margin is None and found["stable"] else words.quantity(
+    result, words = study.summary, gathered.words
+    margin = result["slope_margin"]
+    tolerated = "any slope" if margin is None and result["stable"] else words.quantity(
         margin, "N*m*s/rad"
     )  # fmt: skip
-    detail = f"falling slope {words.quantity(found['slope'], 'N*m*s/rad')}, tolerated {tolerated}"
-    return Check("Is steady drilling stable to small disturbances?", bool(found["stable"]), detail)
+    detail = f"falling slope {words.quantity(result['slope'], 'N*m*s/rad')}, tolerated {tolerated}"
+    return Check("Is steady drilling stable to small disturbances?", bool(result["stable"]), detail)
 
 
 def _keeps_level(gathered: Gathered) -> Check | None:
@@ -77,12 +77,12 @@ def _probable(gathered: Gathered) -> Check | None:
     study = gathered.have("setting")
     if study is None:
         return None
-    found = study.summary
+    result = study.summary
     required = gathered.design.tables.tune.probability
-    low, high = found["interval_95"]
+    low, high = result["interval_95"]
     answer = True if low >= required else False if high < required else None
-    question = f"Is P(J1 ≤ {number(found['level'])} s) at least {percent(required)}?"
-    detail = f"{chance(found['probability'], (low, high))}, {found['realizations']} draws"
+    question = f"Is P(J1 ≤ {number(result['level'])} s) at least {percent(required)}?"
+    detail = f"{chance(result['probability'], (low, high))}, {result['realizations']} draws"
     return Check(question, answer, detail)
 
 
@@ -111,11 +111,11 @@ def summary(found: Verdict) -> dict[str, Any]:
 
 def build(gathered: Gathered) -> tuple[Block, ...]:
     """Verdict, best settings and regions, as far as available."""
-    found = verdict(gathered)
-    blocks: list[Block] = [Text(_sentence(gathered, found.word), _kind(found.word))]
-    if found.checks:
+    result = verdict(gathered)
+    blocks: list[Block] = [Text(_sentence(gathered, result.word), _kind(result.word))]
+    if result.checks:
         caption = "Checks of the current setting: all must be yes to pass"
-        blocks.append(Checks("verdict", caption, found.checks))
+        blocks.append(Checks("verdict", caption, result.checks))
     if best := _best(gathered):
         blocks.append(best)
     if regions := regions_table(gathered):
@@ -177,9 +177,9 @@ def _best(gathered: Gathered) -> Table | None:
                 rows.append(_best_of_draws(gathered, name, best))
     study = gathered.have("tune")
     if study is not None and study.summary.get("gains"):
-        found = study.summary
-        place = gathered.words.place(gathered.design, found["gains"])
-        rows.append(("tuned", place, f"{number(found.get('value'))} s", NOTHING))
+        result = study.summary
+        place = gathered.words.place(gathered.design, result["gains"])
+        rows.append(("tuned", place, f"{number(result.get('value'))} s", NOTHING))
     if not rows:
         return None
     heads = ("best by", "at", "value", "95 % interval")

@@ -11,8 +11,7 @@ from drillctl import registry
 from drillctl.errors import InputError
 from drillctl.rig.table import Table, law_name
 
-Exp = Callable[[Any], Any]
-"""An exponential: `math.exp`, a compiled one, or `casadi.exp`."""
+Exp = Callable[[Any], Any]  # an exponential: `math.exp`, a compiled one, or `casadi.exp`
 
 
 class BitRockLaw(Protocol):

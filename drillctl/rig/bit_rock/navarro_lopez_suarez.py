@@ -17,10 +17,8 @@ from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, refuse_rising
 from drillctl.rig.bit_rock.stribeck import COEFFICIENTS, Stribeck
 from drillctl.rig.table import Table
 
-KNOTS = 7
-"""Most rows at which a piecewise linear function of the weight changes its slope."""
-MOST_ROWS = KNOTS + 1
-"""Most rows of a friction table over the weight on bit."""
+KNOTS = 7  # most rows at which a piecewise linear function of the weight changes its slope
+MOST_ROWS = KNOTS + 1  # most rows of a friction table over the weight on bit
 
 
 class NavarroLopezSuarez(NamedTuple):

@@ -12,8 +12,7 @@ from drillctl.rig import table as q
 from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw
 from drillctl.rig.table import Table
 
-KNOTS = 12
-"""Most points after the first."""
+KNOTS = 12  # most points after the first
 
 
 class Tabulated(NamedTuple):

@@ -24,12 +24,9 @@ Model = Literal["finite-elements", "wave"]
 """How a section is described: by its elements, or as the continuum they stand for."""
 Counts = NDArray[np.int64]
 
-TINY = 1e-140
-"""In place of a zero that is divided by."""
-HELD = 1e250
-"""Stiffness of an end that stands still (N m/rad)."""
-BISECTIONS = 80
-"""Halvings of a bracket: the last bit of a double."""
+TINY = 1e-140  # in place of a zero that is divided by
+HELD = 1e250  # stiffness of an end that stands still (N m/rad)
+BISECTIONS = 80  # halvings of a bracket: the last bit of a double
 
 
 def natural_frequencies(

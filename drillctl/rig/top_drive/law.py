@@ -95,8 +95,7 @@ class StringNumbers(NamedTuple):
     drive_damper: Any  # of active damping by its own rule (N m s/rad)
 
 
-Ranges = Mapping[str, tuple[float, float]]
-"""Least and largest value (SI) by key."""
+Ranges = Mapping[str, tuple[float, float]]  # least and largest value (SI) by key
 
 
 @dataclass(frozen=True)

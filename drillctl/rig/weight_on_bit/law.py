@@ -12,8 +12,7 @@ from drillctl.errors import InputError
 from drillctl.rig import table as q
 from drillctl.rig.table import Table, law_name
 
-HEAVIEST = 1e12
-"""Weight on bit (N) where a law has no upper limit."""
+HEAVIEST = 1e12  # weight on bit (N) where a law has no upper limit
 SHORTEST_LAG = 0.1
 """Time constant (s) of a hoist whose rate is limited, where the design gives a shorter one."""
 

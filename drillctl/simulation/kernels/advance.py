@@ -66,8 +66,7 @@ TRACED = (
 )  # fmt: skip
 """Signals of a trace, in the order in which they leave the kernel."""
 
-LOOK = 64
-"""Steps from one look at whether lanes may be given up to the next."""
+LOOK = 64  # steps from one look at whether lanes may be given up to the next
 
 
 class Clock(NamedTuple):
@@ -305,8 +304,7 @@ def _is_ours(law: Any) -> bool:
     return type(law).__module__.startswith("drillctl.") and all(_is_ours(part) for part in law)
 
 
-run_unkept = _compile(on_disk=False)
-"""`run`, compiled anew in every process."""
+run_unkept = _compile(on_disk=False)  # `run`, compiled anew in every process
 
 run = _compile(on_disk=True)
 """Advance lanes from time zero to the end: `run(begin, end, string, friction, before,

@@ -38,8 +38,7 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 inlined = numba.njit(forceinline=True, **OPTIONS)
 """Decorator for what is part of the step of a block."""
 
-compiled = numba.njit(**OPTIONS)
-"""Decorator for what is called once per block, or seldom."""
+compiled = numba.njit(**OPTIONS)  # decorator for what is called once per block, or seldom
 
 
 def by_type(function: Any) -> Any:
@@ -90,12 +89,12 @@ def gather(typing_context: Any, work: Any, places: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
         whole = builder.fptosi(arguments[1], WHOLE)
-        found = ir.Constant(ROW, ir.Undefined)
+        result = ir.Constant(ROW, ir.Undefined)
         for lane in range(WIDTH):
             index = ir.Constant(ir.IntType(32), lane)
             element = builder.load(builder.gep(data, [builder.extract_element(whole, index)]))
-            found = builder.insert_element(found, element, index)
-        return found
+            result = builder.insert_element(result, element, index)
+        return result
 
     return row(work, row), generate
 

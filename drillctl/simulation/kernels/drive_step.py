@@ -114,8 +114,7 @@ class SampledStep(NamedTuple):
     most_moved: Any
 
 
-SLOWEST = 1e-9
-"""Speed (rad/s) under which a limit of power no longer grows."""
+SLOWEST = 1e-9  # speed (rad/s) under which a limit of power no longer grows
 
 
 class Reduced(NamedTuple):

@@ -42,8 +42,7 @@ class Programs(NamedTuple):
     rock_until: Any  # time until which the rock is another one (s)
 
 
-ROUNDING = 1e-6
-"""Share of a step by which a moment that falls on its end may miss it."""
+ROUNDING = 1e-6  # share of a step by which a moment that falls on its end may miss it
 
 
 def begin_program(program: Any, before: Any, work: Any, first: int) -> None:

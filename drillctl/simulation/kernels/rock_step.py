@@ -21,10 +21,8 @@ from drillctl.simulation.kernels.lane_step import Outcome, stick_or_slip
 from drillctl.simulation.kernels.laws import contact
 from drillctl.simulation.kernels.weight_step import acting
 
-BISECTIONS = 60
-"""Most iterations of the safeguarded Newton method."""
-CLOSE = 1e-13
-"""It has converged when it moves less than this (rad/s, relative over 1 rad/s)."""
+BISECTIONS = 60  # most iterations of the safeguarded Newton method
+CLOSE = 1e-13  # it has converged when it moves less than this (rad/s, relative over 1 rad/s)
 
 
 def meet_rock(friction: Any, weight: Any, reduced: Any, work: Any) -> Any:

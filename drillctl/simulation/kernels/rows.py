@@ -129,5 +129,4 @@ BOUND = _next()  # J1 of a lane that was found over the level at which lanes are
 
 ROWS = _taken
 FIRST_MEASURE = J1
-MEASURES = ROWS - FIRST_MEASURE // WIDTH
-"""Number of measures of a lane."""
+MEASURES = ROWS - FIRST_MEASURE // WIDTH  # number of measures of a lane

@@ -40,15 +40,13 @@ from drillctl.linear.slope_margin import crossings
 
 Array = NDArray[np.float64]
 
-MODES = 3
-"""Lowest crossings that are looked at, unless asked for more."""
+MODES = 3  # lowest crossings that are looked at, unless asked for more
 NODES = 64
 """Gauss-Legendre nodes on each side of the change of sign: enough for friction that decays by
 e^50 within the amplitude."""
 AMPLITUDES = np.concatenate([np.linspace(0.01, 1.0, 100), np.geomspace(1.0, 40.0, 80)[1:]])
 """Amplitudes over the mean speed at which the balance is looked at before it is solved."""
-MEANS = 80
-"""Mean speeds that are looked at where the drive does not fix the mean."""
+MEANS = 80  # mean speeds that are looked at where the drive does not fix the mean
 
 
 @dataclass(frozen=True)
@@ -169,12 +167,12 @@ def harmonic_cycles(design: Design, modes: int = MODES) -> tuple[HarmonicCycle, 
 def rising_crossings(design: Design) -> tuple[tuple[float, float], ...]:
     """Crossings at which the reactance of the bit rises, by rising frequency."""
     ends = ends_of(design.string)
-    found = crossings(ends, *design.top_drive.gains())
-    order = np.argsort(found.omega)
+    result = crossings(ends, *design.top_drive.gains())
+    order = np.argsort(result.omega)
     return tuple(
-        (float(found.omega[i]), float(found.slope[i]))
+        (float(result.omega[i]), float(result.slope[i]))
         for i in order
-        if found.omega[i] > 0.0 and _reactance_rises(design, ends, float(found.omega[i]))
+        if result.omega[i] > 0.0 and _reactance_rises(design, ends, float(result.omega[i]))
     )
 
 
@@ -198,13 +196,13 @@ class _FixedMean:
     def cycles(self, level: float) -> list[tuple[float, float, bool]]:
         """Mean, amplitude and stability of the cycles at a slope of `level`."""
         above = self.slopes > level
-        found = []
+        results = []
         for i in np.flatnonzero(above[1:] != above[:-1]):
             amplitude = brentq(
                 lambda a: float(self.slope(a)) - level, *self.grid[i : i + 2], xtol=1e-13
             )
-            found.append((self.design.speed, float(amplitude), bool(above[i])))
-        return found
+            results.append((self.design.speed, float(amplitude), bool(above[i])))
+        return results
 
 
 class _FreeMean:
@@ -234,7 +232,7 @@ class _FreeMean:
             surplus, slope = self.both(x[0], x[0] * x[1])
             return np.array([surplus, slope - level])
 
-        found: list[tuple[float, float, bool]] = []
+        results: list[tuple[float, float, bool]] = []
         cells = _changes(self.surpluses) & _changes(self.slopes - level)
         for i, j in zip(*np.nonzero(cells), strict=True):
             middle = [self.means[i : i + 2].mean(), AMPLITUDES[j : j + 2].mean()]
@@ -243,9 +241,9 @@ class _FreeMean:
             if np.abs(solved.fun).max() > 1e-6 or mean <= 0.0 or share <= 0.0:
                 continue
             amplitude = mean * share
-            if all(abs(mean - m) + abs(amplitude - a) > 1e-6 * mean for m, a, _ in found):
-                found.append((mean, amplitude, self.holds(mean, amplitude)))
-        return sorted(found, key=lambda cycle: cycle[1])
+            if all(abs(mean - m) + abs(amplitude - a) > 1e-6 * mean for m, a, _ in results):
+                results.append((mean, amplitude, self.holds(mean, amplitude)))
+        return sorted(results, key=lambda cycle: cycle[1])
 
     def holds(self, mean: float, amplitude: float) -> bool:
         """Whether mean and amplitude come back, the mean being the quicker of the two."""

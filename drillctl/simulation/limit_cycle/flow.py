@@ -29,14 +29,11 @@ from drillctl.simulation.system import System, ending, integrate
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-10
-"""Relative and absolute tolerance of the integrator (rad, rad/s)."""
+TOLERANCE = 1e-10  # relative and absolute tolerance of the integrator (rad, rad/s)
 LATER = math.inf
 """Time (s) at which cycles are looked at: when no program of the start acts any more."""
-MOST_PHASES = 2000
-"""Give up beyond this many phases within one flight."""
-SPEED_STEP = 1e-5
-"""Step (rad/s) of the difference that gives the rock's slope, weight law included."""
+MOST_PHASES = 2000  # give up beyond this many phases within one flight
+SPEED_STEP = 1e-5  # step (rad/s) of the difference that gives the rock's slope, weight law included
 
 
 @dataclass(frozen=True, eq=False)

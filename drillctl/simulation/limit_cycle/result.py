@@ -27,13 +27,11 @@ from drillctl.store.result import Result
 
 Array = NDArray[np.float64]
 
-PERIODS = 40
-"""Length of the long simulation in expected periods."""
+PERIODS = 40  # length of the long simulation in expected periods
 FEWEST_PERIODS = 16
 """Fewest of them: half are thrown away, and some are needed to see whether they repeat."""
 
-TOLERANCE = 1e-8
-"""Of the reference solver in the long simulation."""
+TOLERANCE = 1e-8  # of the reference solver in the long simulation
 
 
 @dataclass(frozen=True, eq=False)

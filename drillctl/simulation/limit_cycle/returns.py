@@ -27,20 +27,15 @@ from drillctl.store.labels import label
 
 Array = NDArray[np.float64]
 
-LAST = 10
-"""Returns that are reported."""
-PER_CYCLE = 4
-"""A motion may repeat with every return, or with every second, third or fourth."""
-FINE = 400
-"""Samples in an expected period."""
+LAST = 10  # returns that are reported
+PER_CYCLE = 4  # A motion may repeat with every return, or with every second, third or fourth
+FINE = 400  # samples in an expected period
 LARGEST = 0.02
 """Largest swing of the bit speed, as a share of its mean, of a motion that has settled."""
 CLOSE = 0.1
 """Largest distance of the last returns, over the swing, from which an orbit is looked for."""
-STEPS = 6
-"""Newton steps from the last return: it lies near the orbit, or there is none to be found."""
-NOISE = 1e-6
-"""Distance over the swing below which returns are the same to the integrator's error."""
+STEPS = 6  # Newton steps from the last return: it lies near the orbit, or there is none to be found
+NOISE = 1e-6  # distance over the swing below which returns are the same to the integrator's error
 
 STATUSES = ("equilibrium", "settling", "stalled", "periodic", "not periodic")
 """What a long motion does.
@@ -225,14 +220,14 @@ def _orbit_after(design: Design, returns: Returns, apart: int) -> Orbit | None:
 
 def _rises(time: Array, speed: Array, level: float, low: float) -> list[tuple[float, float]]:
     """Pairs of times between which the speed rises through a level, coming from `low`."""
-    found: list[tuple[float, float]] = []
+    results: list[tuple[float, float]] = []
     armed = False
     for i in range(len(time) - 1):
         armed = armed or bool(speed[i] < low)
         if armed and speed[i] < level <= speed[i + 1]:
-            found.append((float(time[i]), float(time[i + 1])))
+            results.append((float(time[i]), float(time[i + 1])))
             armed = False
-    return found
+    return results
 
 
 class _Trace:

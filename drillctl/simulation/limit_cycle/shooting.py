@@ -29,16 +29,12 @@ Array = NDArray[np.float64]
 
 CLOSED = 1e-9
 """An orbit is closed when no angle (rad) and no speed (rad/s) is off by more after a period."""
-MOST_STEPS = 25
-"""Newton steps before giving up."""
-LARGEST_CHANGE = 0.2
-"""Largest change of the period in one step, as a share of it."""
-MOST_HALVINGS = 7
-"""Halvings of a step that leads no nearer."""
+MOST_STEPS = 25  # Newton steps before giving up
+LARGEST_CHANGE = 0.2  # largest change of the period in one step, as a share of it
+MOST_HALVINGS = 7  # halvings of a step that leads no nearer
 LEAST_SWING = 1e-5
 """Swing of the bit speed over the set speed below which a motion is steady drilling."""
-SAMPLES = 1201
-"""Samples of an orbit, both ends included."""
+SAMPLES = 1201  # samples of an orbit, both ends included
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,9 +199,9 @@ def _nearer(place: _Place) -> _Place:
     change, longer = _newton(place)
     share = min(1.0, LARGEST_CHANGE * place.period / max(abs(longer), 1e-300))
     for _ in range(MOST_HALVINGS):
-        found = _Place(place.flow, place.point + share * change, place.period + share * longer)
-        if found.residual < place.residual:
-            return found
+        result = _Place(place.flow, place.point + share * change, place.period + share * longer)
+        if result.residual < place.residual:
+            return result
         share /= 2.0
     raise SimulationError(
         f"no periodic motion near the guess: no step leads nearer than {place.residual:.2g}"

@@ -44,10 +44,8 @@ KEPT = (
 PATHS = (KP, KI, GAIN)
 STARTS = (0.0, 500.0, 1500.0)
 """Gains of the weight (N s/rad) that are tried with the constant weight's gains of the drive."""
-ROUNDS = 4
-"""Most turns of gains and shift."""
-STILL = 1e-3
-"""Change of the shift over the nominal weight that ends them."""
+ROUNDS = 4  # most turns of gains and shift
+STILL = 1e-3  # change of the shift over the nominal weight that ends them
 
 
 class Terms(NamedTuple):
@@ -203,16 +201,16 @@ def cases(
     """The table's cases, the constant weight first."""
     baseline = compared.constant.with_gains(optima.constant.values)
     ground = measured(baseline, draws)
-    found = [_case(compared.constant, NOMINAL, optima.constant, (0.0, 0.0), ground, ground)]
+    results = [_case(compared.constant, NOMINAL, optima.constant, (0.0, 0.0), ground, ground)]
     for policy, first in ((compared.ideal, optima.ideal), (compared.real, optima.real)):
         for terms in ALL_TERMS:
             best = tuned_on_terms(policy, terms, baseline, first)
             design = policy.with_gains(best.values)
             shift = fresh_shift(policy, terms, design, ground)
             own = measured(design, draws, shift[0])
-            found.append(_case(policy, terms, best, shift, own, ground))
+            results.append(_case(policy, terms, best, shift, own, ground))
             progress.advance(1)
-    return tuple(found)
+    return tuple(results)
 
 
 def tuned_on_terms(policy: Policy, terms: Terms, baseline: Design, first: Optimum) -> Optimum:
@@ -222,15 +220,15 @@ def tuned_on_terms(policy: Policy, terms: Terms, baseline: Design, first: Optimu
         return first
     draws = CommonDraws(table.realizations, table.seed)
     target = float(np.nanmean(draws.run(baseline).measures[terms.measure]))
-    found, shift = first, 0.0
+    result, shift = first, 0.0
     for _ in range(ROUNDS):
-        lanes = draws.lanes(policy.with_gains(found.values))
+        lanes = draws.lanes(policy.with_gains(result.values))
         wanted, _off = matching_shift(lanes, draws.count, terms.measure, target)
         if abs(wanted - shift) <= STILL * own:
             break
         shift = wanted
-        found = optimum(policy.shifted(shift), table.realizations, [found.values])
-    return found
+        result = optimum(policy.shifted(shift), table.realizations, [result.values])
+    return result
 
 
 def fresh_shift(

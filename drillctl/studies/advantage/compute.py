@@ -117,17 +117,17 @@ class Advantage(Result):
         }
 
 
-def _chart_summary(found: Chart) -> dict[str, Any]:
+def _chart_summary(result: Chart) -> dict[str, Any]:
     shown = ("objective", "mean_weight", "advantage", "advantage_low", "advantage_high")
     return {
-        "weights": found.weights.tolist(),
-        "speeds": found.speeds.tolist(),
+        "weights": result.weights.tolist(),
+        "speeds": result.speeds.tolist(),
         "policies": {
             name: {
-                **{one: _plain(found.figures[one][k]) for one in shown},
-                "significant": found.significant(k).tolist(),
+                **{one: _plain(result.figures[one][k]) for one in shown},
+                "significant": result.significant(k).tolist(),
             }
-            for k, name in enumerate(found.policies)
+            for k, name in enumerate(result.policies)
         },
     }
 
@@ -175,7 +175,7 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
     progress.begin("comparing", 2 * len(compared) + 2 * len(ALL_TERMS) + cells + len(table.delays))
     draws = fresh_draws(design)
     optima = own_optima(compared, progress)
-    found = cases(compared, optima, draws, progress)
+    result = cases(compared, optima, draws, progress)
     areas = regions(compared, optima, progress)
     curve = delay_curve(compared, optima, draws, progress)
     over = chart(compared, table.weights, table.speeds, draws, progress)
@@ -184,7 +184,7 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
         front = chart(compared, table.weights, (design.speed,), draws, progress, "front_speed")
     return Advantage(
         design=design,
-        cases=found,
+        cases=result,
         regions=areas,
         front=front,
         chart=over,

@@ -24,10 +24,8 @@ from drillctl.studies.advantage.policies import DELAY, Optimum, Policies, Policy
 
 Array = NDArray[np.float64]
 
-STEPS = 10
-"""Into which a step of the grid is divided where kept gains lose their advantage."""
-STEPS_ANEW = 5
-"""The same where gains tuned anew do, each of which is a search."""
+STEPS = 10  # into which a step of the grid is divided where kept gains lose their advantage
+STEPS_ANEW = 5  # the same where gains tuned anew do, each of which is a search
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +52,8 @@ class DelayLine:
     @property
     def indistinct_from(self) -> float | None:
         """First of the delays (s) at which the interval does not lie above zero."""
-        found = np.flatnonzero(~(self.low > 0.0))
-        return float(self.delays[found[0]]) if found.size else None
+        result = np.flatnonzero(~(self.low > 0.0))
+        return float(self.delays[result[0]]) if result.size else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +120,7 @@ def _tuned_anew(
     step, the small steps into it may carry it over the end: then it is looked for in the next.
     """
     table, tune = policy.design.tables.advantage, policy.design.tables.tune
-    found: dict[float, Optimum] = {}
+    results: dict[float, Optimum] = {}
     points: Points = {}
 
     def tuned(delay: float, start: Array) -> Optimum:
@@ -132,7 +130,7 @@ def _tuned_anew(
         )
 
     def keep(delay: float, one: Optimum) -> Array:
-        found[delay] = one
+        results[delay] = one
         points[delay] = one.values, _objectives(_late(policy, delay), one.values, draws)
         return one.values
 
@@ -146,17 +144,16 @@ def _tuned_anew(
         before = [d for d in table.delays if over and d < over[0]]
         if not before:
             return points
-        last = found[before[-1]].values
+        last = results[before[-1]].values
         for delay in np.linspace(before[-1], over[0], STEPS_ANEW + 1)[1:-1].tolist():
             last = keep(delay, tuned(delay, last))
         again = tuned(over[0], last)
-        if not again.value < found[over[0]].value:
+        if not again.value < results[over[0]].value:
             return points
         keep(over[0], again)
 
 
-Points = dict[float, tuple[Array, Array]]
-"""Gains, and what was measured with them, by delay (s)."""
+Points = dict[float, tuple[Array, Array]]  # gains, and what was measured with them, by delay (s)
 
 
 def _advantages(constant: float, points: Points) -> Array:
@@ -191,8 +188,8 @@ def _line(name: str, points: Points, constant: Array, share: float) -> DelayLine
     """A line from what was measured: objectives of the draws, then of every resample."""
     delays = np.array(sorted(points))
     gains = np.stack([points[delay][0] for delay in delays.tolist()])
-    found = np.stack([points[delay][1] for delay in delays.tolist()])
-    apart = less(constant, found)
+    result = np.stack([points[delay][1] for delay in delays.tolist()])
+    apart = less(constant, result)
     ends = np.array([percentile_estimate(row).ends for row in apart], dtype=float)
     padded = np.zeros((len(gains), 3))
     padded[:, : gains.shape[1]] = gains
@@ -200,7 +197,7 @@ def _line(name: str, points: Points, constant: Array, share: float) -> DelayLine
         name=name,
         delays=delays,
         gains=padded,
-        objective=found[:, 0],
+        objective=result[:, 0],
         advantage=apart[:, 0],
         low=ends[:, 0],
         high=ends[:, 1],

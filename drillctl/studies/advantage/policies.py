@@ -30,8 +30,7 @@ DELAY = LAW + "path.delay"
 WEIGHT, SPEED = "operating_point.weight_on_bit", "operating_point.speed"
 CONSTANT, IDEAL, REAL = "constant weight", "dynamic, ideal path", "dynamic, real path"
 """Names of the policies."""
-AT_BOUND = 1e-3
-"""Over the width of the bounds: gains nearer to one are on it."""
+AT_BOUND = 1e-3  # over the width of the bounds: gains nearer to one are on it
 
 
 @dataclass(frozen=True)
@@ -129,9 +128,9 @@ def _following(design: Design, given: dict[str, object]) -> tuple[Design, Design
         if real.tables.weight_on_bit.path.ideal and law == LAWS[0]:
             real = real.replace(REAL_PATH)
         ideal = _at_once(real)
-        for found in (real, ideal):
-            found.weight_on_bit  # noqa: B018  limits are compared when the law is made
-            found.bit_rock  # noqa: B018  not every friction goes with a weight that moves
+        for result in (real, ideal):
+            result.weight_on_bit  # noqa: B018  limits are compared when the law is made
+            result.bit_rock  # noqa: B018  not every friction goes with a weight that moves
     except InputError as error:
         key = error.where.removeprefix(design.origin).removeprefix(": ")
         raise InputError(error.problem, _where(design, f"advantage.set: {key}")) from None

@@ -48,10 +48,10 @@ class Settings(Table):
 
     @field_validator("weights", "speeds", "delays")
     @classmethod
-    def _sorted(cls, found: tuple[float, ...]) -> tuple[float, ...]:
-        if not found:
+    def _sorted(cls, result: tuple[float, ...]) -> tuple[float, ...]:
+        if not result:
             raise InputError("is empty: at least one value is needed")
-        return tuple(sorted(set(found)))
+        return tuple(sorted(set(result)))
 
     @field_validator("values", mode="before")
     @classmethod

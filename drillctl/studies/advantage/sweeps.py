@@ -67,12 +67,12 @@ class Regions:
     def areas(self) -> dict[float, dict[str, Area]]:
         """Shares of the window by level: `p95`, `p05` with intervals, of realizations."""
         flat = np.ascontiguousarray(np.moveaxis(self.j1, -1, 0).reshape(self.j1.shape[-1], -1))
-        found = {}
+        results = {}
         for level in self.levels:
             one = probability_map(flat, level, INDEPENDENT)
             both = region_areas(flat, [(one, INNER), (one, OUTER)], INDEPENDENT, self.seed)
-            found[level] = dict(zip(("p95", "p05"), both, strict=True))
-        return found
+            results[level] = dict(zip(("p95", "p05"), both, strict=True))
+        return results
 
     def nominal_area(self, level: float) -> float:
         """Share of the window with J1 at or under a level (s) without draws."""
@@ -97,11 +97,11 @@ class Regions:
 
 def regions(compared: Policies, optima: Optima, progress: Progress) -> tuple[Regions, ...]:
     """Regions of every policy with the gain of the weight at its optimum."""
-    found = []
+    results = []
     for policy, best in zip(compared, (optima.constant, optima.ideal, optima.real), strict=True):
-        found.append(_regions(policy, best))
+        results.append(_regions(policy, best))
         progress.advance(1)
-    return tuple(found)
+    return tuple(results)
 
 
 def _regions(policy: Policy, best: Optimum) -> Regions:
@@ -177,14 +177,14 @@ def chart(
                 starts = [known[k, *at].values for at in near if (k, *at) in known]
                 count = policy.design.tables.advantage.sweep_realizations
                 if k == 0:
-                    found = optimum(policy, count, starts)
+                    result = optimum(policy, count, starts)
                 else:
                     starts += [known[1, i, j].values] if k > 1 else []
-                    found = optimum_beside(policy, count, known[0, i, j], starts)
-                known[k, i, j] = found
-                own = measured(policy.with_gains(found.values), draws)
+                    result = optimum_beside(policy, count, known[0, i, j], starts)
+                known[k, i, j] = result
+                own = measured(policy.with_gains(result.values), draws)
                 ground = ground or own
-                for name, value in _figures(found, own, ground).items():
+                for name, value in _figures(result, own, ground).items():
                     figures[name][k, i, j] = np.nan if value is None else value
                 progress.advance(1)
     names = tuple(policy.name for policy in compared)

@@ -19,14 +19,10 @@ from drillctl.simulation import Simulation, simulate
 if TYPE_CHECKING:
     from drillctl.design.tables import AxisTable
 
-ALONE = "as designed"
-"""Name of the only case of a design without cases."""
-INTERVAL = 0.1
-"""Sampling interval of the responses (s), rounded to a whole number of steps."""
-NO_MAPS = "compare.maps is false"
-"""Reason where no maps are requested."""
-WEIGHT = "operating_point.weight_on_bit"
-"""What is shifted for the sake of equal mean weights."""
+ALONE = "as designed"  # name of the only case of a design without cases
+INTERVAL = 0.1  # sampling interval of the responses (s), rounded to a whole number of steps
+NO_MAPS = "compare.maps is false"  # reason where no maps are requested
+WEIGHT = "operating_point.weight_on_bit"  # what is shifted for the sake of equal mean weights
 
 
 def case_designs(design: Design) -> dict[str, Design]:
@@ -34,13 +30,13 @@ def case_designs(design: Design) -> dict[str, Design]:
     cases = design.tables.compare.cases
     if not cases:
         return {ALONE: design}
-    found = {}
+    results = {}
     for case in cases:
         try:
-            found[case.name] = design.replace(case.values)
+            results[case.name] = design.replace(case.values)
         except InputError as error:
             raise in_case(error, design, case.name) from None
-    return found
+    return results
 
 
 def refuse_unequal(cases: Mapping[str, Design]) -> tuple[Uncertain, ...]:
@@ -69,16 +65,16 @@ def _refuse_other_runs(design: Design, baseline: Design) -> None:
 
 
 def _refuse_other_draws(design: Design, baseline: Design, expected: tuple[Uncertain, ...]) -> None:
-    found = uncertain_parameters(design)
+    result = uncertain_parameters(design)
     if design.tables.uncertain != baseline.tables.uncertain or (
-        [p.path for p in found] != [p.path for p in expected]
+        [p.path for p in result] != [p.path for p in expected]
     ):
         raise InputError(
             f"the first case draws {', '.join(p.path for p in expected)}; every case must draw "
             "the same: name them in [uncertain] of the design",
             "uncertain",
         )
-    for drawn in (p for p in found if not p.own_mean):
+    for drawn in (p for p in result if not p.own_mean):
         if parameter(design, drawn.path).value != parameter(baseline, drawn.path).value:
             raise InputError(
                 "is drawn, from one distribution in all cases, so that a value of its own has no "
@@ -104,13 +100,13 @@ class Nominal:
 
     def summary(self) -> dict[str, Any]:
         """Measures and scheme of the response, map or why there is none; SI."""
-        found = None
+        result = None
         if self.map is not None:
             told = self.map.summary()
             # Regions stand with the case, at the levels of the comparison; of an audit that was
             # not made there is nothing to tell.
-            found = {key: told[key] for key in told if key not in ("regions", "audit")}
-        return {**self.response.summary(), "map": found, "no_map": self.no_map}
+            result = {key: told[key] for key in told if key not in ("regions", "audit")}
+        return {**self.response.summary(), "map": result, "no_map": self.no_map}
 
 
 def shifted_design(design: Design, shift: float) -> Design:
@@ -135,13 +131,13 @@ def nominal_runs(
     design: Design, tables: tuple[AxisTable, ...] | None, progress: Progress
 ) -> Nominal:
     """Map and response of a case; without tables of axes no map."""
-    found, reason = None, None
+    result, reason = None, None
     try:
-        found = _map(design, tables, progress)
+        result = _map(design, tables, progress)
     except InputError as error:  # the axes do not fit this case, or a value on them is impossible
         reason = str(error)
         progress.advance(cells_of(tables))
-    return Nominal(found, reason, simulate(design, engine="batch", interval=INTERVAL))
+    return Nominal(result, reason, simulate(design, engine="batch", interval=INTERVAL))
 
 
 def _map(design: Design, tables: tuple[AxisTable, ...] | None, progress: Progress) -> Sweep:

@@ -46,8 +46,7 @@ COMPARED = (
     "rop_proxy", "work_per_turn", "time_outside_table",
 )  # fmt: skip
 """Measures that are compared."""
-NO_ANSWER = "no finite answer"
-"""Reason of a run that broke down."""
+NO_ANSWER = "no finite answer"  # reason of a run that broke down
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +64,8 @@ class ComparedCase(Runs):
 
     def region(self, level: float) -> Region | None:
         """Cells and outline of the nominal map at or under a level of J1 (s); None without map."""
-        found = self.nominal.map
-        return None if found is None else region(found.j1, found.axes, level)
+        result = self.nominal.map
+        return None if result is None else region(result.j1, result.axes, level)
 
     def summary(self, levels: tuple[float, ...]) -> dict[str, Any]:
         """Measures, regions, statuses, failures, shift, scheme and nominal runs; SI."""
@@ -139,8 +138,8 @@ class Comparison(Result):
             "cases": {case.name: case.summary(self.levels) for case in self.cases},
             "paired": {
                 name: {
-                    measure: {**found.summary("difference"), "pairs": found.draws}
-                    for measure, found in differences.items()
+                    measure: {**result.summary("difference"), "pairs": result.draws}
+                    for measure, result in differences.items()
                 }
                 for name, differences in self.paired.items()
             },
@@ -223,15 +222,15 @@ def compare(
         refuse_too_large([len(named), *(one.points for one in axes)])
     progress.begin("simulating cases", (table.realizations + cells_of(axes)) * len(named))
     draws = CommonDraws(table.realizations, table.seed)
-    found = []
+    results = []
     for name, variant in named.items():
         try:
-            found.append(_compared(name, variant, draws, equal, axes, progress))
+            results.append(_compared(name, variant, draws, equal, axes, progress))
         except InputError as error:
             raise in_case(error, variant, name) from None
     return Comparison(
         design=design,
-        cases=tuple(found),
+        cases=tuple(results),
         realizations=draws.count,
         seed=draws.seed,
         levels=design.tables.map.levels,

@@ -40,8 +40,7 @@ from drillctl.studies.delay.lanes import KEPT, delayed_lanes, following_design
 Array = NDArray[np.float64]
 
 
-ENOUGH = 0.95
-"""Share of the draws in which stick-slip must have ended."""
+ENOUGH = 0.95  # share of the draws in which stick-slip must have ended
 
 
 @dataclass(frozen=True)
@@ -291,12 +290,12 @@ def weight_delay(
     progress.begin("simulating delays", count * len(table.delays) * len(table.gains))
     constant = alone.run(0.0).at(0)
     shape = (len(table.delays), count)
-    found = []
+    results = []
     for gain in table.gains:
         # The constant weight is the same at any delay.
-        found.append(lanes.run(gain) if gain > 0.0 else constant.over(shape, KEPT))
+        results.append(lanes.run(gain) if gain > 0.0 else constant.over(shape, KEPT))
         progress.advance(count * len(table.delays))
-    runs = joined(found, np.stack)
+    runs = joined(results, np.stack)
     return WeightDelay(
         measures=runs.measures,
         status=runs.status,

@@ -19,8 +19,7 @@ from drillctl.studies.delay.settings import VARIED
 
 Array = NDArray[np.float64]
 
-LAWS = ("navarro-lopez-suarez", "surface-observer")
-"""Laws of a weight that follows the bit speed."""
+LAWS = ("navarro-lopez-suarez", "surface-observer")  # laws of a weight that follows the bit speed
 GAIN, DELAY = VARIED
 KEPT = (
     "j1", "peak_bit_speed", "peak_pipe_torque", "mean_weight_on_bit", "mean_weight_after_start",
@@ -43,14 +42,14 @@ def following_design(design: Design) -> Design:
             _where(design, "weight_on_bit.law"),
         )
     try:
-        found = design.replace({**values, GAIN: units.SI(0.0), DELAY: units.SI(0.0)})
+        result = design.replace({**values, GAIN: units.SI(0.0), DELAY: units.SI(0.0)})
         # Limits are compared with the nominal weight only when the law is made of them.
-        found.weight_on_bit  # noqa: B018
+        result.weight_on_bit  # noqa: B018
     except InputError as error:
         key = error.where.removeprefix(design.origin).removeprefix(": ")
         raise InputError(error.problem, _where(design, f"weight_delay.set: {key}")) from None
-    uncertain_parameters(found)
-    return found
+    uncertain_parameters(result)
+    return result
 
 
 def _where(design: Design, key: str) -> str:
@@ -70,14 +69,14 @@ class DelayedLanes:
 
     def run(self, gain: float) -> Runs:
         """Simulate all at one gain (N s/rad); runs of shape (delays, draws)."""
-        found = []
+        results = []
         at = (self.delays > 0.0).astype(int)
         sizes = [int((at == k).sum()) for k in (0, 1) if (at == k).any()]
         for part, size in zip(self.parts, sizes, strict=True):
             given = _replaced(part, lambda lanes: _with(lanes, gain=np.full(len(lanes), gain)))
             runs = run_draws(given, size * self.draws)
-            found.append(runs.over((size, self.draws), KEPT))
-        return joined(found, np.concatenate)
+            results.append(runs.over((size, self.draws), KEPT))
+        return joined(results, np.concatenate)
 
 
 def delayed_lanes(following: Design, draws: Draws, delays: Array) -> DelayedLanes:

@@ -12,10 +12,8 @@ from drillctl.rig import table as q
 from drillctl.rig.table import Table
 
 KEY = "weight_delay"
-VARIED = ("weight_on_bit.gain", "weight_on_bit.path.delay")
-"""What the study runs over."""
-LAW = "weight_on_bit."
-"""Where the paths of its law begin."""
+VARIED = ("weight_on_bit.gain", "weight_on_bit.path.delay")  # what the study runs over
+LAW = "weight_on_bit."  # where the paths of its law begin
 
 
 class Settings(Table):
@@ -34,10 +32,10 @@ class Settings(Table):
 
     @field_validator("gains", "delays")
     @classmethod
-    def _sorted(cls, found: tuple[float, ...]) -> tuple[float, ...]:
-        if not found:
+    def _sorted(cls, result: tuple[float, ...]) -> tuple[float, ...]:
+        if not result:
             raise InputError("is empty: at least one value is needed")
-        return tuple(sorted(set(found)))
+        return tuple(sorted(set(result)))
 
     @field_validator("values", mode="before")
     @classmethod
@@ -60,8 +58,8 @@ def paths_of_weight(value: object, varied: tuple[str, ...]) -> object:
 
 def _leaves(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Values by dotted path, whether the paths were quoted in the file or not."""
-    found: dict[str, Any] = {}
+    results: dict[str, Any] = {}
     for key, value in tree.items():
         path = f"{prefix}{key}"
-        found |= _leaves(value, f"{path}.") if isinstance(value, Mapping) else {path: value}
-    return found
+        results |= _leaves(value, f"{path}.") if isinstance(value, Mapping) else {path: value}
+    return results

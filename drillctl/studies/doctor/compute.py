@@ -40,25 +40,19 @@ from drillctl.studies.doctor.scheme import (
 
 Array = NDArray[np.float64]
 
-SEED = 20122
-"""Seed of the sample: the same design is examined at the same cells."""
-LANES = 256
-"""Lanes in the sample; fewer if the map has fewer cells."""
+SEED = 20122  # seed of the sample: the same design is examined at the same cells
+LANES = 256  # lanes in the sample; fewer if the map has fewer cells
 AUDITED = 4
-AUDIT_SECONDS = 10.0
-"""After so long (s) no further run of the reference solver is begun."""
-LEAST_ORDER = 1.0
-"""Order under which a shorter step is no advice."""
+AUDIT_SECONDS = 10.0  # after so long (s) no further run of the reference solver is begun
+LEAST_ORDER = 1.0  # order under which a shorter step is no advice
 
 
 CONFIRMED, REFERENCE = 3.0, 1e-6
 """An audited difference confirms an estimate up to so many times it, and what the reference
 solver itself is good for."""
-TIMED_SECONDS = 0.3
-"""Least length of a timed run (s)."""
+TIMED_SECONDS = 0.3  # least length of a timed run (s)
 MOST_LANES = 65_536
-REPEATS = 3
-"""Runs of which the fastest counts: what others take of the machine is not the engine."""
+REPEATS = 3  # runs of which the fastest counts: what others take of the machine is not the engine
 
 
 @dataclass(frozen=True)
@@ -201,8 +195,8 @@ def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILE
     begin = time.perf_counter()
     if isinstance(design.bit_rock, PrintedThreeBranch):
         return _refused(design, begin)
-    axes, found = _cells_of(design)
-    sample = _sample(axes, found)
+    axes, result = _cells_of(design)
+    sample = _sample(axes, result)
     progress.begin("simulating lanes at three schemes", len(REFINEMENTS) * len(sample.cells))
     estimate, status = sample.examine(progress)
     main = min(sample.parts, key=lambda part: part.prepared.scheme.step)
@@ -306,13 +300,13 @@ class _Sample:
         return j1, step
 
 
-def _sample(axes: tuple[Axis, ...], found: list[Group]) -> _Sample:
+def _sample(axes: tuple[Axis, ...], result: list[Group]) -> _Sample:
     """Cells drawn from all, and what they share."""
     count = int(np.prod(shape_of(axes), dtype=int))
     random = np.random.default_rng(SEED)
     cells = np.sort(random.choice(count, size=min(LANES, count), replace=False, shuffle=False))
     parts = []
-    for group in found:
+    for group in result:
         # Few cells of many: each is looked for in the group, whose cells may be millions.
         chosen = group.lanes_at(cells)
         at = np.flatnonzero(chosen >= 0)

@@ -164,18 +164,14 @@ def _modes(string: Drillstring, table: SimulationTable, step: float) -> tuple[in
 
 Array = NDArray[np.float64]
 
-REFINEMENTS = (1, 2, 4)
-"""Parts into which the step of the scheme is divided."""
+REFINEMENTS = (1, 2, 4)  # parts into which the step of the scheme is divided
 ORDER_TWO = 4.0 / 3.0
 """Error of a scheme of order 2 per difference to the same at half the step (Richardson)."""
 SMALLEST = 1e-7
 """J1 (s) under which errors are taken in parts of this: a rig that never leaves its set speed."""
-ROUNDING = 1e-9
-"""Relative difference of two schemes that may be rounding."""
-ENOUGH = 8
-"""Lanes from which an order says something."""
-UNLIKELY = 0.025
-"""Chance of a sample that speaks against a promise."""
+ROUNDING = 1e-9  # relative difference of two schemes that may be rounding
+ENOUGH = 8  # lanes from which an order says something
+UNLIKELY = 0.025  # chance of a sample that speaks against a promise
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from drillctl.linear.loop_analysis import LoopAnalysis
     from drillctl.store.tables import Table
 
-SHOWN = 10
-"""Oscillating poles in the table."""
+SHOWN = 10  # oscillating poles in the table
 SLOPE = "N*m*s/rad"
 
 

@@ -37,8 +37,8 @@ class MappedLoop(LoopAnalysis):
 def mapped_loop(design: Design, progress: Progress) -> MappedLoop:
     """Analyse a loop, and map it over the axes of the design if there are two that fit."""
     analysis = loop(design)
-    found, why = _map(design, progress)
-    return MappedLoop(**vars(analysis), map=found, no_map=why)
+    result, why = _map(design, progress)
+    return MappedLoop(**vars(analysis), map=result, no_map=why)
 
 
 def _map(design: Design, progress: Progress) -> tuple[LoopMap | None, str]:

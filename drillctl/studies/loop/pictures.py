@@ -109,16 +109,15 @@ def _of_loop(result: LoopAnalysis) -> Iterator[Picture]:
     )
 
 
-TURN = np.radians(4.0)
-"""Largest turn of a Nyquist curve between two frequencies."""
+TURN = np.radians(4.0)  # largest turn of a Nyquist curve between two frequencies
 REFINEMENTS = 6
 
 
 def _smooth(respond: Callable[[Array], FrequencyResponse], grid: Array) -> FrequencyResponse:
     """A response with more frequencies where its Nyquist curve would show corners."""
-    found = respond(grid)
+    result = respond(grid)
     for _ in range(REFINEMENTS):
-        loop = found.between("speed_error", "top_speed")
+        loop = result.between("speed_error", "top_speed")
         step = np.diff(loop)
         with np.errstate(divide="ignore", invalid="ignore"):
             corner = np.abs(np.angle(step[1:] / step[:-1])) > TURN
@@ -130,8 +129,8 @@ def _smooth(respond: Callable[[Array], FrequencyResponse], grid: Array) -> Frequ
         pieces = np.unique(np.concatenate([at, at + 1]))
         middles = np.sqrt(grid[pieces] * grid[pieces + 1])
         grid = np.unique(np.concatenate([grid, middles]))
-        found = respond(grid)
-    return found
+        result = respond(grid)
+    return result
 
 
 def _over_gains(design: Design, slope: float) -> Iterator[Picture]:

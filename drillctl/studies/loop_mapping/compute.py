@@ -60,12 +60,12 @@ class LoopMap(Result):
     @property
     def best(self) -> tuple[float, dict[str, float]] | None:
         """Largest slope margin (N m s/rad) and where (SI); None without steady drilling."""
-        found = self.values["slope_margin"]
-        if np.isnan(found).all():
+        result = self.values["slope_margin"]
+        if np.isnan(result).all():
             return None
-        where = np.unravel_index(int(np.nanargmax(found)), found.shape)
+        where = np.unravel_index(int(np.nanargmax(result)), result.shape)
         at = {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)}
-        return float(found[where]), at
+        return float(result[where]), at
 
     def unit(self, quantity: str) -> str:
         """Unit of a quantity, SI."""
@@ -124,8 +124,8 @@ def loop_map(
     values = {name: np.full(int(np.prod(shape)), np.nan) for name in QUANTITIES if name in wanted}
     progress.begin("analysing loops", values["slope"].size)
     for group in groups(design, axes):
-        for name, found in _figures(design, axes, group, wanted).items():
-            values[name][group.cells] = found
+        for name, result in _figures(design, axes, group, wanted).items():
+            values[name][group.cells] = result
         progress.advance(len(group.cells))
     seconds = time.perf_counter() - begin
     return LoopMap(design, axes, {k: v.reshape(shape) for k, v in values.items()}, seconds)
@@ -139,14 +139,14 @@ def _figures(
     slope = drilling.slope
     margin = slopes_tolerated(design, axes, group, drilling.speed)
     steady = np.isfinite(slope)
-    found = {
+    results = {
         "slope": slope,
         "slope_margin": np.where(steady, margin.slope, np.nan),
         "deciding_frequency": np.where(steady, margin.omega / (2.0 * np.pi), np.nan),
     }
     if wanted & {"spectral_abscissa", "low_damping", "peak_sensitivity"}:
-        found |= _of_poles(group, slope, slope < margin.slope, wanted)
-    return found
+        results |= _of_poles(group, slope, slope < margin.slope, wanted)
+    return results
 
 
 def _of_poles(
@@ -166,19 +166,19 @@ def _of_poles(
     poles = many_loop_poles(
         string, kp, ki, np.where(steady, slope, 0.0), threads=numba.get_num_threads()
     )
-    found: dict[str, Array] = {}
+    results: dict[str, Array] = {}
     if "spectral_abscissa" in wanted:
-        found["spectral_abscissa"] = np.where(steady, np.nanmax(poles.real, axis=1), np.nan)
+        results["spectral_abscissa"] = np.where(steady, np.nanmax(poles.real, axis=1), np.nan)
     if "low_damping" in wanted:
-        found["low_damping"] = np.where(steady, _low_damping(group, poles), np.nan)
+        results["low_damping"] = np.where(steady, _low_damping(group, poles), np.nan)
     if "peak_sensitivity" in wanted:
         peak = np.full(len(kp), np.nan)
         if stable.any():
             peak[stable] = peak_sensitivities(
                 ends_of(string), kp[stable], ki[stable], slope[stable], poles[stable]
             )
-        found["peak_sensitivity"] = peak
-    return found
+        results["peak_sensitivity"] = peak
+    return results
 
 
 def _low_damping(group: Group, poles: NDArray[np.complexfloating[Any, Any]]) -> Array:

@@ -37,10 +37,10 @@ def tables(result: Modes) -> Iterator[Table]:
     yield Table("modes", "natural frequencies of the string", tuple(columns), rows)
 
 
-def _cells(found: tuple[Any, ...], order: int) -> list[Any]:
-    if order >= len(found):
+def _cells(result: tuple[Any, ...], order: int) -> list[Any]:
+    if order >= len(result):
         return [None, None]
-    mode = found[order]
+    mode = result[order]
     if mode.overdamped:
         return [mode.frequency_hz, "overdamped"]
     if mode.frequency_hz == 0.0:

@@ -13,12 +13,9 @@ if TYPE_CHECKING:
     from drillctl.simulation.run import Simulation
     from drillctl.store.tables import Table
 
-HIDDEN = ("j1_rate", "work_at_bit", "time_outside_table")
-"""Measures that are in the summary alone."""
-FREE = 20.0
-"""Interval (s) between the samples of a run that is kept for its measures alone."""
-FINE = 0.05
-"""And of one that is drawn (s)."""
+HIDDEN = ("j1_rate", "work_at_bit", "time_outside_table")  # measures that are in the summary alone
+FREE = 20.0  # interval (s) between the samples of a run that is kept for its measures alone
+FINE = 0.05  # and of one that is drawn (s)
 
 
 def computed(design: Design, run: Run) -> Simulation:

@@ -51,8 +51,7 @@ HORIZON = 200.0
 """Length of the runs (s): on the paper's map sticking that will end has ended by 80 s."""
 STARTS: tuple[Kind, ...] = ("rest", "wound_up")
 """Starts that a cell must leave for steady drilling: both are far from it."""
-TRACED_LANES = 128
-"""Lanes traced together: some 70 MB at 20 ms."""
+TRACED_LANES = 128  # lanes traced together: some 70 MB at 20 ms
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,14 +241,14 @@ class ThreeRegions(Result):
     def combinations(self) -> dict[str, int]:
         """Cells of every combination of regions; the failed apart, so that all add up."""
         names = ("locally_stable", "inside_level", "from_rest", "from_wound_up")
-        found = {}
+        results = {}
         for signs in itertools.product((True, False), repeat=len(names)):
             cells = ~self.failed
             for name, sign in zip(names, signs, strict=True):
                 cells = cells & (getattr(self, name) == sign)
             held = [name for name, sign in zip(names, signs, strict=True) if sign]
-            found[" + ".join(held) or "none"] = int(cells.sum())
-        return found | {"failed": int(self.failed.sum())}
+            results[" + ".join(held) or "none"] = int(cells.sum())
+        return results | {"failed": int(self.failed.sum())}
 
     def summary(self) -> dict[str, Any]:
         """Axes, level, counts, what attraction means here, time; strict JSON values, SI."""

@@ -42,8 +42,7 @@ if TYPE_CHECKING:
     from drillctl.studies.tune.compute import Tune
 
 
-SHOWN = ("q50", "q95", "q99")
-"""Quantiles of J1 that people are shown."""
+SHOWN = ("q50", "q95", "q99")  # quantiles of J1 that people are shown
 
 
 def computed(design: Design, run: Run) -> Tune:

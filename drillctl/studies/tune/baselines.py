@@ -32,10 +32,8 @@ OTHER_LAWS = {"soft torque": "soft-torque", "Z-torque": "z-torque", "stiff speed
 """Laws at their default tuning."""
 ANY_OTHER = {"soft-torque": "stiff-speed", "z-torque": "stiff-speed", "stiff-speed": "soft-torque"}
 """A law to change to on the way, which drops the numbers that a law has already."""
-POINTS = 41
-"""Along each axis of a grid."""
-MOST_AXES = 2
-"""Of a grid that is gone through."""
+POINTS = 41  # along each axis of a grid
+MOST_AXES = 2  # of a grid that is gone through
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,15 +77,15 @@ def baselines(
     if exhaustive is not None:
         made.append(("exhaustive grid", lambda: _exhaustive(exhaustive, fresh)))
     progress.begin("baselines", len(made))
-    found = []
+    results = []
     for name, make in made:
         try:
             gains, runs, more = make()
-            found.append(Baseline(name, gains, runs, "", more))
+            results.append(Baseline(name, gains, runs, "", more))
         except InputError as error:
-            found.append(Baseline(name, {}, None, error.problem, {}))
+            results.append(Baseline(name, {}, None, error.problem, {}))
         progress.advance(1)
-    return tuple(found)
+    return tuple(results)
 
 
 Made = tuple[dict[str, Any], FreshRuns, dict[str, float]]
@@ -119,20 +117,20 @@ def _law(design: Design, law: str) -> Design:
 
 
 def _linear(design: Design, fresh: FreshDraws) -> Made:
-    found = linear_design(design)
-    return found.gains, fresh.of_gains(found.values)[1], {"slope_margin": found.slope_margin}
+    result = linear_design(design)
+    return result.gains, fresh.of_gains(result.values)[1], {"slope_margin": result.slope_margin}
 
 
 def _nominal(design: Design, fresh: FreshDraws) -> Made:
     tuned = fresh.problem.tuned
     begin = time.perf_counter()
     axes = tuple(Axis(t.path, t.unit, line) for t, line in zip(tuned, _lines(tuned), strict=True))
-    found = sweep(design, axes, audit_cells=0, measures=("j1",))
-    if found.minimum is None:
+    result = sweep(design, axes, audit_cells=0, measures=("j1",))
+    if result.minimum is None:
         raise InputError("no cell of the nominal map gives a finite answer")
-    j1, at = found.minimum
+    j1, at = result.minimum
     values = np.array([at[t.path] for t in tuned])
-    more = {"value": j1, "trajectories": found.j1.size, "seconds": time.perf_counter() - begin}
+    more = {"value": j1, "trajectories": result.j1.size, "seconds": time.perf_counter() - begin}
     return by_path(tuned, values), fresh.of_gains(values)[1], more
 
 

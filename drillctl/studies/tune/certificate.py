@@ -46,24 +46,16 @@ MARGINS = (
     "delay_margin",
 )  # fmt: skip
 """Of `drillctl.loop`."""
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
-"""Of J1, as they are reported."""
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99)  # of J1, as they are reported
 LOOKED_AT = 24
 """Points on the line from the optimum to a bound, at distances that grow with their square."""
-AT_A_TIME = 6
-"""Of them, run at a time: none behind the first below."""
-HALVINGS = 8
-"""Of the step in which it falls."""
-POINTS = 21
-"""Along each axis of the neighbourhood."""
-LINE_POINTS = 81
-"""Of the neighbourhood of a single parameter."""
-FEW = 500
-"""Draws of the neighbourhood, the first ones: its probabilities are for the eye."""
-AROUND = 0.6
-"""How far the neighbourhood goes on behind the tolerance, over the tolerance's width."""
-LEAST_HALF = 0.02
-"""Its least half width, over that of the bounds."""
+AT_A_TIME = 6  # of them, run at a time: none behind the first below
+HALVINGS = 8  # of the step in which it falls
+POINTS = 21  # along each axis of the neighbourhood
+LINE_POINTS = 81  # of the neighbourhood of a single parameter
+FEW = 500  # draws of the neighbourhood, the first ones: its probabilities are for the eye
+AROUND = 0.6  # how far the neighbourhood goes on behind the tolerance, over the tolerance's width
+LEAST_HALF = 0.02  # its least half width, over that of the bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +88,12 @@ class FreshRuns:
     def quantiles(self) -> dict[str, float]:
         """Quantiles of J1 (s) over the draws that a rig can have, by name; infinite ones too."""
         possible = np.sort(self.j1[~np.isnan(self.j1)])
-        found = {}
+        results = {}
         for q in QUANTILES:
             weights = rank_weights("quantile", q, len(possible))
             used = weights > 0.0  # no weight on what is infinite
-            found[f"q{round(100 * q):02d}"] = float(possible[used] @ weights[used])
-        return found
+            results[f"q{round(100 * q):02d}"] = float(possible[used] @ weights[used])
+        return results
 
 
 def fresh_design(design: Design) -> Design:
@@ -217,11 +209,11 @@ def tolerances(
 ) -> tuple[Tolerance, ...]:
     """Tolerance of each parameter."""
     progress.begin("tolerance of the gains", len(values))
-    found = []
+    results = []
     for k in range(len(values)):
-        found.append(_tolerance(fresh, values, k, probability))
+        results.append(_tolerance(fresh, values, k, probability))
         progress.advance(1)
-    return tuple(found)
+    return tuple(results)
 
 
 def _tolerance(fresh: FreshDraws, values: Array, k: int, probability: float) -> Tolerance:
@@ -386,14 +378,14 @@ class Certificate:
     def message(self) -> str:
         """The verdict in a sentence."""
         low, high = self.runs.interval
-        found = (
+        result = (
             f"J1 <= {self.runs.level:g} s with probability {self.runs.probability:.4f} "
             f"({low:.4f} to {high:.4f}, 95 %) over {len(self.runs.j1)} fresh realizations, "
             f"{self.required:g} required"
         )
         if self.verdict == "not shown":
-            return f"certificate not shown: {found}; more realizations would decide"
-        return f"certificate {self.verdict}: {found}"
+            return f"certificate not shown: {result}; more realizations would decide"
+        return f"certificate {self.verdict}: {result}"
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI."""
@@ -480,10 +472,10 @@ def certified(
 
 def _margins(design: Design) -> tuple[dict[str, Any], str]:
     try:
-        found = loop(design).summary()
+        result = loop(design).summary()
     except InputError as error:
         return {}, str(error)
-    return {key: found[key] for key in MARGINS}, ""
+    return {key: result[key] for key in MARGINS}, ""
 
 
 def _audit(

@@ -56,11 +56,11 @@ class Tune(Result):
             return self.tuning.message
         if self.certificate.passed:
             return f"{self.tuning.message}; {self.certificate.message}"
-        found = self.certificate.message + self._nearer
+        result = self.certificate.message + self._nearer
         if self.tuning.share < self.certificate.required:
-            return f"{self.tuning.message}; {found}"
+            return f"{self.tuning.message}; {result}"
         at = ", ".join(f"{path} = {value:.6g}" for path, value in self.gains.items())
-        return f"{found}; the closest found is {at}"
+        return f"{result}; the closest found is {at}"
 
     @property
     def _nearer(self) -> str:
@@ -76,9 +76,9 @@ class Tune(Result):
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI: of the search, with `certificate` and `baselines`."""
-        found = self.tuning.summary()
-        found["message"] = self.message
-        return found | {
+        result = self.tuning.summary()
+        result["message"] = self.message
+        return result | {
             "passed": self.passed,
             "search_message": self.tuning.message,
             "certificate": self.certificate.summary(),
@@ -128,12 +128,12 @@ def tune(
     begin = time.perf_counter()
     tuned = tuned_parameters(design)
     fresh = FreshDraws(design, tuned)  # an impossible certificate is refused before the search
-    found = search(design, progress, verbose)
+    result = search(design, progress, verbose)
     grid = search_problem(design, tuned) if exhaustive else None
     return Tune(
         design=design,
-        tuning=found,
-        certificate=certified(found.design, fresh, found.values, progress),
+        tuning=result,
+        certificate=certified(result.design, fresh, result.values, progress),
         baselines=baselines(design, fresh, grid, progress),
         total_seconds=time.perf_counter() - begin,
     )

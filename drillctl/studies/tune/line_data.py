@@ -26,8 +26,7 @@ from drillctl.linear.ends import Ends, telling_grid
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-TERMS = 16
-"""Terms of the power series within a circle."""
+TERMS = 16  # terms of the power series within a circle
 WITHIN = 0.6
 """Share of the circle's radius within which the series is used: 0.6^16 / 16! is under rounding."""
 

@@ -39,23 +39,16 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-LOOKED_AT = 48
-"""Starts that are looked at on the grid, for each tuned parameter."""
-LOOPS_LOOKED_AT = 4
-"""Loops at which they are."""
+LOOKED_AT = 48  # starts that are looked at on the grid, for each tuned parameter
+LOOPS_LOOKED_AT = 4  # loops at which they are
 STARTS = 2
 """Of them, followed further; never two within `APART` of each other, over the bounds' width."""
 APART = 0.15
-FIRST_REACH = 0.25
-"""Longest first step over the bounds' width."""
-SHORTEST_REACH = 1e-6
-"""And the reach at which a search ends."""
-LEAST_GAIN = 1e-6
-"""Gain of a program, over what there is, under which it ends too."""
-PROGRAMS = 25
-"""Most programs from one start."""
-KEPT = 1e-6
-"""Violation that is rounding."""
+FIRST_REACH = 0.25  # longest first step over the bounds' width
+SHORTEST_REACH = 1e-6  # and the reach at which a search ends
+LEAST_GAIN = 1e-6  # gain of a program, over what there is, under which it ends too
+PROGRAMS = 25  # most programs from one start
+KEPT = 1e-6  # violation that is rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,14 +44,10 @@ from drillctl.studies.tune.tuned import StringNumbers, Tuned, by_path, drive_num
 
 Array = NDArray[np.float64]
 
-PRICE = 100.0
-"""Of missing a requirement, over what a unit of it could gain in margin."""
-WIDER = 1.6
-"""Crossings up to this many times the lowest are in the program."""
-MOST = 12
-"""Crossings of a loop in it."""
-BESIDE = 1.0 + 0.1j
-"""Where the size of a characteristic function is read, over its root."""
+PRICE = 100.0  # of missing a requirement, over what a unit of it could gain in margin
+WIDER = 1.6  # crossings up to this many times the lowest are in the program
+MOST = 12  # crossings of a loop in it
+BESIDE = 1.0 + 0.1j  # where the size of a characteristic function is read, over its root
 
 
 class Point(NamedTuple):
@@ -93,8 +89,8 @@ class LinearProgram:
         x = ca.MX.sym("x", len(begin))
         n = len(tuned)
         equal, more = self._constraints(points, x, x[:n] * width + low, x[n], x[n + 1])
-        found = self._solve(x, -x[n] + PRICE * x[n + 1], equal, more, begin, least, most)
-        return np.clip(low + width * found[:n], low, low + width)
+        result = self._solve(x, -x[n] + PRICE * x[n + 1], equal, more, begin, least, most)
+        return np.clip(low + width * result[:n], low, low + width)
 
     def _constraints(
         self, points: list[Point], x: Any, values: Any, t: Any, v: Any
@@ -176,9 +172,9 @@ class LinearProgram:
         )
         upper = np.concatenate([np.zeros(zero.numel()), np.full(kept.numel(), np.inf)])
         begin = [min(max(b, low), high) for b, low, high in zip(begin, least, most, strict=True)]
-        found = solver(x0=begin, lbx=least, ubx=most, lbg=np.zeros(len(upper)), ubg=upper)
+        result = solver(x0=begin, lbx=least, ubx=most, lbg=np.zeros(len(upper)), ubg=upper)
         self.solves += 1
-        return np.asarray(found["x"]).ravel()
+        return np.asarray(result["x"]).ravel()
 
 
 def _points(state: LoopsState) -> Iterator[Point]:
@@ -232,10 +228,8 @@ def _telling(state: LoopState) -> list[Crossing]:
     return chosen + negative[-2:]
 
 
-DATA = 8 * TERMS + 4
-"""Numbers that tell a circle."""
-CONSTANTS = 6
-"""Numbers that tell a loop from another of its kind."""
+DATA = 8 * TERMS + 4  # numbers that tell a circle
+CONSTANTS = 6  # numbers that tell a loop from another of its kind
 
 
 @dataclass(frozen=True, eq=False)

@@ -103,15 +103,15 @@ def refuse_not_linear(design: Design, tuned: tuple[Tuned, ...]) -> None:
 
 def loops_of(designs: Iterable[Design], tuned: tuple[Tuned, ...]) -> list[Loop]:
     """Loops of a number of realizations of a design."""
-    found: dict[tuple[Any, ...], Loop] = {}
+    results: dict[tuple[Any, ...], Loop] = {}
     strings: dict[Any, tuple[Ends, Grid, StringNumbers]] = {}
     for design in designs:
         loop = _loop(middle(design, tuned), strings, tuned)
         side = None if loop.weight is None else (loop.weight.torque, loop.weight.path, loop.slope)
         key = (design.string.parts, design.tables.controller.model_dump_json(), side)
-        if key not in found or found[key].slope < loop.slope:
-            found[key] = loop
-    return list(found.values())
+        if key not in results or results[key].slope < loop.slope:
+            results[key] = loop
+    return list(results.values())
 
 
 def _loop(
@@ -141,8 +141,7 @@ def _weight(design: Design, slope: float) -> tuple[WeightSide | None, float]:
     return WeightSide(path.gain / float(law.gain), float(law.gain), path), slope
 
 
-KEPT = 16
-"""Crossings of a loop that are refined at least: the lowest, as seen on the grid."""
+KEPT = 16  # crossings of a loop that are refined at least: the lowest, as seen on the grid
 ALIKE = 1.05
 """And all that are lowest but for this factor: high modes have margins of nearly one size."""
 
@@ -199,12 +198,12 @@ def crossings_of(loop: Loop, values: Mapping[str, float]) -> list[Crossing]:
     if len(order) == 0:
         return []
     around = circles(loop.ends, 1j * seen.omega[order])
-    found = []
+    results = []
     for circle, place in zip(around, seen.place[order], strict=True):
         bracket = loop.grid.omega[place], loop.grid.omega[place + 1]
         omega = _refined(loop, values, circle, *bracket)
-        found.append(Crossing(float(_impedance(loop, values, circle, omega).real), omega, circle))
-    return sorted(found, key=lambda crossing: crossing.slope)
+        results.append(Crossing(float(_impedance(loop, values, circle, omega).real), omega, circle))
+    return sorted(results, key=lambda crossing: crossing.slope)
 
 
 def _impedance(loop: Loop, values: Mapping[str, float], circle: Circle, omega: float) -> complex:

@@ -34,11 +34,9 @@ from drillctl.studies.tune.tuned import Tuned, designs_at
 
 Array = NDArray[np.float64]
 
-PRICE = 1000.0
-"""Of a requirement missed by all of itself, in seconds of J1."""
+PRICE = 1000.0  # of a requirement missed by all of itself, in seconds of J1
 
-KERNEL = 0.02
-"""Half width of the kernel of a smooth quantile, as a share of the realizations."""
+KERNEL = 0.02  # half width of the kernel of a smooth quantile, as a share of the realizations
 
 
 def rank_weights(kind: str, quantile: float, count: int) -> Array:
@@ -98,31 +96,31 @@ class Objective:
         A realization without an answer has an infinite J1.
         """
         table = self.table
-        found = self._statistic(measures["j1"], smooth)
+        result = self._statistic(measures["j1"], smooth)
         weights = table.weights
         if weights.effort > 0.0:
-            found = found + weights.effort * measures["effort"].mean(axis=-1) / self.static
+            result = result + weights.effort * measures["effort"].mean(axis=-1) / self.static
         if weights.peak_top_torque > 0.0:
             peak = measures["peak_top_torque"].mean(axis=-1)
-            found = found + weights.peak_top_torque * peak / self.static
+            result = result + weights.peak_top_torque * peak / self.static
         if weights.lost_weight > 0.0:
             lost = 1.0 - measures["mean_weight_on_bit"].mean(axis=-1) / self.nominal
-            found = found + weights.lost_weight * np.maximum(lost, 0.0)
-        return np.asarray(found)
+            result = result + weights.lost_weight * np.maximum(lost, 0.0)
+        return np.asarray(result)
 
     def violations(self, measures: Mapping[str, Array], smooth: bool = False) -> dict[str, Array]:
         """By how much each limit of the runs is missed, over the limit; not negative."""
-        asked, found = self.table.constraints, {}
+        asked, result = self.table.constraints, {}
         if asked.peak_top_torque is not None:
             count = measures["peak_top_torque"].shape[-1]
             make = smooth_weights if smooth else rank_weights
             weights = make("quantile", self.table.quantile, count)
             peak = np.sort(measures["peak_top_torque"], axis=-1) @ weights
-            found["peak_top_torque"] = np.maximum(peak / asked.peak_top_torque - 1.0, 0.0)
+            result["peak_top_torque"] = np.maximum(peak / asked.peak_top_torque - 1.0, 0.0)
         if asked.mean_weight_on_bit is not None:
             mean = measures["mean_weight_on_bit"].mean(axis=-1)
-            found["mean_weight_on_bit"] = np.maximum(1.0 - mean / asked.mean_weight_on_bit, 0.0)
-        return found
+            result["mean_weight_on_bit"] = np.maximum(1.0 - mean / asked.mean_weight_on_bit, 0.0)
+        return result
 
     def merit(self, measures: Mapping[str, Array], smooth: bool = False) -> Array:
         """The objective with what limits are missed by (s): what a search compares."""
@@ -149,10 +147,8 @@ def objective_of(design: Design) -> Objective:
     return Objective(design.tables.tune, static, weight or 1.0)
 
 
-STRINGS = 16
-"""Realizations at which requirements of the linear loop are checked."""
-ROUNDING = 1e-6
-"""A violation of less is none."""
+STRINGS = 16  # realizations at which requirements of the linear loop are checked
+ROUNDING = 1e-6  # A violation of less is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,10 +198,10 @@ class GainProblem:
 
     def own(self, design: Design) -> Array | None:
         """The design's own values, where it has them and they lie within the bounds."""
-        found = [parameter(design, t.path).value for t in self.tuned]
-        if any(value is None for value in found):
+        results = [parameter(design, t.path).value for t in self.tuned]
+        if any(value is None for value in results):
             return None
-        values = np.array(found, dtype=float)
+        values = np.array(results, dtype=float)
         inside = np.all((values >= self.low) & (values <= self.low + self.width))
         return values if inside else None
 
@@ -229,11 +225,11 @@ class GainProblem:
     def points(self, values: Array, count: int, first: int = 0) -> list[Point]:
         """Points at the first realizations, `values` of shape (points, parameters)."""
         measures = self.runs.measures(values, self.objective.needs, first, first + count)
-        found = []
+        results = []
         for row, one in enumerate(values):
             own = {name: column[row] for name, column in measures.items()}
-            found.append(self._point(one, own))
-        return found
+            results.append(self._point(one, own))
+        return results
 
     def at_all(self, point: Point) -> Point:
         """A point at all realizations; those that it met already are not run again."""

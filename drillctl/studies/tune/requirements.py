@@ -23,8 +23,7 @@ from drillctl.studies.tune.tuned import Tuned, by_path, put
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-PEAKS = 6
-"""Peaks of a sensitivity, and delays, that are told: the worst."""
+PEAKS = 6  # peaks of a sensitivity, and delays, that are told: the worst
 
 
 @dataclass(frozen=True)
@@ -118,15 +117,15 @@ class Loops:
         return weight_path(variant, variant.speed)
 
     def _state(self, loop: Loop, values: Array, named: Mapping[str, float]) -> LoopState:
-        found = crossings_of(loop, named)
+        result = crossings_of(loop, named)
         stable = self._stable(loop, values)
         if not (self.needs_stability and stable):
-            return LoopState(loop, found, stable)
+            return LoopState(loop, result, stable)
         poles = self._poles(loop, values)
         asked, omega = self.asked, pole_grid(loop.ends, poles)
         return LoopState(
             loop,
-            found,
+            result,
             stable,
             self._first(loop, poles) if asked.damping_ratio is not None else poles[:0],
             _peaks(loop, named, omega) if asked.peak_sensitivity is not None else [],
@@ -165,20 +164,20 @@ class LoopsState:
     def violations(self) -> dict[str, float]:
         """How far each requirement is missed, in its own scale; what is kept is not listed."""
         asked, scale = self.problem.asked, self.problem.scale
-        found = {}
+        results = {}
         if asked.slope_reserve is not None:
-            found["slope_reserve"] = (asked.slope_reserve - self.excess) / scale
+            results["slope_reserve"] = (asked.slope_reserve - self.excess) / scale
         elif self.problem.needs_stability:
-            found["slope"] = -self.excess / scale
+            results["slope"] = -self.excess / scale
         if asked.peak_sensitivity is not None:
             peak = max(state.peak for state in self.loops)
-            found["peak_sensitivity"] = peak / asked.peak_sensitivity - 1.0
+            results["peak_sensitivity"] = peak / asked.peak_sensitivity - 1.0
         if asked.damping_ratio is not None:
-            found["damping_ratio"] = asked.damping_ratio - min(s.damping for s in self.loops)
+            results["damping_ratio"] = asked.damping_ratio - min(s.damping for s in self.loops)
         if asked.delay is not None:
             borne = min([asked.delay, *(d.delay for state in self.loops for d in state.delays)])
-            found["delay"] = 1.0 - borne / asked.delay
-        return {key: value for key, value in found.items() if value > 0.0}
+            results["delay"] = 1.0 - borne / asked.delay
+        return {key: value for key, value in results.items() if value > 0.0}
 
     @property
     def violation(self) -> float:

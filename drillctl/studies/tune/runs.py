@@ -29,10 +29,8 @@ from drillctl.studies.tune.tuned import (
 
 Array = NDArray[np.float64]
 
-SAMPLED = 0.1
-"""Distance of the samples that an effort is read from (s)."""
-TOGETHER = 20_000
-"""Lanes made at a time: bounds the memory."""
+SAMPLED = 0.1  # distance of the samples that an effort is read from (s)
+TOGETHER = 20_000  # lanes made at a time: bounds the memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,34 +74,34 @@ class GainRuns:
     ) -> dict[str, Array]:  # fmt: skip
         """Measures of points at realizations."""
         chosen = self.numbers[first:last]
-        found = {name: np.full((len(points), len(chosen)), np.nan) for name in names}
+        results = {name: np.full((len(points), len(chosen)), np.nan) for name in names}
         if not self._at_once:
             for row, point in enumerate(points):
-                self._one_by_one(point, chosen, found, row, give_up)
+                self._one_by_one(point, chosen, results, row, give_up)
         else:
             for ready in self.groups:
                 members = np.flatnonzero(np.isin(ready.group.numbers, chosen))
                 if len(members):
                     columns = np.searchsorted(chosen, ready.group.numbers[members])
-                    self._group(points, ready, members, columns, found, give_up)
+                    self._group(points, ready, members, columns, results, give_up)
         self.trajectories += len(points) * len(chosen)
-        if "j1" in found:
-            found["j1"] = np.where(np.isnan(found["j1"]), math.inf, found["j1"])
-        return found
+        if "j1" in results:
+            results["j1"] = np.where(np.isnan(results["j1"]), math.inf, results["j1"])
+        return results
 
     def _group(
         self, points: Array, ready: Ready, members: NDArray[np.int64],
-        columns: NDArray[np.int64], found: dict[str, Array], give_up: float,
+        columns: NDArray[np.int64], result: dict[str, Array], give_up: float,
     ) -> None:  # fmt: skip
         """All points at the realizations that share a string."""
-        most = TOGETHER // (20 if "effort" in found else 1)  # traces take more room
+        most = TOGETHER // (20 if "effort" in result else 1)  # traces take more room
         rows = max(1, most // len(members))
         for begin in range(0, len(points), rows):
             some = points[begin : begin + rows]
             lanes = self._lanes(some, ready, members)
-            for name, values in _run(lanes, ready.prepared, tuple(found), give_up).items():
+            for name, values in _run(lanes, ready.prepared, tuple(result), give_up).items():
                 place = np.ix_(np.arange(begin, begin + len(some)), columns)
-                found[name][place] = values.reshape(len(some), len(members))
+                result[name][place] = values.reshape(len(some), len(members))
 
     def _lanes(self, points: Array, ready: Ready, members: NDArray[np.int64]) -> Lanes:
         """Every point at every member, point by point."""
@@ -126,7 +124,7 @@ class GainRuns:
         return replace(lanes, drive=drive, weight=weight)
 
     def _one_by_one(
-        self, point: Array, chosen: NDArray[np.int64], found: dict[str, Array], row: int,
+        self, point: Array, chosen: NDArray[np.int64], result: dict[str, Array], row: int,
         give_up: float,
     ) -> None:  # fmt: skip
         """A point whose lanes are made anew from the design: any parameter may be tuned."""
@@ -141,8 +139,8 @@ class GainRuns:
             lanes = group.lanes[members]
             prepared = prepare(lanes, group.design.tables.simulation)
             columns = np.searchsorted(chosen, group.numbers[members])
-            for name, values in _run(lanes, prepared, tuple(found), give_up).items():
-                found[name][row, columns] = values
+            for name, values in _run(lanes, prepared, tuple(result), give_up).items():
+                result[name][row, columns] = values
 
 
 def _at_once(design: Design, tuned: tuple[Tuned, ...]) -> bool:
@@ -158,10 +156,10 @@ def _run(
     lanes: Lanes, prepared: Prepared, names: tuple[str, ...], give_up: float
 ) -> dict[str, Array]:
     kept = tuple(name for name in names if name != "effort")
-    found = measured(lanes, prepared, kept, give_up).measures
+    result = measured(lanes, prepared, kept, give_up).measures
     if "effort" in names:
-        found["effort"] = _effort(lanes, prepared)
-    return found
+        result["effort"] = _effort(lanes, prepared)
+    return result
 
 
 def _effort(lanes: Lanes, prepared: Prepared) -> Array:

@@ -44,18 +44,14 @@ LOOK = (64, 300, 500, 800)
 """Gains of the first look by the number of parameters; more have as many as four."""
 RACE = (("first look", 16, 80), ("race", 64, 16))
 """Rounds of the race: realizations, and how many gains are kept after it."""
-GENERATIONS, AMONG = 20, 100
-"""Of the population, and realizations that it lives among."""
-CROSSING = 0.9
-"""Share of the parameters of a trial that are changed."""
+GENERATIONS, AMONG = 20, 100  # of the population, and realizations that it lives among
+CROSSING = 0.9  # share of the parameters of a trial that are changed
 NEAR = 1.2
 """Merit of known gains, over that of the population's end, up to which they are polished too."""
 APART = 0.05
 """Least distance of two ends of the population that are polished, over the bounds' width."""
-FIRST_STEP, LAST_STEP = 0.01, 1e-3
-"""Of the polish, over the bounds' width."""
-ROUNDS = 14
-"""Most rounds of it."""
+FIRST_STEP, LAST_STEP = 0.01, 1e-3  # of the polish, over the bounds' width
+ROUNDS = 14  # most rounds of it
 
 Note = Callable[[str, Point], None]
 """Receives the name of a stage that is over and the best point of it."""
@@ -139,10 +135,10 @@ def polished(problem: GainProblem, start: Point) -> Point:
     gained = np.zeros(len(best.values))
     for _ in range(ROUNDS):
         trials = problem.points(_around(problem, best, step, gained), len(problem))
-        found = min(trials, key=_merit)
-        if found.merit < best.merit:
-            gained = problem.shares(found.values) - problem.shares(best.values)
-            best = found
+        result = min(trials, key=_merit)
+        if result.merit < best.merit:
+            gained = problem.shares(result.values) - problem.shares(best.values)
+            best = result
             continue
         gained = np.zeros(len(best.values))
         step *= 0.5

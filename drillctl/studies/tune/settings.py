@@ -12,8 +12,7 @@ from drillctl.rig import table as q
 from drillctl.rig.table import Table, number_or_quantity
 
 KEY = "tune"
-FRESH = 1_000_003
-"""From the seed of a search to that of its certificate, where none is given."""
+FRESH = 1_000_003  # from the seed of a search to that of its certificate, where none is given
 
 
 def _inside(value: float) -> float:

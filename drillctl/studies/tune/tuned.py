@@ -46,14 +46,14 @@ def tuned_parameters(design: Design) -> tuple[Tuned, ...]:
     """What the `[tune]` table of a design names, or the numbers of its controller."""
     table = design.tables.tune
     if table.parameters:
-        found = tuple(_read(design, path, entry) for path, entry in table.parameters.items())
+        result = tuple(_read(design, path, entry) for path, entry in table.parameters.items())
     else:
-        found = _defaults(design)
-    for path in (t.path for t in found if t.path in design.tables.uncertain):
+        result = _defaults(design)
+    for path in (t.path for t in result if t.path in design.tables.uncertain):
         raise InputError(
             "is drawn in [uncertain], and cannot be tuned as well", _where(design, path)
         )
-    return found
+    return result
 
 
 def _where(design: Design, path: str) -> str:
@@ -177,9 +177,9 @@ def drive_numbers(
             )
     replaced = {path.removeprefix("controller."): value for path, value in given.items()}
     numbers = SimpleNamespace(**(dict(table) | replaced))
-    found = drive_laws()[table.law].controller(numbers, string)._asdict()
-    del found["sensed_inertia"]
-    return found | {"level": found["feedforward"]}
+    result = drive_laws()[table.law].controller(numbers, string)._asdict()
+    del result["sensed_inertia"]
+    return result | {"level": result["feedforward"]}
 
 
 def tracked(design: Design, numbers: dict[str, Any]) -> dict[str, Any]:

@@ -63,8 +63,8 @@ class Mean(NamedTuple):
 
     def values(self, ordered: Array) -> Array:
         """Means."""
-        found: Array = ordered.mean(axis=0)
-        return found
+        result: Array = ordered.mean(axis=0)
+        return result
 
     def influence(self, j1: Array, ordered: Array) -> Array:
         """Deviations from the mean."""
@@ -128,8 +128,8 @@ class TailMean(NamedTuple):
         """Quantile and mean excess over it."""
         at = Quantile(self.probability).values(ordered)
         excess = np.maximum(ordered - at, 0.0).mean(axis=0)
-        found: Array = at + excess / (1.0 - self.probability)
-        return found
+        result: Array = at + excess / (1.0 - self.probability)
+        return result
 
     def influence(self, j1: Array, ordered: Array) -> Array:
         """Excess over the quantile less the tail mean's; no density is needed."""
@@ -155,8 +155,8 @@ class Exceedance(NamedTuple):
 
     def values(self, ordered: Array) -> Array:
         """Shares of the realizations."""
-        found: Array = (ordered > self.level).mean(axis=0)
-        return found
+        result: Array = (ordered > self.level).mean(axis=0)
+        return result
 
     def influence(self, j1: Array, ordered: Array) -> Array:
         """Whether above, less how often."""
@@ -170,8 +170,7 @@ class Exceedance(NamedTuple):
 
 Mask = NDArray[np.bool_]
 
-CELLS = 128
-"""Cells looked at at a time: bounds the memory."""
+CELLS = 128  # cells looked at at a time: bounds the memory
 NEEDS_FULL = "lanes were stopped at the highest level: run with --full"
 
 
@@ -215,7 +214,7 @@ def values_of(asked: Iterable[Objective], j1: Array, censored: Mask) -> dict[str
         if censored[:, some].any():
             bound[some] = np.where(censored[:, some], j1[:, some], np.inf).min(axis=0)
     failed = np.isnan(j1).any(axis=0)
-    found = {}
+    results = {}
     for one in asked:
         known = values[one.name]
         if isinstance(one, Exceedance):
@@ -224,8 +223,8 @@ def values_of(asked: Iterable[Objective], j1: Array, censored: Mask) -> dict[str
             certain = known < bound
         else:
             certain = np.isinf(bound)
-        found[one.name] = Values(np.where(failed, np.nan, known), certain | failed)
-    return found
+        results[one.name] = Values(np.where(failed, np.nan, known), certain | failed)
+    return results
 
 
 def best_cells(
@@ -257,11 +256,11 @@ def best_cells(
     return best
 
 
-def _cell(objective: Objective, found: Values, j1: Array) -> int | InputError:
-    known = np.where(found.certain, found.values, np.nan)
-    if np.isnan(found.values).all():
+def _cell(objective: Objective, result: Values, j1: Array) -> int | InputError:
+    known = np.where(result.certain, result.values, np.nan)
+    if np.isnan(result.values).all():
         return InputError("every cell has failed lanes", objective.name)
-    if np.isnan(known).all() or np.nanmin(known) > np.nanmin(found.values):
+    if np.isnan(known).all() or np.nanmin(known) > np.nanmin(result.values):
         return InputError(NEEDS_FULL, objective.name)
     return _chosen(known, j1)
 
@@ -280,7 +279,7 @@ def _chosen(known: Array, j1: Array) -> int:
 
 def _alike(
     asked: Iterable[Objective],
-    found: Mapping[str, Values],
+    result: Mapping[str, Values],
     chosen: Mapping[str, Any],
     j1: Array,
     censored: Mask,
@@ -300,7 +299,7 @@ def _alike(
         columns = j1[:, some]
         ordered = np.sort(columns, axis=0)
         for one in asked:
-            values = found[one.name].values
+            values = result[one.name].values
             apart = one.influence(columns, ordered)
             apart -= reference[one.name]
             error = scatter.standard_error(apart)

@@ -38,10 +38,8 @@ Array = NDArray[np.float64]
 
 SoFar = Callable[[], Uncertainty | None]
 
-AUDITED = 64
-"""Realizations that audited lanes are chosen from: the first ones are as good as any."""
-COPIES = 4
-"""Of what is kept of a lane, that are held at one time at most."""
+AUDITED = 64  # realizations that audited lanes are chosen from: the first ones are as good as any
+COPIES = 4  # of what is kept of a lane, that are held at one time at most
 
 
 def uncertainty(
@@ -220,31 +218,31 @@ class _Study:
         seconds = run(job, count, kept, self.workers, self.progress).total
         measures, status = kept.read(count)
         cells = _cells(self.design, self.axes, table)
-        found = indices.sensitivity(
+        result = indices.sensitivity(
             tuple(columns), table.samples, measures["j1"], status, cells, self.levels,
             self.table.seed,
         )  # fmt: skip
-        return found, seconds
+        return result, seconds
 
-    def _audit(self, found: Uncertainty, count: int) -> auditing.Audit:
-        known = np.where(found.censored, np.nan, found.j1)[:AUDITED]
+    def _audit(self, result: Uncertainty, count: int) -> auditing.Audit:
+        known = np.where(result.censored, np.nan, result.j1)[:AUDITED]
         lanes = auditing.choose_cells(known, self.levels, count)
-        rig = beyond_the_table(self.design, tuple(found.drawn))
+        rig = beyond_the_table(self.design, tuple(result.drawn))
         designs = []
         for lane in lanes:
-            row, cell = divmod(int(lane), found.nominal.size)
-            designs.append(cell_design(rig, self.axes, cell).replace(_of(found.drawn, row)))
+            row, cell = divmod(int(lane), result.nominal.size)
+            designs.append(cell_design(rig, self.axes, cell).replace(_of(result.drawn, row)))
         reference = auditing.references(designs, self.progress)
         return auditing.Audit(lanes, known.ravel()[lanes], reference, "lane")
 
-    def _failures(self, found: Uncertainty) -> tuple[Failures, ...]:
+    def _failures(self, result: Uncertainty) -> tuple[Failures, ...]:
         """Realizations that failed in every cell, by reason."""
-        rig = beyond_the_table(self.design, tuple(found.drawn))
+        rig = beyond_the_table(self.design, tuple(result.drawn))
         first = cell_design(rig, self.axes, 0)
         errors, broken = [], 0
-        for row in np.flatnonzero(~found.possible):
+        for row in np.flatnonzero(~result.possible):
             try:
-                first.replace(_of(found.drawn, int(row)))
+                first.replace(_of(result.drawn, int(row)))
                 broken += 1
             except InputError as error:
                 errors.append(error)
@@ -292,7 +290,7 @@ def _cells(design: Design, axes: tuple[Axis, ...], table: SensitivityTable) -> d
 
     where = "uncertainty.sensitivity.cells"
     known = {a.path: a for a in axes}
-    found: dict[int, str] = {}
+    results: dict[int, str] = {}
     for given in table.cells or ({},):
         for path in given:
             if path not in known:
@@ -304,7 +302,7 @@ def _cells(design: Design, axes: tuple[Axis, ...], table: SensitivityTable) -> d
             middle = 0.5 * (float(a.values[0]) + float(a.values[-1]))
             place.append(int(np.argmin(np.abs(a.values - (middle if value is None else value)))))
         cell = int(np.ravel_multi_index(place, shape_of(axes)))
-        found[cell] = ", ".join(
+        results[cell] = ", ".join(
             f"{a.path} {a.values[k]:g} {a.unit}".rstrip() for a, k in zip(axes, place, strict=True)
         )
-    return found
+    return results

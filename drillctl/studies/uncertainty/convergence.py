@@ -21,8 +21,7 @@ from drillctl.errors import InputError
 
 Array = NDArray[np.float64]
 
-FEWEST = 16
-"""Realizations that the first point of a curve has, or two a replicate."""
+FEWEST = 16  # realizations that the first point of a curve has, or two a replicate
 
 
 class Convergence(NamedTuple):
@@ -90,6 +89,6 @@ def look(
 ) -> Look:
     """The area at one of the looks."""
     confidence = 1.0 - (1.0 - CONFIDENCE) / looks
-    found = probability_map(j1, level, scatter)
-    (area,) = region_areas(j1, [(found, table.probability)], scatter, seed, confidence)
+    result = probability_map(j1, level, scatter)
+    (area,) = region_areas(j1, [(result, table.probability)], scatter, seed, confidence)
     return Look(len(j1), area.value, area.interval, confidence)

@@ -35,11 +35,11 @@ Array = NDArray[np.float64]
 def derived(result: Uncertainty) -> dict[str, Any]:
     """What follows from the lanes: counts with intervals, moments; and units of the draws."""
     paths = [a.path for a in result.axes]
-    found: dict[str, Any] = {
+    results: dict[str, Any] = {
         one.path: ("realization", result.drawn[one.path], {"units": one.unit})
         for one in uncertain_parameters(result.design)
     }
-    found["level"] = ("level", np.array(result.levels), {"units": "s"})
+    results["level"] = ("level", np.array(result.levels), {"units": "s"})
     every = list(result.maps.values())
     columns: dict[str, list[NDArray[Any]]] = {
         "count": [one.counts for one in every],
@@ -49,20 +49,20 @@ def derived(result: Uncertainty) -> dict[str, Any]:
         "simultaneous_low": [one.simultaneous[0] for one in every],
         "simultaneous_high": [one.simultaneous[1] for one in every],
     }
-    found |= {name: (["level", *paths], np.stack(rows), {}) for name, rows in columns.items()}
-    return found | {
+    results |= {name: (["level", *paths], np.stack(rows), {}) for name, rows in columns.items()}
+    return results | {
         f"j1_{name}": (paths, values, {"units": "s"}) for name, values in known(result).items()
     }
 
 
 def known(result: Uncertainty) -> dict[str, Array]:
     """Mean, 95 % quantile and tail mean in every cell (s); NaN where stopped lanes enter."""
-    found = {}
+    results = {}
     for name in (Mean().name, Quantile().name, TailMean().name):
         one = result.values[name]
         certain = np.where(one.certain, one.values, np.nan)
-        found[name] = certain.reshape(result.nominal.shape)
-    return found
+        results[name] = certain.reshape(result.nominal.shape)
+    return results
 
 
 def summary(result: Uncertainty) -> dict[str, Any]:

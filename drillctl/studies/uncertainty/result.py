@@ -154,10 +154,10 @@ class Uncertainty(Result):
         """Areas of inner, median and outer region by level, with bootstrap intervals."""
         asked = [(one, bound) for one in self.maps.values() for bound in (INNER, MEDIAN, OUTER)]
         areas = region_areas(self._flat(self.j1), asked, self.scatter, self.seed)
-        found: dict[float, dict[float, Area]] = {level: {} for level in self.levels}
+        results: dict[float, dict[float, Area]] = {level: {} for level in self.levels}
         for (one, bound), area in zip(asked, areas, strict=True):
-            found[one.level][bound] = area
-        return found
+            results[one.level][bound] = area
+        return results
 
     @cached_property
     def convergence(self) -> Convergence:
@@ -179,10 +179,10 @@ class Uncertainty(Result):
         """
         if name not in self.objectives:
             raise InputError(f"no objective {name!r}; allowed: {', '.join(self.objectives)}")
-        found = self._best[name]
-        if isinstance(found, InputError):
-            raise found
-        return found
+        result = self._best[name]
+        if isinstance(result, InputError):
+            raise result
+        return result
 
     @cached_property
     def values(self) -> dict[str, Values]:
@@ -227,13 +227,13 @@ class Uncertainty(Result):
         InputError
             It is not known in some cell because lanes were stopped there.
         """
-        found = self.values.get(objective.name)
-        if found is None or self.objectives[objective.name] != objective:
-            found = values_of([objective], *self._lanes)[objective.name]
-        if not found.certain.all():
-            lacking = int((~found.certain).sum())
+        result = self.values.get(objective.name)
+        if result is None or self.objectives[objective.name] != objective:
+            result = values_of([objective], *self._lanes)[objective.name]
+        if not result.certain.all():
+            lacking = int((~result.certain).sum())
             raise InputError(f"unknown in {lacking} cells: {NEEDS_FULL}", objective.name)
-        return found.values.reshape(self.nominal.shape)
+        return result.values.reshape(self.nominal.shape)
 
     def contours(self, level: float, realization: int) -> shapely.MultiPolygon:
         """Outline of the region of one realization, in SI, over two parameters.
@@ -269,11 +269,11 @@ class Uncertainty(Result):
         last = self.axes[2]
         name = last.path.rpartition(".")[2].replace("_", " ")
         title = self.design.tables.title or self.design.name
-        found = {}
+        results = {}
         for k, value in enumerate(last.values):
             shown, unit = units.displayed(float(value), last.unit, "si")
             values = {last.path: units.SI(value), "title": f"{title}, {name} {shown:g} {unit}"}
-            found[float(value)] = replace(
+            results[float(value)] = replace(
                 self,
                 design=self.design.replace(values),
                 axes=self.axes[:2],
@@ -284,7 +284,7 @@ class Uncertainty(Result):
                 looks=(),
                 sensitivity=None,
             )
-        return found
+        return results
 
     def at(self, cell: int) -> dict[str, float]:
         """Parameters (SI) of a cell of the flattened map."""

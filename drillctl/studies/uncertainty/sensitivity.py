@@ -25,10 +25,8 @@ from drillctl.studies.uncertainty.best import NEEDS_FULL
 
 Array = NDArray[np.float64]
 
-_EDGE = 2.0**-53
-"""Nearest to 0 and to 1 that a point comes, where quantiles are infinite."""
-RESAMPLES = 1000
-"""Of the bootstrap of the indices."""
+_EDGE = 2.0**-53  # nearest to 0 and to 1 that a point comes, where quantiles are infinite
+RESAMPLES = 1000  # of the bootstrap of the indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,11 +86,11 @@ def points(design: Design, samples: int, seed: int) -> dict[str, Array]:
     from SALib.sample import sobol
 
     refuse_correlated(design)
-    found = uncertain_parameters(design)
-    table = sobol.sample(_problem(tuple(p.path for p in found)), samples,
+    result = uncertain_parameters(design)
+    table = sobol.sample(_problem(tuple(p.path for p in result)), samples,
                          calc_second_order=False, scramble=True, seed=seed)  # fmt: skip
     inside = np.clip(table, _EDGE, 1.0 - _EDGE)
-    return {p.path: p.values(inside[:, k]) for k, p in enumerate(found)}
+    return {p.path: p.values(inside[:, k]) for k, p in enumerate(result)}
 
 
 def indices(of: str, unit: str, values: Array, parameters: tuple[str, ...], seed: int) -> Indices:
@@ -105,12 +103,12 @@ def indices(of: str, unit: str, values: Array, parameters: tuple[str, ...], seed
     # SALib takes a seed of 0 for none. A resample may be of equal values: its error is not known.
     with np.errstate(invalid="ignore", divide="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        found = sobol.analyze(
+        result = sobol.analyze(
             _problem(parameters), values, calc_second_order=False, num_resamples=RESAMPLES,
             conf_level=CONFIDENCE, seed=seed + 1,
         )  # fmt: skip
     names = {"first": "S1", "total": "ST", "first_error": "S1_conf", "total_error": "ST_conf"}
-    columns = {key: np.asarray(found[name], dtype=float) for key, name in names.items()}
+    columns = {key: np.asarray(result[name], dtype=float) for key, name in names.items()}
     return Indices(of=of, unit=unit, variance=float(values.var()), **columns)
 
 
@@ -129,13 +127,13 @@ def sensitivity(
     seed: int,
 ) -> Sensitivity:
     """Indices of J1 at cells, and of the area under each level."""
-    found = []
+    results = []
     for cell, name in cells.items():
         for reason, problem in (("censored", NEEDS_FULL), ("failed", "lanes failed there")):
             if (status[:, cell] == STATUSES.index(reason)).any():
                 raise InputError(f"J1 at {name}: {problem}", "uncertainty.sensitivity")
-        found.append(indices(f"J1 at {name}", "s", j1[:, cell], parameters, seed))
+        results.append(indices(f"J1 at {name}", "s", j1[:, cell], parameters, seed))
     for level in levels:
         area = (j1 <= level).mean(axis=1)
-        found.append(indices(f"area of J1 <= {level:g}", "1", area, parameters, seed))
-    return Sensitivity(parameters, samples, j1.size, tuple(found))
+        results.append(indices(f"area of J1 <= {level:g}", "1", area, parameters, seed))
+    return Sensitivity(parameters, samples, j1.size, tuple(results))
