@@ -16,7 +16,7 @@ As a state space:
 
 - `state_space.py`: `plant`, `closed_loop`, `open_loop` as `control.StateSpace`, named signals.
 - `modal.py`, `poles.py`: natural frequencies, damping ratios and shapes.
-- `loop_poles.py`, `root_loci.py`: poles of the loop, and against a parameter.
+- `loop_model.py`: poles of the loop; `boundary.py` holds those against a parameter as well.
 - `export.py`: the nonlinear loop as `control.NonlinearIOSystem`; matrices for other programs.
 
 `loop_analysis.py` puts the figures of one design together.

@@ -5,9 +5,9 @@ Reads results and calls studies; computes nothing itself.
 - `making.py`: `report`, from a design to files.
 - `recipes.py`: profiles, and how each study is run; `gather.py`: reads or runs them.
 - `cells.py`: values and time responses of the cells of a map.
-- `sections/`: one file per section, studies in, blocks out; `blocks.py`: the blocks.
-- `rig_drawing.py`: the drawing of the rig; `words.py`: numbers and units as text.
-- `html.py` with `templates/`, `markdown.py`: the document as a file; `html.py` also prints the PDF.
+- `sections/`: sections that no study makes by itself; `blocks.py`: what they are made of.
+- `words.py`: numbers and units as text.
+- `pages.py` with `templates/`: the document as HTML, PDF or Markdown.
 - `pictures.py`: figures as files.
 """
 
