@@ -257,6 +257,7 @@ def _compile(on_disk: bool) -> Any:
         string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
         observer: Any, speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any,
     ) -> str:  # fmt: skip
+        """Advance blocks of lanes from time zero to the end."""
         for block in range(begin, end):
             _advance_block(
                 string, friction, before, drive, weight, program, observer,
