@@ -57,7 +57,7 @@ def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
         ("bit torque at that speed", found.bit_torque, "N*m"),
         ("falling slope of the rock, −dT/dω", found.slope, SLOPE),
         ("falling slope that the loop tolerates, D*", result.slope_margin, SLOPE),
-        ("nearest speed at which stability changes", result.critical_speed, "rad/s"),
+        ("critical speed (stability changes)", result.critical_speed, "rad/s"),
         ("nearest weight at which stability changes", result.critical_weight_on_bit, "N"),
     )
     return [[name, Quantity(value, unit), unit] for name, value, unit in rows]
@@ -70,8 +70,8 @@ def _margins(result: LoopAnalysis) -> list[list[Any]]:
         ("largest real part of the poles", result.spectral_abscissa, "1/s"),
         ("falling slope of the rock, −dT/dω", result.operating_point.slope, SLOPE),
         ("slope margin D*", result.slope_margin, SLOPE),
-        ("frequency that decides it", result.deciding_frequency_hz, "Hz"),
-        ("slope margin of the exact continuum", result.continuum_slope_margin, SLOPE),
+        ("deciding frequency", result.deciding_frequency_hz, "Hz"),
+        ("slope margin of the continuous string", result.continuum_slope_margin, SLOPE),
     ]
     found = result.margins
     if found is not None:
@@ -81,7 +81,7 @@ def _margins(result: LoopAnalysis) -> list[list[Any]]:
             ("largest sensitivity", found.peak_sensitivity, "1"),
             ("frequency of the largest sensitivity", found.peak_sensitivity_hz, "Hz"),
             ("delay at the top torque that is tolerated", found.delay, "s"),
-            ("frequency that decides it", found.delay_hz, "Hz"),
+            ("deciding frequency", found.delay_hz, "Hz"),
         ]
     if result.weight_delay_margin is not None:
         rows.append(("further delay of the moving weight that is tolerated",

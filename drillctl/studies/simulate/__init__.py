@@ -41,7 +41,7 @@ def tables(result: Simulation) -> Iterator[Table]:
         rows.append(["peak pipe torque over torsional yield", f"{result.share_of_yield:.1%}", ""])
     if result.energy is not None:
         residual = f"{result.energy.relative_residual:.0e} of the work"
-        rows.append(["energy that does not balance", residual, ""])
+        rows.append(["energy residual", residual, ""])
     rows.append(["status", result.status.replace("_", " "), ""])
     engine = result.engine
     if result.step is not None:

@@ -84,7 +84,7 @@ def _areas(name: str, title: str, result: Uncertainty) -> Table:
 
     columns = (
         Column("level", "J1 at or under", "s"),
-        Column("nominal", "nothing uncertain", percent=True, digits=3),
+        Column("nominal", "nominal design", percent=True, digits=3),
         *(
             Column(f"area_{key}", f"P ≥ {share} %", percent=True, digits=3, interval=True)
             for key, share in (("p95", 95), ("p50", 50), ("p05", 5))
@@ -106,7 +106,7 @@ def _best(result: Uncertainty) -> Table:
     columns = (
         Column("objective", "best by"), Column("value", interval=True),
         *(Column(axis.path, unit=axis.unit) for axis in result.axes),
-        Column("alike_cells", "equally good cells"),
+        Column("alike_cells", "cells not significantly worse"),
     )  # fmt: skip
     rows: list[list[Any]] = []
     for name in result.objectives:
