@@ -177,7 +177,7 @@ def test_nothing_is_pickled_and_nothing_is_left_half_written(result, tmp_path):
         assert not content.startswith((b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"))
         assert b"pickle" not in content
     assert {path.name for path in folder.iterdir()} == {
-        "run.json", "design.toml", "summary.json", "data.zarr",
+        "run.json", "design.toml", "summary.json", "data.zarr", "result.json",
     }  # fmt: skip
     for name in ("run.json", "summary.json"):
         json.loads((folder / name).read_text(), parse_constant=pytest.fail)

@@ -22,8 +22,8 @@ VERBS: dict[str, tuple[Callable[..., None], Group]] = {
 }
 """Commands that are not studies, with their groups in the help."""
 
-for name, (verb, group) in VERBS.items():
-    app.command(name=name, rich_help_panel=group)(verb)
+for name, (function, group) in VERBS.items():
+    app.command(name=name, rich_help_panel=group)(function)
 for name, study in studies().items():
     if study.command:
         app.command(name=name, rich_help_panel=study.group)(command(study))

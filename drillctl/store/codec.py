@@ -82,8 +82,14 @@ class _Encoder:
         inside = {}
         for one, label in labels(cls).items():
             own = label.name.format_map(_Attributes(value)) or one
-            # A field named by an attribute, such as an axis by its path, takes no prefix.
-            name = own if "{" in label.name else prefix if label.flat else _joined(prefix, own)
+            # A field that an attribute names, as its path names an axis, takes no prefix.
+            name = (
+                own
+                if label.name.startswith("{")
+                else prefix
+                if label.flat
+                else _joined(prefix, own)
+            )
             inner = getattr(value, one)
             inside[one] = self.tree(inner, name, label, _Owner(value, owner))
         return {MARK: "object", "of": f"{cls.__module__}:{cls.__qualname__}", "is": inside}

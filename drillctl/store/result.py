@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -56,7 +57,9 @@ class Result:
 
     def write(self, folder: Path) -> None:
         """Write arrays and numbers into the folder of a run."""
-        write(self, folder)
+        design, _ = self.requested()
+        # As it is read back it gives the same numbers again.
+        write(self if design is self.design else replace(self, design=design), folder)  # type: ignore[type-var]
 
     def save(self, folder: str | Path) -> Path:
         """Write design, data and summary into a folder.

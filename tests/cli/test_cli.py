@@ -672,7 +672,7 @@ def test_interrupted_map_goes_on_and_ends_in_the_same_bits(call, monkeypatch):
     assert Path("cut/blocks/000000.npz").is_file()
     assert not Path("cut/blocks/000007.npz").exists()
     assert not Path("cut/summary.json").exists()
-    with pytest.raises(drillctl.errors.InputError, match="not finished"):
+    with pytest.raises(drillctl.errors.InputError, match="unfinished run"):
         drillctl.open("cut")
     with monkeypatch.context() as patch:
         counted = Counted(patch)
@@ -795,8 +795,9 @@ def test_as_a_process():
 
 def test_interrupted_by_a_signal():
     # The file says that the run has begun: an import that is interrupted may swallow the signal.
-    slow = "import time, pathlib, drillctl\n"
-    slow += "drillctl.simulate = lambda d: (pathlib.Path('begun').touch(), time.sleep(60))\n"
+    slow = "import time, pathlib, drillctl.simulation.run as run\n"
+    slow += "wait = lambda *a, **k: (pathlib.Path('begun').touch(), time.sleep(60))\n"
+    slow += "run.simulate = wait\n"
     script = f"{slow}from drillctl.cli import run\nimport sys\nsys.exit(run(sys.argv[1:]))"
     process = subprocess.Popen(
         [sys.executable, "-c", script, "simulate", BISTABLE, "--out", "cut", "--json"],

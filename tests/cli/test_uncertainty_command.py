@@ -244,7 +244,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(call, monkeypatch, after):
     monkeypatch.setattr(ZarrBlocks, "keep", interrupted)
     code, _, err = call("uncertainty", PAPER, *FEW, "--out", "run")
     assert code == 130
-    assert "finished blocks are kept: repeat with --out run to resume" in err
+    assert "finished blocks are kept; to resume, repeat with --out run" in err
     monkeypatch.setattr(ZarrBlocks, "keep", keep)
     with pytest.raises(InputError, match="not finished"):
         drillctl.open("run")

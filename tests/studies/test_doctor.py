@@ -9,7 +9,7 @@ import drillctl
 from drillctl.design.reading import parse_axis
 from drillctl.ensemble import audit
 from drillctl.errors import InputError
-from drillctl.studies.doctor import examination
+from drillctl.studies.doctor import compute as examination
 from drillctl.studies.doctor import result as diagnosis
 from drillctl.studies.doctor.scheme import PROMISES, ErrorEstimate, Promise, errors_of
 
