@@ -246,7 +246,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(call, monkeypatch, after):
     assert code == 130
     assert "finished blocks are kept; to resume, repeat with --out run" in err
     monkeypatch.setattr(ZarrBlocks, "keep", keep)
-    with pytest.raises(InputError, match="not finished"):
+    with pytest.raises(InputError, match="unfinished run"):
         drillctl.open("run")
     code, _, _ = call("uncertainty", PAPER, *FEW, "--resume", "--out", "run")
     assert code == 0

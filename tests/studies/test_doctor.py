@@ -10,7 +10,6 @@ from drillctl.design.reading import parse_axis
 from drillctl.ensemble import audit
 from drillctl.errors import InputError
 from drillctl.studies.doctor import compute as examination
-from drillctl.studies.doctor import result as diagnosis
 from drillctl.studies.doctor.scheme import PROMISES, ErrorEstimate, Promise, errors_of
 
 PAPER = "monteiro-trindade-140kn"
@@ -220,7 +219,7 @@ def test_an_audit_that_differs_by_more_than_said_is_looked_at(found):
     none = np.empty(0)
     unaudited = dataclasses.replace(found, audit=audit.Audit(none.astype(int), none, none))
     assert unaudited.confirmed is None
-    assert diagnosis.CONFIRMED == 3.0
+    assert examination.CONFIRMED == 3.0
 
 
 def test_the_audit_begins_no_run_after_its_time(monkeypatch):
