@@ -8,7 +8,6 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from drillctl.design import Design
 from drillctl.errors import SimulationError
@@ -330,6 +329,8 @@ def integrate(*arguments: Any, longest_step: float = LONGEST_STEP, **options: An
     itself by rounding; an event that lies just there is then not bracketed. Other steps move it
     inside.
     """
+    from scipy.integrate import solve_ivp  # a third of a second that maps need not wait for
+
     for share in (1.0, 0.83, 0.71, 0.59, 0.47):
         try:
             return solve_ivp(*arguments, max_step=share * longest_step, **options)
