@@ -1,6 +1,7 @@
 """The directive `verbs`: every command with its help, read from the program itself."""
 
-import click
+from typing import Any
+
 import typer
 from docutils import nodes
 from sphinx.application import Sphinx
@@ -18,10 +19,10 @@ class Verbs(SphinxDirective):
         program = typer.main.get_command(app)
         return [self._section(verb, program.commands[verb]) for verb in program.commands]
 
-    def _section(self, verb: str, command: click.Command) -> nodes.section:
+    def _section(self, verb: str, command: Any) -> nodes.section:
         section = nodes.section(ids=[nodes.make_id(verb)], names=[verb])
         section += nodes.title(verb, f"drillctl {verb}")
-        context = click.Context(
+        context = command.context_class(
             command, info_name=f"drillctl {verb}", terminal_width=88, max_content_width=88
         )
         section += nodes.literal_block("", command.get_help(context), language="text")
