@@ -795,7 +795,9 @@ def test_as_a_process():
 
 def test_interrupted_by_a_signal():
     # The file says that the run has begun: an import that is interrupted may swallow the signal.
-    slow = "import time, pathlib, drillctl.simulation.run as run\n"
+    # A shell that starts the tests in the background makes them, and so this process, ignore it.
+    slow = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    slow += "import time, pathlib, drillctl.simulation.run as run\n"
     slow += "wait = lambda *a, **k: (pathlib.Path('begun').touch(), time.sleep(60))\n"
     slow += "run.simulate = wait\n"
     script = f"{slow}from drillctl.cli import run\nimport sys\nsys.exit(run(sys.argv[1:]))"
