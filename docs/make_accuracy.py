@@ -21,8 +21,7 @@ import drillctl
 from drillctl import catalog
 from drillctl.ensemble.grid import axes_of, groups
 from drillctl.simulation.batch import prepare, run_batch
-from drillctl.simulation.scheme import Scheme
-from drillctl.studies.doctor.scheme import PROMISES
+from drillctl.simulation.scheme import PROMISES, Scheme
 
 PAGE = Path(__file__).with_name("accuracy.md")
 SAMPLE = PAGE.parents[1] / "tests" / "data" / "paper_map_sample.json"

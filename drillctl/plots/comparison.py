@@ -33,6 +33,7 @@ from drillctl.plots.style import (
     heading,
     legend_under,
     origin_of,
+    picture,
 )
 from drillctl.simulation.measures import MEASURES
 
@@ -55,20 +56,11 @@ TRACES = (2.0, 1.1)  # line of the first and the last case, likewise
 FILL = 0.10  # how much of its colour fills a region: enough to tell inside from outside
 
 
+@picture()
 def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
     """Share of the draws at or under each J1, a curve a case, with the levels marked.
 
-    Parameters
-    ----------
-    result : Comparison
-        Any number of cases.
-    ax : Axes, optional
-        Axes to draw on.
-
-    Returns
-    -------
-    Figure
-        A curve ends below 1 where draws failed: they are under no level.
+    A curve ends below 1 where draws failed: they are under no level.
     """
     figure, ax = axes_or_new(ax, 7.5, 5.0)
     for number, case in enumerate(result.cases):
@@ -99,26 +91,12 @@ def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
     return figure
 
 
+@picture(result="Two cases or more.", raises="There is one case only.")
 def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
     """Difference of each case from the baseline in every measure, with 95 % intervals.
 
-    Parameters
-    ----------
-    result : Comparison
-        Two cases or more.
-    ax : Axes, optional
-        Axes to draw on.
-
-    Returns
-    -------
-    Figure
-        In percent of the baseline's mean over the same draws; a measure that is zero or
-        undefined there is named below.
-
-    Raises
-    ------
-    InputError
-        There is one case only.
+    In percent of the baseline's mean over the same draws; a measure that is zero or undefined
+    there is named below.
     """
     if len(result.cases) < 2:
         raise InputError("differences are between two cases or more, the result has 1")
@@ -147,26 +125,15 @@ def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
     return figure
 
 
+@picture()
 def j1_against_weight(
     result: Comparison, ax: Axes | None = None, system: units.System = "si"
 ) -> Figure:
     """J1 against the mean weight on bit after the start: what smoothness costs in weight.
 
-    Parameters
-    ----------
-    result : Comparison
-        Any number of cases.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the weight.
-
-    Returns
-    -------
-    Figure
-        A Pareto picture: a dot a draw, a large mark a case at its means over the draws that all
-        cases define; ringed those that no other beats in both, with the border of what they beat.
-        No rings where the weights were made equal.
+    A Pareto picture: a dot a draw, a large mark a case at its means over the draws that all cases
+    define; ringed those that no other beats in both, with the border of what they beat. No rings
+    where the weights were made equal.
     """
     figure, ax = axes_or_new(ax, 7.5, 5.5)
     shared = _shared(result)
@@ -208,6 +175,11 @@ def j1_against_weight(
     return figure
 
 
+@picture(
+    result="With at least one case that has a map.",
+    level="Level of J1 (s), any; by default the lowest of the comparison.",
+    raises="No case has a map, or the level is not a positive number.",
+)
 def compared_regions(
     result: Comparison,
     level: float | None = None,
@@ -216,26 +188,7 @@ def compared_regions(
 ) -> Figure:
     """Outlines of {J1 <= level} of every case, over the same two parameters.
 
-    Parameters
-    ----------
-    result : Comparison
-        With at least one case that has a map.
-    level : float, optional
-        Level of J1 (s); by default the lowest of the comparison. Any will do, the maps are kept.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the axes.
-
-    Returns
-    -------
-    Figure
-        With the share of the cells in the legend; a cross where a case is in the map.
-
-    Raises
-    ------
-    InputError
-        No case has a map, or the level is not a positive number.
+    With the share of the cells in the legend; a cross where a case is in the map.
     """
     level = result.levels[0] if level is None else level
     if not (math.isfinite(level) and level > 0.0):
@@ -260,29 +213,13 @@ def compared_regions(
     return figure
 
 
+@picture(ax="Three panels, from the top.", raises="Another number of axes than three.")
 def compared_responses(
     result: Comparison, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
     """Bit speed, weight on bit and top torque of every case against time.
 
-    Parameters
-    ----------
-    result : Comparison
-        Any number of cases.
-    ax : sequence of Axes, optional
-        Three, from the top.
-    system : {'si', 'field'}
-        Units of weight and torque.
-
-    Returns
-    -------
-    Figure
-        A panel a signal, a line a case.
-
-    Raises
-    ------
-    InputError
-        Another number of axes than three.
+    A panel a signal, a line a case.
     """
     figure, panels = grid_or_new(ax, 3, 1, 9.0, 8.0, share_x=True)
     signals = (

@@ -27,6 +27,7 @@ from drillctl.plots.style import (
     heading,
     legend_under,
     origin_of,
+    picture,
 )
 
 if TYPE_CHECKING:
@@ -45,26 +46,15 @@ APART = 0.006
 HARM = 0.6  # harm that is shown, over the objective of the constant weight
 
 
+@picture(result="From `drillctl.studies.delay`.", ax="Two panels.")
 def weight_delay(
     result: WeightDelay, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
     """Draw J1 and the share of draws in which stick-slip has ended against the total delay.
 
-    Parameters
-    ----------
-    result : WeightDelay
-        From `drillctl.studies.delay`.
-    ax : sequence of Axes, optional
-        Two panels.
-    system : {'si', 'field'}
-        Units of the gain.
-
-    Returns
-    -------
-    Figure
-        Left: mean of J1, a line a gain with its bootstrap band; a cross, with the interval as a
-        bar, where it turns harmful. Right: shares with Clopper-Pearson bars. The axis of the
-        delay is a square root, since delays are denser at its short end.
+    Left: mean of J1, a line a gain with its bootstrap band; a cross, with the interval as a bar,
+    where it turns harmful. Right: shares with Clopper-Pearson bars. The axis of the delay is a
+    square root, since delays are denser at its short end.
     """
     figure, (left, right) = grid_or_new(ax, 1, 2, 12.5, 5.6)
     longest = float(result.delays[-1])
@@ -175,24 +165,13 @@ def _label(result: WeightDelay, number: int, system: units.System) -> str:
     return f"{gain:g} {unit} s/rad, {limit}"
 
 
+@picture(result="From `drillctl.advantage`.")
 def advantage_front(
     result: Advantage, ax: Axes | None = None, system: units.System = "si"
 ) -> Figure:
     """Draw the robust objective against the mean weight on bit, a line a policy.
 
-    Parameters
-    ----------
-    result : Advantage
-        From `drillctl.advantage`.
-    ax : Axes, optional
-        To draw on.
-    system : {'si', 'field'}
-        Units of the weight.
-
-    Returns
-    -------
-    Figure
-        Each point is a nominal weight with gains tuned for it; bars are 95 % intervals.
+    Each point is a nominal weight with gains tuned for it; bars are 95 % intervals.
     """
     figure, axes = axes_or_new(ax, 7.5, 5.2)
     factor, unit = units.displayed(1.0, "N", system)
@@ -215,25 +194,14 @@ def advantage_front(
     return figure
 
 
+@picture(result="From `drillctl.advantage`.", ax="Two panels.")
 def advantage_map(
     result: Advantage, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
     """Draw the advantage over weight and speed, a panel for each path of the weight.
 
-    Parameters
-    ----------
-    result : Advantage
-        From `drillctl.advantage`.
-    ax : sequence of Axes, optional
-        Two panels.
-    system : {'si', 'field'}
-        Units of the weight.
-
-    Returns
-    -------
-    Figure
-        Objective of the constant weight less that of the one that follows, each tuned in each cell;
-        a cross where the 95 % interval holds zero.
+    Objective of the constant weight less that of the one that follows, each tuned in each cell; a
+    cross where the 95 % interval holds zero.
     """
     figure, panels = grid_or_new(ax, 1, 2, 12.0, 5.2)
     factor, unit = units.displayed(1.0, "N", system)
@@ -272,21 +240,12 @@ def advantage_map(
     return figure
 
 
+@picture(result="From `drillctl.advantage`.")
 def advantage_delay(result: Advantage, ax: Axes | None = None) -> Figure:
     """Draw the advantage against the delay of the path, with kept gains and gains tuned anew.
 
-    Parameters
-    ----------
-    result : Advantage
-        From `drillctl.advantage`.
-    ax : Axes, optional
-        To draw on.
-
-    Returns
-    -------
-    Figure
-        Bands are 95 % intervals; a cross with a bar where the advantage of kept gains vanishes and
-        where that of gains tuned anew is no longer material.
+    Bands are 95 % intervals; a cross with a bar where the advantage of kept gains vanishes and
+    where that of gains tuned anew is no longer material.
     """
     figure, axes = axes_or_new(ax, 8.0, 5.2)
     found, share = result.delay, result.design.tables.advantage.material
@@ -322,21 +281,12 @@ def advantage_delay(result: Advantage, ax: Axes | None = None) -> Figure:
     return figure
 
 
+@picture(result="From `drillctl.advantage`.")
 def advantage_cases(result: Advantage, ax: Axes | None = None) -> Figure:
     """Draw the distribution of J1 of every case over the fresh draws.
 
-    Parameters
-    ----------
-    result : Advantage
-        From `drillctl.advantage`.
-    ax : Axes, optional
-        To draw on.
-
-    Returns
-    -------
-    Figure
-        Quantiles 5 to 95 % as a bar, the median as a line, the objective as a diamond with its 95 %
-        interval.
+    Quantiles 5 to 95 % as a bar, the median as a line, the objective as a diamond with its 95 %
+    interval.
     """
     figure, axes = axes_or_new(ax, 9.0, 4.8)
     names = []

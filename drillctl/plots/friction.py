@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from drillctl import units
 from drillctl.design import Design
 from drillctl.plots import style
+from drillctl.plots.style import picture
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.units import RPM, SI
 
@@ -22,24 +23,13 @@ WEIGHT = "operating_point.weight_on_bit"
 Array = NDArray[np.float64]
 
 
+@picture(design="The rig.")
 def friction_curves(design: Design, ax: Axes | None = None, system: units.System = "si") -> Figure:
     """Draw the torque on the bit against its speed, for each weight on bit of the table.
 
-    Parameters
-    ----------
-    design : Design
-        The rig.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of torque and weight.
-
-    Returns
-    -------
-    Figure
-        One curve for each row of the friction table, and for the operating weight on bit if
-        it is not a row. At rest the torque takes any value on the vertical segment. A dot
-        marks the operating point.
+    One curve for each row of the friction table, and for the operating weight on bit if it is not
+    a row. At rest the torque takes any value on the vertical segment. A dot marks the operating
+    point.
     """
     figure, ax = style.axes_or_new(ax)
     weight = design.tables.operating_point.weight_on_bit

@@ -25,11 +25,25 @@ from drillctl.linear.boundary import GainBoundary, RootLocus
 from drillctl.linear.tuning import DriveImpedance
 from drillctl.plots import style
 from drillctl.plots.modes import hertz, listed
-from drillctl.plots.style import beyond, colours, legend_under, named_values, plain_ticks, title_of
+from drillctl.plots.style import (
+    beyond,
+    colours,
+    legend_under,
+    named_values,
+    picture,
+    plain_ticks,
+    title_of,
+)
 
 GREY = "#777777"
 
 
+@picture(
+    results="From `drillctl.linear.drive_impedance`; each is named by its `label`.",
+    ax="Two panels: impedance and reflection.",
+    marks="Frequencies (Hz) to mark, such as that of stick-slip; by name, if they have one.",
+    raises="Nothing to draw, or a mark that is not more than 0 Hz.",
+)
 def drive_impedance(
     results: DriveImpedance | Sequence[DriveImpedance],
     ax: Sequence[Axes] | None = None,
@@ -37,26 +51,9 @@ def drive_impedance(
 ) -> Figure:
     """Draw impedance and reflection of one or several top drives over frequency.
 
-    Parameters
-    ----------
-    results : DriveImpedance or sequence of DriveImpedance
-        From `drillctl.linear.drive_impedance`; each is named by its `label`.
-    ax : sequence of Axes, optional
-        Two panels: impedance and reflection.
-    marks : mapping of str to float or sequence of float, optional
-        Frequencies (Hz) that are marked, such as that of stick-slip; by name, if they have one.
-
-    Returns
-    -------
-    Figure
-        Above, the magnitude of the drive's impedance over that of the pipe: the drive takes
-        most of a wave near 1, where the line is drawn. Below, the share of the amplitude of
-        a wave that is sent back: 0 takes all, 1 takes nothing.
-
-    Raises
-    ------
-    InputError
-        Nothing to draw, or a mark that is not more than 0 Hz.
+    Above, the magnitude of the drive's impedance over that of the pipe: the drive takes most of a
+    wave near 1, where the line is drawn. Below, the share of the amplitude of a wave that is sent
+    back: 0 takes all, 1 takes nothing.
     """
     drives = listed(results)
     figure, (above, below) = style.grid_or_new(ax, 2, 1, 7.5, 6.0, share_x=True)
@@ -118,6 +115,10 @@ DIAMOND: dict[str, Any] = {
 """Mark of the design's own values."""
 
 
+@picture(
+    result="From `drillctl.linear.gain_boundary`; others, as the continuum, after the first.",
+    raises="Nothing to draw.",
+)
 def gain_boundary(
     result: GainBoundary | Sequence[GainBoundary],
     ax: Axes | None = None,
@@ -125,25 +126,8 @@ def gain_boundary(
 ) -> Figure:
     """Draw the curve of poles on the imaginary axis and the stable gains it bounds.
 
-    Parameters
-    ----------
-    result : GainBoundary or sequence of GainBoundary
-        From `drillctl.linear.gain_boundary`. The first is coloured by frequency, its region
-        filled; of others, such as the continuum, curve and outline are dashed.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the gains.
-
-    Returns
-    -------
-    Figure
-        Each mode brings a branch; those of high modes are thin.
-
-    Raises
-    ------
-    InputError
-        Nothing to draw.
+    The first result is coloured by frequency, its region filled; curves of others are dashed.
+    Each mode adds a branch; those of high modes are thin.
     """
     boundaries = listed(result)
     first = boundaries[0]
@@ -246,29 +230,13 @@ TELLING = 0.02
 """A track is looked at if it goes this far from the imaginary axis, over the farthest."""
 
 
+@picture(result="From `drillctl.linear.root_locus`.", raises="No poles to draw.")
 def root_locus(result: RootLocus, ax: Axes | None = None, system: units.System = "si") -> Figure:
     """Draw the tracks of the poles, upper half of the plane.
 
-    Parameters
-    ----------
-    result : RootLocus
-        From `drillctl.linear.root_locus`.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the parameter.
-
-    Returns
-    -------
-    Figure
-        Real part in 1/s, frequency in Hz. Tracks that hug the imaginary axis, high modes of
-        an undamped string, are left out of the window and counted below it. Poles right of
-        the axis grow; numbers beside it are the parameter's values where a track crosses.
-
-    Raises
-    ------
-    InputError
-        No poles to draw.
+    Real part in 1/s, frequency in Hz. Tracks that hug the imaginary axis, high modes of an
+    undamped string, are left out of the window and counted below it. Poles right of the axis grow;
+    numbers beside it are the parameter's values where a track crosses.
     """
     tracks = mirrored(result.poles)
     if not np.isfinite(tracks.real).any():

@@ -18,7 +18,7 @@ from drillctl.errors import InputError, nearest
 from drillctl.linear.boundary import GainBoundary
 from drillctl.plots import style
 from drillctl.plots.loop_gains import DIAMOND, GAINS, rings_of, shown_gains
-from drillctl.plots.style import beyond, colours, legend_under, plain_ticks, plane
+from drillctl.plots.style import beyond, colours, legend_under, picture, plain_ticks, plane
 
 if TYPE_CHECKING:
     from drillctl.studies.loop_mapping.compute import LoopMap
@@ -50,6 +50,12 @@ class _Look:
     levels: tuple[float, ...]
 
 
+@picture(
+    result="Over two parameters.",
+    quantity="One of `drillctl.studies.loop_mapping.compute.QUANTITIES` that was mapped.",
+    boundary="Outline of the stable gains, drawn over a map of both gains.",
+    raises="Not two parameters, a quantity that was not mapped, or a boundary of other parameters.",
+)
 def loop_map(
     result: LoopMap,
     quantity: str = "slope_margin",
@@ -59,31 +65,8 @@ def loop_map(
 ) -> Figure:
     """Draw one figure of the loop over two parameters.
 
-    Parameters
-    ----------
-    result : LoopMap
-        Over two parameters.
-    quantity : str
-        What of it: one of `drillctl.studies.loop_mapping.compute.QUANTITIES` that was mapped.
-    ax : Axes, optional
-        Axes to draw on.
-    boundary : GainBoundary, optional
-        Outline of the stable gains, drawn over a map of both gains.
-    system : {'si', 'field'}
-        Units of the axes.
-
-    Returns
-    -------
-    Figure
-        The heavy line is the boundary of local stability, where the rock's slope equals the
-        margin. Colours stop at limits that leave the stable cells legible; cells without a
-        value are grey.
-
-    Raises
-    ------
-    InputError
-        Another number of parameters than two, a quantity that was not mapped, or a boundary
-        over parameters that are not the gains.
+    The heavy line is the boundary of local stability, where the rock's slope equals the margin.
+    Colours stop at limits that leave the stable cells legible; cells without a value are grey.
     """
     if quantity not in result.values:
         raise InputError(f"no {quantity!r} in this map; {nearest(quantity, result.values)}")

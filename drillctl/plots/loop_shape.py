@@ -36,6 +36,7 @@ from drillctl.linear.response import FrequencyResponse, frequency_response
 from drillctl.plots import style
 from drillctl.plots.loop_gains import GREY
 from drillctl.plots.modes import hertz
+from drillctl.plots.style import picture
 
 Array = NDArray[np.floating[Any]]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
@@ -49,32 +50,23 @@ PEAKS = (1.4, 2.0, 4.0)  # magnitudes of the sensitivity drawn as curves on the 
 APART = 0.2  # least distance in the plane of L between two frequencies that are written beside it
 LOW = 10.0  # the curve is heavy up to this many times the frequency at which it is nearest to -1
 SHOWN_HZ = (0.01, 5.0)  # frequencies (Hz) within the picture of the sensitivities
+OF_LOOP = {
+    "result": "Of the open loop, slope of the rock included; see the head of this module.",
+    "raises": "Not an open loop, one that does not react, or one that is not that of the analysis.",
+}
 
 
+@picture(
+    **OF_LOOP,
+    analysis="Of the same loop: gives the disk of its margin and the number of unstable poles.",
+)
 def nyquist(
     result: FrequencyResponse, ax: Axes | None = None, analysis: LoopAnalysis | None = None
 ) -> Figure:
     """Draw the Nyquist curve of the loop about -1, true to scale.
 
-    Parameters
-    ----------
-    result : FrequencyResponse
-        Of the open loop, slope of the rock included; see the head of this module.
-    ax : Axes, optional
-        Axes to draw on.
-    analysis : LoopAnalysis, optional
-        Of the same loop: gives the disk of its margin and the number of unstable poles.
-
-    Returns
-    -------
-    Figure
-        Frequency rises along the arrows. What lies outside is told below the picture. How
-        often L turns about -1 is told where curve and poles agree on it.
-
-    Raises
-    ------
-    InputError
-        Not an open loop, one that does not react, or one that is not that of the analysis.
+    Frequency rises along the arrows. A note below the picture says what lies outside, and how
+    often L turns about -1 where curve and poles agree on it.
     """
     loop = _loop(result, analysis)
     figure, ax = style.axes_or_new(ax, 8.0, 6.2)
@@ -107,30 +99,14 @@ def nyquist(
     return figure
 
 
+@picture(**OF_LOOP, analysis="Of the same loop: gives the disk of its margin.")
 def nichols(
     result: FrequencyResponse, ax: Axes | None = None, analysis: LoopAnalysis | None = None
 ) -> Figure:
     """Draw magnitude against phase of the loop, with curves of constant sensitivity.
 
-    Parameters
-    ----------
-    result : FrequencyResponse
-        Of the open loop, slope of the rock included; see the head of this module.
-    ax : Axes, optional
-        Axes to draw on.
-    analysis : LoopAnalysis, optional
-        Of the same loop: gives the disk of its margin.
-
-    Returns
-    -------
-    Figure
-        Phase from -360 to 0 degrees, so that -1 is in the middle; what leaves on one side
-        comes back on the other.
-
-    Raises
-    ------
-    InputError
-        Not an open loop, one that does not react, or one that is not that of the analysis.
+    Phase from -360 to 0 degrees, so that -1 is in the middle; what leaves on one side comes back
+    on the other.
     """
     loop = _loop(result, analysis)
     figure, ax = style.axes_or_new(ax, 8.5, 5.4)
@@ -160,29 +136,16 @@ def nichols(
     return figure
 
 
+@picture(
+    **OF_LOOP,
+    analysis="Of the same loop: gives the peak to full digits; by default that of the curve.",
+)
 def sensitivity(
     result: FrequencyResponse, ax: Axes | None = None, analysis: LoopAnalysis | None = None
 ) -> Figure:
     """Draw sensitivity S = 1/(1 + L) and its complement T = L/(1 + L) over frequency.
 
-    Parameters
-    ----------
-    result : FrequencyResponse
-        Of the open loop, slope of the rock included; see the head of this module.
-    ax : Axes, optional
-        Axes to draw on.
-    analysis : LoopAnalysis, optional
-        Of the same loop: gives the peak to full digits; by default that of the curve.
-
-    Returns
-    -------
-    Figure
-        The highest peak of S is marked, with its frequency.
-
-    Raises
-    ------
-    InputError
-        Not an open loop, one that does not react, or one that is not that of the analysis.
+    The highest peak of S is marked, with its frequency.
     """
     loop = _loop(result, analysis)
     figure, ax = style.axes_or_new(ax, 7.5, 4.6)

@@ -22,6 +22,7 @@ from drillctl.plots.style import (
     BLACK,
     BLUE,
     LINE,
+    OVER_TWO,
     SMALL,
     VERMILLION,
     axes_or_new,
@@ -29,11 +30,12 @@ from drillctl.plots.style import (
     dress,
     legend_under,
     origin_of,
+    picture,
     plane,
     title_of,
 )
 from drillctl.simulation.measures import STATUSES
-from drillctl.studies.doctor.scheme import PROMISES, ROUNDING, SMALLEST
+from drillctl.simulation.scheme import PROMISES, ROUNDING, SMALLEST
 
 if TYPE_CHECKING:
     from drillctl.studies import Doctor, Sweep
@@ -43,27 +45,11 @@ MOST_COLOURED = 2000
 """Cells along an axis that are coloured: more than a picture has points along it."""
 
 
+@picture(**OVER_TWO)
 def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = "si") -> Figure:
     """J1 over two parameters with its regions.
 
-    Parameters
-    ----------
-    result : Sweep
-        Over two parameters.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the axes.
-
-    Returns
-    -------
-    Figure
-        Colours stop at twice the highest level; failed cells are white with a cross.
-
-    Raises
-    ------
-    InputError
-        The result has another number of parameters than two.
+    Colours stop at twice the highest level; failed cells are white with a cross.
     """
     figure, ax, x, y = plane(result, ax, 6.0, system)
     top = 2.0 * result.levels[-1]
@@ -127,23 +113,9 @@ def _caption(result: Sweep) -> str:
     return f"{origin_of(result)}{table.duration:g} s, {scheme}; {checked}"
 
 
+@picture(result="Over one parameter.", raises="The result has more than one parameter.")
 def sweep_line(result: Sweep, ax: Axes | None = None, system: units.System = "si") -> Figure:
-    """J1 over one parameter, with the levels.
-
-    Parameters
-    ----------
-    result : Sweep
-        Over one parameter.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the axis.
-
-    Raises
-    ------
-    InputError
-        The result has more than one parameter.
-    """
+    """J1 over one parameter, with the levels."""
     if len(result.axes) != 1:
         raise InputError(f"a line shows 1 parameter, the result has {len(result.axes)}")
     figure, ax = axes_or_new(ax)
@@ -166,25 +138,14 @@ def sweep_line(result: Sweep, ax: Axes | None = None, system: units.System = "si
     return figure
 
 
+@picture(
+    result="Of a design that the batch engine takes.",
+    raises="The engine refused the design: there is nothing to draw.",
+)
 def error_estimate(result: Doctor, ax: Axes | None = None) -> Figure:
     """Estimated error of each lane over its J1, beside what the accuracy promises.
 
-    Parameters
-    ----------
-    result : Doctor
-        Of a design that the batch engine takes.
-    ax : Axes, optional
-        Axes to draw on.
-
-    Returns
-    -------
-    Figure
-        Circles are audited differences, on the lanes that were simulated again.
-
-    Raises
-    ------
-    InputError
-        The engine refused the design: there is nothing to draw.
+    Circles are audited differences, on the lanes that were simulated again.
     """
     if not len(result.cells):
         raise InputError("there is no estimate to draw: the batch engine refused this design")
@@ -212,21 +173,12 @@ def error_estimate(result: Doctor, ax: Axes | None = None) -> Figure:
     return figure
 
 
+@picture(result="From `drillctl.regularisation`.", ax="Two panels.")
 def regularisation(result: Regularisation, ax: Sequence[Axes] | None = None) -> Figure:
     """Draw the shift of J1 and the size of the regions against the width of the smoothing.
 
-    Parameters
-    ----------
-    result : Regularisation
-        From `drillctl.regularisation`.
-    ax : sequence of Axes, optional
-        Two panels.
-
-    Returns
-    -------
-    Figure
-        Left: median, 95th percentile and worst relative change of J1 over the cells. Right:
-        cells at or under each level over those of the set-valued map.
+    Left: median, 95th percentile and worst relative change of J1 over the cells. Right: cells at
+    or under each level over those of the set-valued map.
     """
     figure, (left, right) = style.grid_or_new(ax, 1, 2, 10.5, 4.6)
     size = np.abs(result.shifts)

@@ -27,28 +27,21 @@ from drillctl.errors import InputError
 from drillctl.linear.modal import Mode, Modes
 from drillctl.linear.response import FrequencyResponse
 from drillctl.plots import style
+from drillctl.plots.style import picture
 
 SHOWN = 4  # modes drawn of each boundary condition: more cannot be told apart
 
 
+@picture(
+    result="From `drillctl.modes`.",
+    ax="Four panels: angle and torque with the top free, then with the top held.",
+)
 def mode_shapes(
     result: Modes, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
     """Draw angle and torque of the lowest modes along the string, depth downward.
 
-    Parameters
-    ----------
-    result : Modes
-        From `drillctl.modes`.
-    ax : sequence of Axes, optional
-        Four panels: angle and torque with the top free, then with the top held.
-    system : {'si', 'field'}
-        Units of depth.
-
-    Returns
-    -------
-    Figure
-        A lumped string, which has no length, is drawn over its node numbers.
+    A lumped string, which has no length, is drawn over its node numbers.
     """
     figure, panels = style.grid_or_new(ax, 2, 2, 8.5, 8.0, share_y=True)
     place, label = _places(result, system)
@@ -110,30 +103,19 @@ ENDS = (("bit", "bit_torque", "bit_speed"), ("top", "top_torque", "top_speed"))
 """Name, input and output of each end."""
 
 
+@picture(
+    results="From `drillctl.linear.frequency_response`; told apart by their `title`.",
+    ax="A panel for the bit, and one for the top if a result has the top torque as an input.",
+    raises="Nothing to draw, a result without mobility at the bit, not as many axes as panels.",
+)
 def mobility(
     results: FrequencyResponse | Sequence[FrequencyResponse], ax: Sequence[Axes] | None = None
 ) -> Figure:
     """Draw the magnitude of the mobility at bit and top.
 
-    Parameters
-    ----------
-    results : FrequencyResponse or sequence of FrequencyResponse
-        From `drillctl.linear.frequency_response`: the string alone (`plant`), with its drive
-        (`closed_loop`), of elements or of the continuum; told apart by their `title`.
-    ax : sequence of Axes, optional
-        A panel for the bit and one for the top; the latter only where a result has the top
-        torque among its inputs, which a string with its drive has not.
-
-    Returns
-    -------
-    Figure
-        In rpm per kN m. High peaks at the bit are where the rock's falling slope feeds the
-        string; those of an undamped string end where the nearest frequency lies.
-
-    Raises
-    ------
-    InputError
-        Nothing to draw, a result without mobility at the bit, not as many axes as panels.
+    In rpm per kN m, of the string alone (`plant`) or with its drive (`closed_loop`, which has no
+    top torque among its inputs). High peaks at the bit are where the rock's falling slope feeds
+    the string; those of an undamped string end where the nearest frequency lies.
     """
     given = listed(results)
     for one in given:
@@ -178,6 +160,13 @@ WIDTHS = (2.8, 1.6, 1.1, 0.8)
 """Widths (points) of one response after another, so that equal ones show through."""
 
 
+@picture(
+    result="From `drillctl.linear.frequency_response`; several are told apart by their `title`.",
+    ax="Two panels: magnitude and phase.",
+    source="Input; by default the first input of each result.",
+    targets="Outputs; by default top and bit speed.",
+    raises="No such signal, nothing to draw, or responses of different units.",
+)
 def bode(
     result: FrequencyResponse | Sequence[FrequencyResponse],
     ax: Sequence[Axes] | None = None,
@@ -186,28 +175,8 @@ def bode(
 ) -> Figure:
     """Draw magnitude and phase of the response of some signals to one other.
 
-    Parameters
-    ----------
-    result : FrequencyResponse or sequence of FrequencyResponse
-        From `drillctl.linear.frequency_response`: one, or several to be compared, such as
-        finite elements and continuum. Those compared are told apart by their `title`.
-    ax : sequence of Axes, optional
-        Two panels: magnitude and phase.
-    source : str, optional
-        Input; by default the first input of each result.
-    targets : sequence of str, optional
-        Outputs; by default top and bit speed.
-
-    Returns
-    -------
-    Figure
-        Magnitude in dB of the unit named; phase between -180 and 180 degrees. The peaks of
-        an undamped string are infinite: as drawn they end where the nearest frequency lies.
-
-    Raises
-    ------
-    InputError
-        No such signal, nothing to draw, or responses of different units.
+    Magnitude in dB of the unit named; phase between -180 and 180 degrees. The peaks of an undamped
+    string are infinite: as drawn they end where the nearest frequency lies.
     """
     results = listed(result)
     names = TARGETS if targets is None else tuple(targets)

@@ -22,6 +22,7 @@ from drillctl.plots.style import (
     axes_or_new,
     dress,
     grid_or_new,
+    picture,
 )
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from drillctl.simulation.limit_cycle import LimitCycle
 
 
+@picture(paths="Parameters named in the title of each panel; by default the numbers of the drive.")
 def time_response(
     results: Simulation | Sequence[Simulation],
     ax: Axes | Sequence[Axes] | None = None,
@@ -94,21 +96,12 @@ def _named(run: Simulation, path: str) -> str:
     return f"{NAMES.get(path, path.rpartition('.')[2])} {value:g} {unit}".rstrip()
 
 
+@picture(result="Orbit, harmonic prediction and simulation; what there is none of is left out.")
 def limit_cycle(result: LimitCycle, ax: Axes | None = None) -> Figure:
     """Bit speed over one cycle, from the moment it rises through its mean.
 
-    Parameters
-    ----------
-    result : LimitCycle
-        Orbit, harmonic prediction and simulation; what there is none of is left out.
-    ax : Axes, optional
-        Axes to draw on.
-
-    Returns
-    -------
-    Figure
-        Speeds in rpm. The orbit grey below the last simulated cycle, which hides it where they
-        agree; an orbit's harmonic prediction is drawn over the same time.
+    Speeds in rpm. The orbit grey below the last simulated cycle, which hides it where they agree;
+    an orbit's harmonic prediction is drawn over the same time.
     """
     figure, axes = axes_or_new(ax, 7.0, 4.2)
     run, orbit, cycle = result.simulated, result.orbit, result.predicted

@@ -11,7 +11,16 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from drillctl import units
-from drillctl.plots.style import BLACK, BLUE, SMALL, VERMILLION, legend_under, plane
+from drillctl.plots.style import (
+    BLACK,
+    BLUE,
+    OVER_TWO,
+    SMALL,
+    VERMILLION,
+    legend_under,
+    picture,
+    plane,
+)
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -33,29 +42,13 @@ _MARKS = {
 """Symbol, colour and legend of the cells at which the regions differ."""
 
 
+@picture(**OVER_TWO)
 def three_regions(
     result: ThreeRegions, ax: Axes | None = None, system: units.System = "si"
 ) -> Figure:
     """Local stability, J1 and attraction over two parameters, cell by cell.
 
-    Parameters
-    ----------
-    result : ThreeRegions
-        Over two parameters.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the axes.
-
-    Returns
-    -------
-    Figure
-        Every cell is a rectangle, so that what is counted in the caption is what is seen.
-
-    Raises
-    ------
-    InputError
-        The result has another number of parameters than two.
+    Every cell is a rectangle, so that what is counted in the caption is what is seen.
     """
     figure, ax, x, y = plane(result, ax, 7.2, system, "regions are shown over")
     handles = [

@@ -7,8 +7,10 @@ The plane of two parameters that maps are drawn on, and what all pictures of a d
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+import inspect
+import re
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,11 +24,11 @@ from drillctl import units
 from drillctl.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from matplotlib.artist import Artist
 
     from drillctl.studies import Axis
+
+Drawing = TypeVar("Drawing", bound=Callable[..., Figure])
 
 BLACK = "#000000"
 BLUE = "#0072B2"
@@ -47,6 +49,45 @@ SMALL = 9.0  # size of tick labels and legends (points)
 LINE = 1.6  # width of a curve (points)
 GRID = "#DDDDDD"
 """Colour of grid and zero lines."""
+
+USUAL = {
+    "ax": "Axes to draw on; by default those of a new figure.",
+    "system": "Units of axes and labels.",
+}
+"""Parameters that most pictures have; any other is what is drawn, unless it is described."""
+OVER_TWO = {
+    "result": "Over two parameters.",
+    "raises": "The result has another number of parameters than two.",
+}
+_TYPES = (
+    (r"units\.System", "{'si', 'field'}"), (r" \| None", ""), (r" \| ", " or "),
+    (r"Sequence\[(\w+)\]", r"sequence of \1"), (r"Mapping\[(\w+), (\w+)\]", r"mapping of \1 to \2"),
+)  # fmt: skip
+
+
+def picture(raises: str = "", **about: str) -> Callable[[Drawing], Drawing]:
+    """Add to the docstring of a picture its parameters, the figure, and what it refuses.
+
+    `about` describes parameters by name, where their type and `USUAL` do not say enough.
+    """
+
+    def completed(draw: Drawing) -> Drawing:
+        lines = [inspect.cleandoc(draw.__doc__ or ""), "", "Parameters", "----------"]
+        for name, one in inspect.signature(draw).parameters.items():
+            kind = str(one.annotation) + ", optional" * (one.default in (None, ()))
+            for pattern, words in _TYPES:
+                kind = re.sub(pattern, words, kind)
+            lines += [
+                f"{name} : {kind}",
+                f"    {about.get(name) or USUAL.get(name, 'What to draw.')}",
+            ]
+        lines += ["", "Returns", "-------", "Figure", "    The picture, not shown."]
+        if raises:
+            lines += ["", "Raises", "------", "InputError", f"    {raises}"]
+        draw.__doc__ = "\n".join(lines)
+        return draw
+
+    return completed
 
 
 def figure(width: float = 7.0, height: float = 4.5) -> Figure:

@@ -27,6 +27,7 @@ from drillctl.plots.style import (
     grid_or_new,
     legend_under,
     origin_of,
+    picture,
     title_of,
 )
 
@@ -38,20 +39,11 @@ ROW = 0.42  # height of a row (inches)
 WIDEST = 120  # longest line of a caption (characters)
 
 
+@picture(ax="Two panels.")
 def tune_baselines(result: Tune, ax: Sequence[Axes] | None = None) -> Figure:
     """Quantiles of J1 and the probability of the level, a row the tuned gains and each baseline.
 
-    Parameters
-    ----------
-    result : Tune
-        Any.
-    ax : sequence of Axes, optional
-        Two panels to draw on.
-
-    Returns
-    -------
-    Figure
-        Baselines that do not apply are left out.
+    Baselines that do not apply are left out.
     """
     rows: dict[str, FreshRuns] = {"tuned": result.certificate.runs}
     rows |= {one.name: one.runs for one in result.baselines if one.runs is not None}
@@ -97,23 +89,12 @@ def _spread(ax: Axes, place: int, runs: FreshRuns, colour: str) -> None:
 WIDEST_NEIGHBOURHOOD = 105  # longest line of a caption (characters)
 
 
+@picture(result="Over any number of parameters; the others stay at the optimum.")
 def tune_neighbourhood(result: Tune, ax: Axes | None = None, system: units.System = "si") -> Figure:
     """Probability of the level over the first two tuned parameters, or the only one.
 
-    Parameters
-    ----------
-    result : Tune
-        Over any number of parameters; the others stay at the optimum.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the axes.
-
-    Returns
-    -------
-    Figure
-        The contour is that of the required probability; bars are how far each parameter may
-        drift alone, an arrow where the bound of the search ends it.
+    The contour is that of the required probability; bars are how far each parameter may drift
+    alone, an arrow where the bound of the search ends it.
     """
     figure, ax = axes_or_new(ax, 8.0, 6.0)
     about = result.certificate.neighbourhood

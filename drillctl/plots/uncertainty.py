@@ -26,12 +26,14 @@ from drillctl.plots.style import (
     DASHES,
     LINE,
     NAMES,
+    OVER_TWO,
     SMALL,
     VERMILLION,
     axes_or_new,
     axis_label,
     dress,
     grid_or_new,
+    picture,
     title_of,
 )
 
@@ -44,16 +46,9 @@ if TYPE_CHECKING:
 BEST = ("mean", "q95")  # objectives whose best cells are shown unless others are chosen
 
 
+@picture()
 def area_convergence(result: Uncertainty, ax: Axes | None = None) -> Figure:
-    """Area of the 95 % regions against the number of draws, with its sampling error.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        Any map.
-    ax : Axes, optional
-        Axes to draw on.
-    """
+    """Area of the 95 % regions against the number of draws, with its sampling error."""
     figure, ax = axes_or_new(ax)
     curves = result.convergence
     for k, (level, areas) in enumerate(curves.areas.items()):
@@ -81,25 +76,14 @@ def area_convergence(result: Uncertainty, ax: Axes | None = None) -> Figure:
     return figure
 
 
+@picture(cells="Of the flattened map; by default the best of the design, and those of `BEST`.")
 def cell_distributions(
     result: Uncertainty,
     cells: Sequence[int] | None = None,
     ax: Axes | None = None,
     system: units.System = "si",
 ) -> Figure:
-    """Distribution of J1 over the draws at some cells of the map.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        Any map.
-    cells : sequence of int, optional
-        Of the flattened map; by default the best of the design itself, and those of `BEST`.
-    ax : Axes, optional
-        Axes to draw on.
-    system : {'si', 'field'}
-        Units of the parameters.
-    """
+    """Distribution of J1 over the draws at some cells of the map."""
     figure, ax = axes_or_new(ax)
     named = _named(result) if cells is None else dict.fromkeys(cells, "")
     j1 = result.j1.reshape(result.realizations, -1)
@@ -147,21 +131,9 @@ def _shown(result: Uncertainty, cell: int, path: str, system: units.System) -> s
     return f"{value:g} {label}".rstrip()
 
 
+@picture(result="With indices.", raises="The result has no indices.")
 def sensitivity_bars(result: Uncertainty, ax: Sequence[Axes] | None = None) -> Figure:
-    """First and total Sobol indices with their intervals, a panel a figure that they explain.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        With indices.
-    ax : sequence of Axes, optional
-        Panels to draw on.
-
-    Raises
-    ------
-    InputError
-        The result has no indices.
-    """
+    """First and total Sobol indices with their intervals, a panel a figure that they explain."""
     found = result.sensitivity
     if found is None:
         raise InputError("the result has no Sobol indices: ask for uncertainty.sensitivity")
@@ -211,6 +183,7 @@ SHADES = {OUTER: "#D6E6F2", MEDIAN: "#8FBFE0", INNER: BLUE}
 FEW = 20  # realizations up to which the outline of every one is drawn
 
 
+@picture(**OVER_TWO, ax="A panel for each level.")
 def uncertain_regions(
     result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
@@ -218,20 +191,6 @@ def uncertain_regions(
 
     The picture of Monteiro & Trindade (2012), Fig. 6, a panel a level. Up to `FEW` realizations
     are drawn one by one beside the bands.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        Over two parameters.
-    ax : sequence of Axes, optional
-        Panels to draw on, one a level.
-    system : {'si', 'field'}
-        Units of the axes.
-
-    Raises
-    ------
-    InputError
-        The result has another number of parameters than two.
     """
     figure, panels, x, y = _panels(result, ax, system)
     # Between a cell that is known and one that was stopped an outline is not.
@@ -257,25 +216,11 @@ def uncertain_regions(
     return figure
 
 
+@picture(**OVER_TWO, ax="A panel for each level.")
 def probability_map(
     result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
-    """Probability that J1 keeps to each level, over two parameters.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        Over two parameters.
-    ax : sequence of Axes, optional
-        Panels to draw on, one a level.
-    system : {'si', 'field'}
-        Units of the axes.
-
-    Raises
-    ------
-    InputError
-        The result has another number of parameters than two.
-    """
+    """Probability that J1 keeps to each level, over two parameters."""
     figure, panels, x, y = _panels(result, ax, system)
     share = Normalize(0.0, 1.0)
     scale = ScalarMappable(share, "cividis")
@@ -298,6 +243,7 @@ def probability_map(
     return figure
 
 
+@picture(**OVER_TWO, ax="A panel for each level.")
 def region_error(
     result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
@@ -305,20 +251,6 @@ def region_error(
 
     Cells whose probability is at least 95 %, or is not, by intervals that hold in all cells at
     once with 95 %; and those of which neither can be said.
-
-    Parameters
-    ----------
-    result : Uncertainty
-        Over two parameters.
-    ax : sequence of Axes, optional
-        Panels to draw on, one a level.
-    system : {'si', 'field'}
-        Units of the axes.
-
-    Raises
-    ------
-    InputError
-        The result has another number of parameters than two.
     """
     from matplotlib.colors import ListedColormap
 

@@ -15,7 +15,7 @@ import pytest
 import drillctl
 from drillctl.ensemble.grid import axes_of, groups
 from drillctl.simulation.batch import prepare, run_batch
-from drillctl.studies.doctor.scheme import PROMISES
+from drillctl.simulation.scheme import PROMISES
 
 HOLDS = (
     (

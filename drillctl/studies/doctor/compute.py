@@ -26,10 +26,10 @@ from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
+from drillctl.simulation.scheme import PROMISES
 from drillctl.store.labels import label
 from drillctl.store.result import Result
 from drillctl.studies.doctor.scheme import (
-    PROMISES,
     REFINEMENTS,
     ErrorEstimate,
     SchemeReasons,

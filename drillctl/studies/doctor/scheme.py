@@ -25,6 +25,8 @@ from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.propagator import string_step
 from drillctl.simulation.scheme import (
     ACCURACIES,
+    ROUNDING,
+    SMALLEST,
     STEEPEST,
     Scheme,
     _whole_steps,
@@ -167,46 +169,7 @@ Array = NDArray[np.float64]
 REFINEMENTS = (1, 2, 4)  # parts into which the step of the scheme is divided
 ORDER_TWO = 4.0 / 3.0
 """Error of a scheme of order 2 per difference to the same at half the step (Richardson)."""
-SMALLEST = 1e-7
-"""J1 (s) under which errors are taken in parts of this: a rig that never leaves its set speed."""
-ROUNDING = 1e-9  # relative difference of two schemes that may be rounding
 ENOUGH = 8  # lanes from which an order says something
-UNLIKELY = 0.025  # chance of a sample that speaks against a promise
-
-
-@dataclass(frozen=True)
-class Promise:
-    """What a named accuracy promises of the relative error of J1, over the paper's map."""
-
-    # median and 99th percentile; None for no promise
-    median: float | None
-    p99: float
-
-    def kept(self, errors: Array) -> bool:
-        """Whether a sample of errors, shape (lanes,), leaves it standing.
-
-        It does unless so many of them lie over a percentile as chance has in less than one of
-        forty samples of a map that keeps it (binomial, one-sided).
-        """
-        known = errors[np.isfinite(errors)]
-        asked = [(self.p99, 0.01)] + ([] if self.median is None else [(self.median, 0.5)])
-        return known.size > 0 and all(
-            _chance(int((known > bar).sum()), known.size, share) >= UNLIKELY for bar, share in asked
-        )
-
-
-def _chance(over: int, count: int, share: float) -> float:
-    """Chance of so many or more of `count` where each is one with the chance `share`."""
-    from scipy.stats import binom
-
-    return float(binom.sf(over - 1, count, share))
-
-
-PROMISES = {
-    "fast": Promise(1.5e-4, 7e-3),
-    "standard": Promise(5e-5, 2e-3),
-    "fine": Promise(None, 1e-4),
-}
 
 
 @dataclass(frozen=True)
