@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from drillctl.plots.following_weight import advantage_front as advantage_front
     from drillctl.plots.following_weight import advantage_map as advantage_map
     from drillctl.plots.following_weight import weight_delay as weight_delay
-    from drillctl.plots.friction import friction_curves as friction_curves
     from drillctl.plots.loop_gains import drive_impedance as drive_impedance
     from drillctl.plots.loop_gains import gain_boundary as gain_boundary
     from drillctl.plots.loop_gains import root_locus as root_locus
@@ -34,12 +33,13 @@ if TYPE_CHECKING:
     from drillctl.plots.map import regularisation as regularisation
     from drillctl.plots.map import stability_map as stability_map
     from drillctl.plots.map import sweep_line as sweep_line
-    from drillctl.plots.modes import bode as bode
-    from drillctl.plots.modes import mobility as mobility
-    from drillctl.plots.modes import mode_shapes as mode_shapes
+    from drillctl.plots.map import three_regions as three_regions
     from drillctl.plots.over_time import limit_cycle as limit_cycle
     from drillctl.plots.over_time import time_response as time_response
-    from drillctl.plots.regions import three_regions as three_regions
+    from drillctl.plots.plant import bode as bode
+    from drillctl.plots.plant import friction_curves as friction_curves
+    from drillctl.plots.plant import mobility as mobility
+    from drillctl.plots.plant import mode_shapes as mode_shapes
     from drillctl.plots.tune import tune_baselines as tune_baselines
     from drillctl.plots.tune import tune_neighbourhood as tune_neighbourhood
     from drillctl.plots.uncertainty import area_convergence as area_convergence
@@ -64,14 +64,12 @@ _MODULES = {
         "advantage_map",
         "weight_delay",
     ),
-    "friction": ("friction_curves",),
     "loop_gains": ("drive_impedance", "gain_boundary", "root_locus"),
     "loop_maps": ("loop_map",),
     "loop_shape": ("nichols", "nyquist", "sensitivity"),
-    "map": ("error_estimate", "regularisation", "stability_map", "sweep_line"),
-    "modes": ("bode", "mobility", "mode_shapes"),
-    "regions": ("three_regions",),
+    "map": ("error_estimate", "regularisation", "stability_map", "sweep_line", "three_regions"),
     "over_time": ("limit_cycle", "time_response"),
+    "plant": ("bode", "friction_curves", "mobility", "mode_shapes"),
     "tune": ("tune_baselines", "tune_neighbourhood"),
     "uncertainty": (
         "area_convergence",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -19,22 +18,7 @@ from drillctl import units
 from drillctl.design import parameter
 from drillctl.ensemble.cases import mean_interval
 from drillctl.errors import InputError, shown
-from drillctl.plots.style import (
-    BLACK,
-    COLOURS,
-    DASHES,
-    LINE,
-    SMALL,
-    TITLE,
-    axes_or_new,
-    axis_label,
-    dress,
-    grid_or_new,
-    heading,
-    legend_under,
-    origin_of,
-    picture,
-)
+from drillctl.plots import style
 from drillctl.simulation.measures import MEASURES
 
 if TYPE_CHECKING:
@@ -47,7 +31,6 @@ Array = NDArray[np.float64]
 
 UNBEATEN = "unbeaten in both"  # legend of the cases that no other beats
 NO_DRAWS = "Each case at its own values, without draws."
-WIDEST = 110  # longest line of a caption (characters)
 LEVEL_COLOUR = "#888888"
 """Of the levels of J1: in the background, yet legible."""
 OUTLINES = (3.2, 1.7)
@@ -56,13 +39,13 @@ TRACES = (2.0, 1.1)  # line of the first and the last case, likewise
 FILL = 0.10  # how much of its colour fills a region: enough to tell inside from outside
 
 
-@picture()
+@style.picture()
 def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
     """Share of the draws at or under each J1, a curve a case, with the levels marked.
 
     A curve ends below 1 where draws failed: they are under no level.
     """
-    figure, ax = axes_or_new(ax, 7.5, 5.0)
+    figure, ax = style.axes_or_new(ax, 7.5, 5.0)
     for number, case in enumerate(result.cases):
         values = np.sort(case.measures["j1"][~np.isnan(case.measures["j1"])])
         share = np.arange(1, len(values) + 1) / result.realizations
@@ -71,27 +54,27 @@ def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
         )  # fmt: skip
         ax.step(
             np.concatenate([values[:1], values]), np.concatenate([share[:1] * 0.0, share]),
-            where="post",
-            linewidth=LINE, label=label, color=_colour(number),
-            linestyle=DASHES[number % len(DASHES)],
+            where="post", label=label, **style.look(number),
         )  # fmt: skip
     for level in result.levels:
         ax.axvline(level, color=LEVEL_COLOUR, linewidth=0.8, linestyle=":")
         ax.text(
-            level, 1.015, f"{level:g}", color=LEVEL_COLOUR, fontsize=SMALL, ha="center",
+            level, 1.015, f"{level:g}", color=LEVEL_COLOUR, fontsize=style.SMALL, ha="center",
             transform=ax.get_xaxis_transform(),
         )  # fmt: skip
     ax.set_ylim(0.0, 1.0)
     ax.set_xlim(left=0.0)
-    dress(ax, "J1 (s)", "share of draws at or under")
-    title = heading(result, "Distribution of J1 over the draws")
-    ax.set_title(title, fontsize=TITLE, loc="left", pad=18.0)
+    style.dress(ax, "J1 (s)", "share of draws at or under")
+    title = style.heading(result, "Distribution of J1 over the draws")
+    ax.set_title(title, fontsize=style.TITLE, loc="left", pad=18.0)
     _legend_below(ax, len(result.cases))
-    figure.supxlabel(_caption(result, _draws(result), "Grey: levels of J1 (s)."), fontsize=SMALL)
+    figure.supxlabel(
+        _caption(result, _draws(result), "Grey: levels of J1 (s)."), fontsize=style.SMALL
+    )
     return figure
 
 
-@picture(result="Two cases or more.", raises="There is one case only.")
+@style.picture(result="Two cases or more.", raises="There is one case only.")
 def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
     """Difference of each case from the baseline in every measure, with 95 % intervals.
 
@@ -100,7 +83,7 @@ def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
     """
     if len(result.cases) < 2:
         raise InputError("differences are between two cases or more, the result has 1")
-    figure, ax = axes_or_new(ax, 8.0, 6.0)
+    figure, ax = style.axes_or_new(ax, 8.0, 6.0)
     drawn, left_out = _relative(result)
     others = result.cases[1:]
     for number, case in enumerate(others):
@@ -111,21 +94,23 @@ def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
         ax.errorbar(
             points[:, 0], place[known],
             xerr=np.abs(points[:, 1:].T - points[:, 0]), fmt="o", markersize=4.5, capsize=3.0,
-            linewidth=LINE, color=_colour(number + 1), label=case.name,
+            linewidth=style.LINE, color=style.colour(number + 1), label=case.name,
         )  # fmt: skip
-    ax.axvline(0.0, color=BLACK, linewidth=0.8)
+    ax.axvline(0.0, color=style.BLACK, linewidth=0.8)
     ax.set_yticks(range(len(drawn)), [MEASURES[name].label for name in drawn])
     ax.set_ylim(max(len(drawn), 1) - 0.5, -0.5)
-    title = heading(result, f"Mean difference from {result.baseline.name!r} at the same draws")
-    dress(ax, "difference (% of its mean)", "", title)
+    title = style.heading(
+        result, f"Mean difference from {result.baseline.name!r} at the same draws"
+    )
+    style.dress(ax, "difference (% of its mean)", "", title)
     _legend_below(ax, len(others))
     lost = f"Zero or undefined in a case: {', '.join(left_out)}." if left_out else ""
     text = "Mean of the differences draw by draw; bars: 95 % bootstrap intervals of that mean."
-    figure.supxlabel(_caption(result, _draws(result), text, lost), fontsize=SMALL)
+    figure.supxlabel(_caption(result, _draws(result), text, lost), fontsize=style.SMALL)
     return figure
 
 
-@picture()
+@style.picture()
 def j1_against_weight(
     result: Comparison, ax: Axes | None = None, system: units.System = "si"
 ) -> Figure:
@@ -135,7 +120,7 @@ def j1_against_weight(
     define; ringed those that no other beats in both, with the border of what they beat. No rings
     where the weights were made equal.
     """
-    figure, ax = axes_or_new(ax, 7.5, 5.5)
+    figure, ax = style.axes_or_new(ax, 7.5, 5.5)
     shared = _shared(result)
     means = []
     for number, case in enumerate(result.cases):
@@ -143,14 +128,14 @@ def j1_against_weight(
         weight, _ = units.displayed(case.measures["mean_weight_after_start"], "N", system)
         if np.isnan(j1).all():
             continue
-        colour = _colour(number)
+        colour = style.colour(number)
         ax.plot(weight, j1, ".", color=colour, markersize=3.0, alpha=0.35)
         if not shared.any():
             continue
         means.append((float(weight[shared].mean()), float(j1[shared].mean())))
         ax.errorbar(
             *means[-1], xerr=_bar(weight[shared], result.seed), yerr=_bar(j1[shared], result.seed),
-            fmt="osD^v"[number % 5], color=colour, markeredgecolor=BLACK, markersize=9.0,
+            fmt="osD^v"[number % 5], color=colour, markeredgecolor=style.BLACK, markersize=9.0,
             capsize=3.0, label=case.name, zorder=4,
         )  # fmt: skip
     # Of weights made equal only the rest of a search is left: nothing to be better in.
@@ -158,24 +143,24 @@ def j1_against_weight(
     if rings:
         # More weight than one of them is to be had only at the J1 of the next: hence the steps.
         ax.plot(
-            *zip(*_unbeaten(means), strict=True), "o--", drawstyle="steps-pre", color=BLACK,
+            *zip(*_unbeaten(means), strict=True), "o--", drawstyle="steps-pre", color=style.BLACK,
             linewidth=0.9, markersize=17.0, markerfacecolor="none", markeredgewidth=1.2,
             label=UNBEATEN, zorder=3,
         )  # fmt: skip
     _, unit = units.displayed(1.0, "N", system)
     ax.set_ylim(bottom=0.0)
-    title = heading(result, "J1 against mean weight on bit")
-    dress(ax, f"mean WOB after {result.weight_from:g} s ({unit})", "J1 (s)", title)
+    title = style.heading(result, "J1 against mean weight on bit")
+    style.dress(ax, f"mean WOB after {result.weight_from:g} s ({unit})", "J1 (s)", title)
     _legend_below(ax, len(result.cases) + 1)
     count = int(shared.sum())
     which = "the draws" if count == result.realizations else f"the {count} draws defined in all"
     text = f"Large: means over {which} with their 95 % intervals; small: the draws."
     best = "Ringed: no other case has less J1 and more weight on the mean." if rings else ""
-    figure.supxlabel(_caption(result, _draws(result), text, best), fontsize=SMALL)
+    figure.supxlabel(_caption(result, _draws(result), text, best), fontsize=style.SMALL)
     return figure
 
 
-@picture(
+@style.picture(
     result="With at least one case that has a map.",
     level="Level of J1 (s), any; by default the lowest of the comparison.",
     raises="No case has a map, or the level is not a positive number.",
@@ -194,26 +179,31 @@ def compared_regions(
     if not (math.isfinite(level) and level > 0.0):
         raise InputError(f"a level of J1 is a positive number of seconds, got {shown(level)}")
     axes = _axes(result)
-    figure, ax = axes_or_new(ax, 8.0, 6.5)
-    x, x_label = axis_label(axes[0], system)
-    y, y_label = axis_label(axes[1], system)
+    figure, ax = style.axes_or_new(ax, 8.0, 6.5)
+    x, x_label = style.axis_label(axes[0], system)
+    y, y_label = style.axis_label(axes[1], system)
     scales = np.array([units.displayed(1.0, axis.unit, system)[0] for axis in axes])
     widths = np.linspace(*OUTLINES, len(result.cases))
     for number, (case, width) in enumerate(zip(result.cases, widths, strict=True)):
         _outline(ax, case, level, number, float(width), scales)
     ax.plot(
-        *zip(*_places(result, axes, scales), strict=True), "X", color=BLACK, markersize=9.0,
+        *zip(*_places(result, axes, scales), strict=True), "X", color=style.BLACK, markersize=9.0,
         markeredgewidth=2.0, linestyle="", label="where the cases are", zorder=5,
     )  # fmt: skip
     ax.set_xlim(x[0], x[-1])
     ax.set_ylim(y[0], y[-1])
-    dress(ax, x_label, y_label, heading(result, f"Region of J1 at or under {level:g} s, by case"))
+    style.dress(
+        ax,
+        x_label,
+        y_label,
+        style.heading(result, f"Region of J1 at or under {level:g} s, by case"),
+    )
     _legend_below(ax, 2)
-    figure.supxlabel(_caption(result, NO_DRAWS), fontsize=SMALL)
+    figure.supxlabel(_caption(result, NO_DRAWS), fontsize=style.SMALL)
     return figure
 
 
-@picture(ax="Three panels, from the top.", raises="Another number of axes than three.")
+@style.picture(ax="Three panels, from the top.", raises="Another number of axes than three.")
 def compared_responses(
     result: Comparison, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
@@ -221,7 +211,7 @@ def compared_responses(
 
     A panel a signal, a line a case.
     """
-    figure, panels = grid_or_new(ax, 3, 1, 9.0, 8.0, share_x=True)
+    figure, panels = style.grid_or_new(ax, 3, 1, 9.0, 8.0, share_x=True)
     signals = (
         ("bit_speed", "rad/s", "bit speed"), ("weight_on_bit", "N", "WOB"),
         ("top_torque", "N*m", "top torque"),
@@ -233,16 +223,15 @@ def compared_responses(
             run = case.nominal.response
             j1 = "J1 undefined" if run.measures.j1 is None else f"J1 {run.measures.j1:.1f} s"
             panel.plot(
-                run.time, factor * run.signals[name], color=_colour(number),
-                linestyle=DASHES[number % len(DASHES)], linewidth=widths[number],
-                label=f"{case.name} ({j1})",
+                run.time, factor * run.signals[name], label=f"{case.name} ({j1})",
+                **style.look(number, widths[number]),
             )  # fmt: skip
         panel.set_xlim(0.0, float(result.baseline.nominal.response.time[-1]))
-        dress(panel, "time (s)" if panel is panels[-1] else "", f"{words} ({unit})")
-    title = heading(result, "Speed, weight on bit and top torque, by case")
-    panels[0].set_title(title, fontsize=TITLE, loc="left")
-    legend_under(panels[-1], 2, drop=0.22)
-    figure.supxlabel(_caption(result, NO_DRAWS), fontsize=SMALL)
+        style.dress(panel, "time (s)" if panel is panels[-1] else "", f"{words} ({unit})")
+    title = style.heading(result, "Speed, weight on bit and top torque, by case")
+    panels[0].set_title(title, fontsize=style.TITLE, loc="left")
+    style.legend_under(panels[-1], 2, drop=0.22)
+    figure.supxlabel(_caption(result, NO_DRAWS), fontsize=style.SMALL)
     return figure
 
 
@@ -267,12 +256,12 @@ def _percent(
     base = result.baseline.measures[name]
     # Over the pairs alone: the draws that the difference is of.
     paired = base[~np.isnan(base) & ~np.isnan(case.measures[name])]
-    found = result.paired[case.name][name]
+    difference = result.paired[case.name][name]
     mean = abs(float(paired.mean())) if paired.size else 0.0
-    if found.value is None or mean == 0.0:
+    if difference.value is None or mean == 0.0:
         return None
-    low, high = found.interval or (found.value, found.value)
-    return 100 * found.value / mean, 100 * low / mean, 100 * high / mean
+    low, high = difference.interval or (difference.value, difference.value)
+    return 100 * difference.value / mean, 100 * low / mean, 100 * high / mean
 
 
 def _shared(result: Comparison) -> np.ndarray:
@@ -312,15 +301,15 @@ def _outline(
 ) -> None:
     result = case.region(level)
     share = "no map" if result is None else f"{result.area_fraction:.1%} of the cells"
-    colour = _colour(number)
     parts = [] if result is None or result.polygons is None else result.polygons.geoms
     rings = [ring * scales for polygon in parts for ring in _rings(polygon)]
     # An empty region has its entry in the legend too.
     path = Path.make_compound_path(*map(Path, rings)) if rings else Path(np.empty((0, 2)))
     ax.add_patch(
         PathPatch(
-            path, facecolor=to_rgba(colour, FILL), edgecolor=colour, linewidth=width,
-            linestyle=DASHES[number % len(DASHES)], label=f"{case.name} ({share})",
+            path, facecolor=to_rgba(style.colour(number), FILL), edgecolor=style.colour(number),
+            linewidth=width, linestyle=style.look(number)["linestyle"],
+            label=f"{case.name} ({share})",
         )
     )  # fmt: skip
 
@@ -347,16 +336,11 @@ def _places(result: Comparison, axes: tuple[Axis, ...], scales: Array) -> list[t
     return list(dict.fromkeys(places))
 
 
-def _colour(number: int) -> str:
-    """Colour of a case by its place; the same in every picture of a comparison."""
-    return COLOURS[number % len(COLOURS)]
-
-
 def _legend_below(ax: Axes, entries: int) -> None:
     """Legend under the axes, four entries a row, that of the unbeaten after the cases."""
     handles, labels = ax.get_legend_handles_labels()
     last = [h for h, label in zip(handles, labels, strict=True) if label == UNBEATEN]
-    legend_under(ax, min(entries, 4), [h for h in handles if h not in last] + last, drop=0.13)
+    style.legend_under(ax, min(entries, 4), [h for h in handles if h not in last] + last, drop=0.13)
 
 
 def _draws(result: Comparison) -> str:
@@ -367,8 +351,5 @@ def _draws(result: Comparison) -> str:
 
 
 def _caption(result: Comparison, *lines: str) -> str:
-    origin = "String reconstructed. " if origin_of(result) else ""
     equal = "Nominal weights shifted for equal means." if result.equal_mean_weight else ""
-    first, *rest = lines
-    texts = (f"{origin}{first}", equal, *rest)
-    return "\n".join(part for text in texts for part in textwrap.wrap(text, WIDEST))
+    return style.caption(result, lines[0], equal, *lines[1:])

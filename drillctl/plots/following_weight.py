@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -12,23 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.plots.style import (
-    BLACK,
-    BLUE,
-    COLOURS,
-    DASHES,
-    LINE,
-    SMALL,
-    TITLE,
-    VERMILLION,
-    axes_or_new,
-    dress,
-    grid_or_new,
-    heading,
-    legend_under,
-    origin_of,
-    picture,
-)
+from drillctl.plots import style
 
 if TYPE_CHECKING:
     from drillctl.ensemble.cases import Crossing
@@ -38,7 +21,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-WIDEST = 110  # longest line of a caption (characters)
 BAND = 0.18  # how much of its colour fills an interval
 MARKS = "osD^vP"  # of gains and policies, with the colours
 APART = 0.006
@@ -46,7 +28,7 @@ APART = 0.006
 HARM = 0.6  # harm that is shown, over the objective of the constant weight
 
 
-@picture(result="From `drillctl.studies.delay`.", ax="Two panels.")
+@style.picture(result="From `drillctl.studies.delay`.", ax="Two panels.")
 def weight_delay(
     result: WeightDelay, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
@@ -56,58 +38,57 @@ def weight_delay(
     where it turns harmful. Right: shares with Clopper-Pearson bars. The axis of the delay is a
     square root, since delays are denser at its short end.
     """
-    figure, (left, right) = grid_or_new(ax, 1, 2, 12.5, 5.6)
+    figure, (left, right) = style.grid_or_new(ax, 1, 2, 12.5, 5.6)
     longest = float(result.delays[-1])
+    constant, level = result.baseline, result.baseline.j1.value
     moving = [i for i, gain in enumerate(result.gains) if gain > 0.0]
     for number, i in enumerate(moving):
         label = _label(result, i, system)
         _j1_line(left, result.delays, result.benefits[i], number, label)
         _share_line(right, result.delays, result.benefits[i], number, number - len(moving) / 2)
-        _harm(left, result, result.limits[i].harmful_from, number)
-    constant = result.baseline
-    level = constant.j1.value
+        harmful = result.limits[i].harmful_from
+        _cross(left, harmful, level, longest, style.colour(number))
     if level is not None:
         low, high = constant.j1.interval or (level, level)
-        left.axhspan(low, high, color=BLACK, alpha=0.12, linewidth=0.0)
-        left.axhline(level, color=BLACK, linewidth=LINE, label="constant weight")
-    right.axhline(constant.ended.value, color=BLACK, linewidth=LINE)
-    right.axhline(result.enough, color=BLACK, linewidth=0.8, linestyle=":")
+        left.axhspan(low, high, color=style.BLACK, alpha=0.12, linewidth=0.0)
+        left.axhline(level, color=style.BLACK, linewidth=style.LINE, label="constant weight")
+    right.axhline(constant.ended.value, color=style.BLACK, linewidth=style.LINE)
+    right.axhline(result.enough, color=style.BLACK, linewidth=0.8, linestyle=":")
     right.annotate(
         f"{result.enough:.0%}", (1.0, result.enough), xycoords=("axes fraction", "data"),
-        xytext=(3.0, 0.0), textcoords="offset points", va="center", fontsize=SMALL,
+        xytext=(3.0, 0.0), textcoords="offset points", va="center", fontsize=style.SMALL,
     )  # fmt: skip
     left.set_ylim(bottom=0.0)
     right.set_ylim(-0.03, 1.03)
     for panel in (left, right):
         _delay_axis(panel, longest)
     over = "total delay of the bit speed (s)"
-    dress(left, over, "J1 (s), mean over the draws", "Speed error of the bit")
-    dress(right, over, "share of the draws", "Stick-slip ended")
-    legend_under(left, 2, drop=0.13)
+    style.dress(left, over, "J1 (s), mean over the draws", "Speed error of the bit")
+    style.dress(right, over, "share of the draws", "Stick-slip ended")
+    style.legend_under(left, 2, drop=0.13)
     if ax is None:
-        title = heading(result, "Weight on bit that follows the bit speed, against its delay")
-        figure.suptitle(title, fontsize=TITLE, x=0.01, ha="left")
+        title = style.heading(result, "Weight on bit that follows the bit speed, against its delay")
+        figure.suptitle(title, fontsize=style.TITLE, x=0.01, ha="left")
         text = (
             f"{result.realizations} draws of {', '.join(result.drawn)}, the same everywhere (seed "
             f"{result.seed}). Bands and bars: 95 % intervals of the mean (bootstrap) and of the "
             "probability (Clopper-Pearson). Crosses: from here on the mean of J1 is not less than "
             "with a constant weight. Black: constant weight."
         )
-        figure.supxlabel(_caption(result, text), fontsize=SMALL)
+        figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
     return figure
 
 
 def _j1_line(
     ax: Axes, delays: Array, benefits: Sequence[DelayedBenefit], number: int, label: str
 ) -> None:
-    colour = COLOURS[number % len(COLOURS)]
     mean = np.array([one.j1.value for one in benefits], dtype=float)
     ends = np.array([one.j1.ends for one in benefits], dtype=float)
-    ax.fill_between(delays, ends[:, 0], ends[:, 1], color=colour, alpha=BAND, linewidth=0.0)
-    ax.plot(
-        delays, mean, MARKS[number % len(MARKS)], color=colour, markersize=4.0, linewidth=LINE,
-        linestyle=DASHES[number % len(DASHES)], label=label,
-    )  # fmt: skip
+    ax.fill_between(
+        delays, ends[:, 0], ends[:, 1], color=style.colour(number), alpha=BAND, linewidth=0.0
+    )
+    mark = MARKS[number % len(MARKS)]
+    ax.plot(delays, mean, mark, markersize=4.0, label=label, **style.look(number))
 
 
 def _share_line(
@@ -120,23 +101,19 @@ def _share_line(
     where = np.square(_root(delays) + (place + 0.5) * APART * np.sqrt(delays[-1]))
     ax.errorbar(
         where, shares, yerr=bars, fmt=MARKS[number % len(MARKS)], capsize=2.5, markersize=4.0,
-        color=COLOURS[number % len(COLOURS)], linewidth=LINE, elinewidth=1.0,
-        linestyle=DASHES[number % len(DASHES)],
+        elinewidth=1.0, **style.look(number),
     )  # fmt: skip
 
 
-def _harm(ax: Axes, result: WeightDelay, found: Crossing, number: int) -> None:
-    """A cross on the level of the constant weight, and the interval of its place."""
-    level = result.baseline.j1.value
-    if found.at is None or level is None:
+def _cross(ax: Axes, crossing: Crossing, level: float | None, longest: float, colour: str) -> None:
+    """A cross where a line meets a level, and the interval of that place."""
+    if crossing.at is None or level is None:
         return
-    longest = float(result.delays[-1])
-    low, high = found.interval
-    ends = [found.at - (low or 0.0), (longest if high is None else high) - found.at]
+    ends = [longest if end is None else end for end in crossing.interval]
     ax.errorbar(
-        [found.at], [level], xerr=np.maximum(np.array(ends)[:, None], 0.0), fmt="X",
-        markersize=8.0, markeredgecolor=BLACK, markeredgewidth=0.8, capsize=4.0, zorder=6,
-        color=COLOURS[number % len(COLOURS)], elinewidth=2.0,
+        [crossing.at], [level], xerr=np.abs(np.array(ends)[:, None] - crossing.at), fmt="X",
+        markersize=8.0, markeredgecolor=style.BLACK, markeredgewidth=0.8, capsize=4.0, zorder=6,
+        color=colour, elinewidth=2.0,
     )  # fmt: skip
 
 
@@ -158,14 +135,14 @@ def _root(values: Array) -> Array:
 
 def _label(result: WeightDelay, number: int, system: units.System) -> str:
     gain, unit = units.displayed(float(result.gains[number]), "N", system)
-    found = result.limits[number].harmful_from
+    crossing = result.limits[number].harmful_from
     limit = f"not harmful up to {result.delays[-1]:g} s"
-    if found.at is not None:
-        limit = f"harmful from {found.at:.2f} s"
+    if crossing.at is not None:
+        limit = f"harmful from {crossing.at:.2f} s"
     return f"{gain:g} {unit} s/rad, {limit}"
 
 
-@picture(result="From `drillctl.advantage`.")
+@style.picture(result="From `drillctl.advantage`.")
 def advantage_front(
     result: Advantage, ax: Axes | None = None, system: units.System = "si"
 ) -> Figure:
@@ -173,7 +150,7 @@ def advantage_front(
 
     Each point is a nominal weight with gains tuned for it; bars are 95 % intervals.
     """
-    figure, axes = axes_or_new(ax, 7.5, 5.2)
+    figure, axes = style.axes_or_new(ax, 7.5, 5.2)
     factor, unit = units.displayed(1.0, "N", system)
     front = result.front.figures
     for k, name in enumerate(result.front.policies):
@@ -181,20 +158,21 @@ def advantage_front(
         value = front["objective"][k, :, 0]
         ends = np.stack([front[f"objective_{end}"][k, :, 0] for end in ("low", "high")])
         axes.errorbar(
-            weight, value, yerr=np.abs(ends - value), fmt=MARKS[k % 3], color=COLOURS[k],
-            linestyle=DASHES[k], linewidth=LINE, markersize=5.0, capsize=3.0, label=name,
+            weight, value, yerr=np.abs(ends - value), fmt=MARKS[k % 3], markersize=5.0,
+            capsize=3.0, label=name, **style.look(k),
         )  # fmt: skip
     axes.set_ylim(bottom=0.0)
     speed, rpm = units.displayed(float(result.front.speeds[0]), "rad/s", system)
-    dress(axes, f"mean weight on bit after the start ({unit})", f"{result.objective} (s)",
-          heading(result, f"Robust J1 against mean weight on bit, at {speed:g} {rpm}"))  # fmt: skip
-    axes.legend(fontsize=SMALL, frameon=False)
+    title = style.heading(result, f"Robust J1 against mean weight on bit, at {speed:g} {rpm}")
+    across = f"mean weight on bit after the start ({unit})"
+    style.dress(axes, across, f"{result.objective} (s)", title)
+    axes.legend(fontsize=style.SMALL, frameon=False)
     if ax is None:
-        figure.supxlabel(_draws(result), fontsize=SMALL)
+        figure.supxlabel(_draws(result), fontsize=style.SMALL)
     return figure
 
 
-@picture(result="From `drillctl.advantage`.", ax="Two panels.")
+@style.picture(result="From `drillctl.advantage`.", ax="Two panels.")
 def advantage_map(
     result: Advantage, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
@@ -203,7 +181,7 @@ def advantage_map(
     Objective of the constant weight less that of the one that follows, each tuned in each cell; a
     cross where the 95 % interval holds zero.
     """
-    figure, panels = grid_or_new(ax, 1, 2, 12.0, 5.2)
+    figure, panels = style.grid_or_new(ax, 1, 2, 12.0, 5.2)
     factor, unit = units.displayed(1.0, "N", system)
     turning, rpm = units.displayed(1.0, "rad/s", system)
     values = result.chart.figures["advantage"][1:]
@@ -220,9 +198,9 @@ def advantage_map(
             value = values[k - 1][i, j]
             mark = "" if not np.isfinite(value) else f"{value:.1f}" + "×" * int(doubtful[i, j])
             dark = abs(value) > 0.6 * most
-            axes.annotate(mark, place, ha="center", va="center", fontsize=SMALL,
-                          color="white" if dark else BLACK)  # fmt: skip
-        dress(axes, f"set speed ({rpm})", f"nominal weight on bit ({unit})",
+            axes.annotate(mark, place, ha="center", va="center", fontsize=style.SMALL,
+                          color="white" if dark else style.BLACK)  # fmt: skip
+        style.dress(axes, f"set speed ({rpm})", f"nominal weight on bit ({unit})",
               result.chart.policies[k])  # fmt: skip
         axes.grid(visible=False)
         axes.set_xticks(result.chart.speeds * turning)
@@ -230,86 +208,82 @@ def advantage_map(
         for formatted in (axes.xaxis, axes.yaxis):
             formatted.set_major_formatter("{x:.4g}")
     if mesh is not None:
-        bar = figure.colorbar(mesh, ax=panels)
-        bar.set_label(f"advantage in the {result.objective} (s)", fontsize=SMALL)
+        style.colour_bar(figure, mesh, panels, f"advantage in the {result.objective} (s)")
     if ax is None:
-        title = heading(result, "J1 that a weight which follows the bit speed saves")
-        figure.suptitle(title, fontsize=TITLE, x=0.01, ha="left")
+        title = style.heading(result, "J1 saved by a weight that follows the bit speed")
+        figure.suptitle(title, fontsize=style.TITLE, x=0.01, ha="left")
         more = "Positive: the weight that follows is better. ×: the 95 % interval holds zero."
-        figure.supxlabel(_draws(result, more), fontsize=SMALL)
+        figure.supxlabel(_draws(result, more), fontsize=style.SMALL)
     return figure
 
 
-@picture(result="From `drillctl.advantage`.")
+@style.picture(result="From `drillctl.advantage`.")
 def advantage_delay(result: Advantage, ax: Axes | None = None) -> Figure:
     """Draw the advantage against the delay of the path, with kept gains and gains tuned anew.
 
     Bands are 95 % intervals; a cross with a bar where the advantage of kept gains vanishes and
     where that of gains tuned anew is no longer material.
     """
-    figure, axes = axes_or_new(ax, 8.0, 5.2)
-    found, share = result.delay, result.design.tables.advantage.material
+    figure, axes = style.axes_or_new(ax, 8.0, 5.2)
+    study, share = result.delay, result.design.tables.advantage.material
     lines: tuple[tuple[str, DelayLine, Crossing, float, str], ...] = (
-        ("gains of the ideal path", found.kept, found.kept.zero, 0.0, VERMILLION),
-        ("gains tuned at each delay", found.anew, found.anew.material,
-         share * found.constant, BLUE),
+        ("gains of the ideal path", study.kept, study.kept.zero, 0.0, style.VERMILLION),
+        ("gains tuned at each delay", study.anew, study.anew.material,
+         share * study.constant, style.BLUE),
     )  # fmt: skip
     for number, (name, line, crossing, level, colour) in enumerate(lines):
         axes.fill_between(line.delays, line.low, line.high, color=colour, alpha=BAND, linewidth=0)
-        axes.plot(line.delays, line.advantage, MARKS[number], color=colour, linewidth=LINE,
-                  linestyle=DASHES[number], markersize=4.0,
+        axes.plot(line.delays, line.advantage, MARKS[number], color=colour, linewidth=style.LINE,
+                  linestyle=style.DASHES[number], markersize=4.0,
                   label=f"{name}: {_vanishes(crossing, level)}")  # fmt: skip
-        if crossing.at is not None:
-            longest = float(found.delays[-1])
-            ends = [longest if end is None else end for end in crossing.interval]
-            bar = np.abs(np.array([[e] for e in ends]) - crossing.at)
-            axes.errorbar([crossing.at], [level], xerr=bar, fmt="X", color=colour, zorder=6,
-                          markersize=8.0, markeredgecolor=BLACK, capsize=4.0)  # fmt: skip
-    axes.axhline(0.0, color=BLACK, linewidth=0.9)
-    axes.set_xlim(0.0, max(float(found.delays[-1]), 1e-3) * 1.02)
-    if np.isfinite(found.constant):  # harm goes far below: what matters is where it begins
-        axes.set_ylim(bottom=max(axes.get_ylim()[0], -HARM * found.constant))
-    dress(axes, "delay of the bit speed (s)", f"advantage in the {result.objective} (s)",
-          heading(result, "J1 saved against the delay of the bit speed"))  # fmt: skip
-    legend_under(axes, 1, drop=0.13)
+        _cross(axes, crossing, level, float(study.delays[-1]), colour)
+    axes.axhline(0.0, color=style.BLACK, linewidth=0.9)
+    axes.set_xlim(0.0, max(float(study.delays[-1]), 1e-3) * 1.02)
+    if np.isfinite(study.constant):  # harm goes far below: what matters is where it begins
+        axes.set_ylim(bottom=max(axes.get_ylim()[0], -HARM * study.constant))
+    style.dress(axes, "delay of the bit speed (s)", f"advantage in the {result.objective} (s)",
+          style.heading(result, "J1 saved against the delay of the bit speed"))  # fmt: skip
+    style.legend_under(axes, 1, drop=0.13)
     if ax is None:
         more = (
-            f"Constant weight: {found.constant:.1f} s. Hoist lag and limits are the same at every "
+            f"Constant weight: {study.constant:.1f} s. Hoist lag and limits are the same at every "
             "delay. Harm goes on below the picture."
         )
-        figure.supxlabel(_draws(result, more), fontsize=SMALL)
+        figure.supxlabel(_draws(result, more), fontsize=style.SMALL)
     return figure
 
 
-@picture(result="From `drillctl.advantage`.")
+@style.picture(result="From `drillctl.advantage`.")
 def advantage_cases(result: Advantage, ax: Axes | None = None) -> Figure:
     """Draw the distribution of J1 of every case over the fresh draws.
 
     Quantiles 5 to 95 % as a bar, the median as a line, the objective as a diamond with its 95 %
     interval.
     """
-    figure, axes = axes_or_new(ax, 9.0, 4.8)
+    figure, axes = style.axes_or_new(ax, 9.0, 4.8)
     names = []
     for row, case in enumerate(result.cases):
         values = case.measures["j1"]
         values = values[~np.isnan(values)]
         if values.size:
             low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
-            colour = COLOURS[result.chart.policies.index(case.policy)]
+            colour = style.COLOURS[result.chart.policies.index(case.policy)]
             axes.barh(row, high - low, left=low, height=0.55, color=colour, alpha=0.35)
             axes.plot([middle, middle], [row - 0.28, row + 0.28], color=colour, linewidth=2.0)
         if case.objective.value is not None and case.objective.interval is not None:
             ends = np.abs(np.array(case.objective.interval)[:, None] - case.objective.value)
-            axes.errorbar([case.objective.value], [row], xerr=ends, fmt="D", color=BLACK,
+            axes.errorbar([case.objective.value], [row], xerr=ends, fmt="D", color=style.BLACK,
                           markersize=4.5, capsize=3.5)  # fmt: skip
         names.append(case.name)
     axes.set_yticks(range(len(names)), names)
     axes.invert_yaxis()
     axes.set_xlim(left=0.0)
-    dress(axes, "J1 (s)", "", heading(result, "J1 of each policy at its robust optimum"))
+    style.dress(
+        axes, "J1 (s)", "", style.heading(result, "J1 of each policy at its robust optimum")
+    )
     if ax is None:
         more = f"Bars: 5 to 95 % of the draws; line: median; diamond: {result.objective}."
-        figure.supxlabel(_draws(result, more), fontsize=SMALL)
+        figure.supxlabel(_draws(result, more), fontsize=style.SMALL)
     return figure
 
 
@@ -327,9 +301,4 @@ def _draws(result: Advantage, more: str = "") -> str:
         f"{table.realizations} fresh draws, the same everywhere (seed {table.seed}); intervals by "
         f"resampled pairs. {more}"
     )
-    return _caption(result, text)
-
-
-def _caption(result: Advantage | WeightDelay, text: str) -> str:
-    origin = "String reconstructed. " if origin_of(result) else ""
-    return "\n".join(textwrap.wrap(f"{origin}{text}", WIDEST))
+    return style.caption(result, text)

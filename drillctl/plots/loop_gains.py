@@ -24,21 +24,12 @@ from drillctl.errors import InputError
 from drillctl.linear.boundary import GainBoundary, RootLocus
 from drillctl.linear.tuning import DriveImpedance
 from drillctl.plots import style
-from drillctl.plots.modes import hertz, listed
-from drillctl.plots.style import (
-    beyond,
-    colours,
-    legend_under,
-    named_values,
-    picture,
-    plain_ticks,
-    title_of,
-)
+from drillctl.plots.plant import hertz, listed
 
 GREY = "#777777"
 
 
-@picture(
+@style.picture(
     results="From `drillctl.linear.drive_impedance`; each is named by its `label`.",
     ax="Two panels: impedance and reflection.",
     marks="Frequencies (Hz) to mark, such as that of stick-slip; by name, if they have one.",
@@ -58,11 +49,7 @@ def drive_impedance(
     drives = listed(results)
     figure, (above, below) = style.grid_or_new(ax, 2, 1, 7.5, 6.0, share_x=True)
     for number, drive in enumerate(drives):
-        look = {
-            "color": style.COLOURS[number % len(style.COLOURS)],
-            "linestyle": style.DASHES[number % len(style.DASHES)],
-            "linewidth": style.LINE,
-        }
+        look = style.look(number)
         frequency = drive.frequency_hz
         above.loglog(frequency, np.abs(drive.impedance) / drive.pipe, label=drive.label, **look)
         below.semilogx(frequency, np.abs(drive.reflection), label=drive.label, **look)
@@ -115,7 +102,7 @@ DIAMOND: dict[str, Any] = {
 """Mark of the design's own values."""
 
 
-@picture(
+@style.picture(
     result="From `drillctl.linear.gain_boundary`; others, as the continuum, after the first.",
     raises="Nothing to draw.",
 )
@@ -133,7 +120,7 @@ def gain_boundary(
     first = boundaries[0]
     figure, ax = style.axes_or_new(ax, 7.8, 5.8)
     sides = [
-        named_values(path, GAIN_UNITS[path], np.array(span), system)
+        style.named_values(path, GAIN_UNITS[path], np.array(span), system)
         for path, span in zip(GAINS, first.window, strict=True)
     ]
     _fill(ax, first, system)
@@ -144,10 +131,10 @@ def gain_boundary(
     kp, ki = shown_gains(own[0], own[1], system)
     if kp > 0.0 or ki > 0.0:
         ax.plot(kp, ki, "D", **DIAMOND, label="gains of the design")
-    style.dress(ax, sides[0][1], sides[1][1], f"Stable gains\n{title_of(first)}")
+    style.dress(ax, sides[0][1], sides[1][1], style.heading(first, "Stable gains"))
     ax.set_xlim(*sides[0][0])
     ax.set_ylim(*sides[1][0])
-    legend_under(ax, 2)
+    style.legend_under(ax, 2)
     figure.supxlabel(f"falling slope of the rock {first.slope:.4g} N m s", fontsize=style.SMALL)
     return figure
 
@@ -187,22 +174,20 @@ def _coloured(figure: Figure, ax: Axes, boundary: GainBoundary, system: units.Sy
         pieces.append(np.stack([points[:-1], points[1:]], axis=1))
         middle.append(np.sqrt(branch.omega[:-1] * branch.omega[1:]) / (2.0 * np.pi))
     frequency = np.concatenate(middle)
-    # Towards Ki = 0 a branch goes to no frequency at all; the modes are to be told apart.
+    # Towards Ki = 0 a branch goes to no frequency at all; modes must stay distinguishable.
     high = float(frequency.max())
     low = min(max(float(frequency.min()), 1e-3 * high), 0.99 * high)
     norm = LogNorm(low, high)
     share = np.log(np.maximum(frequency, low) / low) / np.log(high / low)
     lines = LineCollection(
-        list(np.concatenate(pieces)), cmap=colours(0.0, 0.88),
+        list(np.concatenate(pieces)), cmap=style.colours(0.0, 0.88),
         norm=norm, linewidths=4.0 - 3.3 * share,
         capstyle="round", zorder=3,
     )  # fmt: skip
     lines.set_array(frequency)
     ax.add_collection(lines)
-    bar = figure.colorbar(lines, ax=ax, extend=beyond(frequency, norm), pad=0.02)
-    plain_ticks(bar)
-    bar.set_label("frequency of the poles on the axis (Hz)", fontsize=style.LABEL)
-    bar.ax.tick_params(labelsize=style.SMALL)
+    label = "frequency of the poles on the axis (Hz)"
+    style.colour_bar(figure, lines, ax, label, style.beyond(frequency, norm))
 
 
 def _dashed(ax: Axes, boundary: GainBoundary, number: int, system: units.System) -> None:
@@ -226,11 +211,11 @@ def shown_gains(kp: Any, ki: Any, system: units.System) -> tuple[Any, Any]:
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 LINE_APART = 0.035  # least distance between two lines of text, over the height of the window
-TELLING = 0.02
-"""A track is looked at if it goes this far from the imaginary axis, over the farthest."""
+LEAST_REACH = 0.02
+"""A track is shown if it goes this far from the imaginary axis, over the farthest."""
 
 
-@picture(result="From `drillctl.linear.root_locus`.", raises="No poles to draw.")
+@style.picture(result="From `drillctl.linear.root_locus`.", raises="No poles to draw.")
 def root_locus(result: RootLocus, ax: Axes | None = None, system: units.System = "si") -> Figure:
     """Draw the tracks of the poles, upper half of the plane.
 
@@ -241,20 +226,18 @@ def root_locus(result: RootLocus, ax: Axes | None = None, system: units.System =
     tracks = mirrored(result.poles)
     if not np.isfinite(tracks.real).any():
         raise InputError("no poles to draw")
-    values, label = named_values(result.path, result.unit, result.values, system)
+    values, label = style.named_values(result.path, result.unit, result.values, system)
     figure, ax = style.axes_or_new(ax, 7.5, 6.0)
     norm = Normalize(float(np.min(values)), float(np.max(values)))
     lines = [_track(ax, column, values, norm) for column in tracks.T]
     _ends(ax, tracks)
-    bar = figure.colorbar(lines[0], ax=ax, pad=0.02)
-    bar.set_label(label, fontsize=style.LABEL)
-    bar.ax.tick_params(labelsize=style.SMALL)
+    style.colour_bar(figure, lines[0], ax, label)
     left, right, top = _window(tracks)
     ax.axvspan(0.0, max(right, 0.0), color="#F2F2F2", zorder=0)
     ax.axvline(0.0, color=style.BLACK, linewidth=1.2)
     ax.set_xlim(left, right)
     ax.set_ylim(-0.02 * top, top)
-    title = f"Root locus\n{title_of(result)}"
+    title = style.heading(result, "Root locus")
     style.dress(ax, "real part (1/s), unstable to the right", "frequency (Hz)", title)
     _crossings(ax, tracks, values, top)
     ax.legend(
@@ -278,7 +261,7 @@ def _track(ax: Axes, poles: ComplexArray, values: Array, norm: Normalize) -> Lin
     points = np.column_stack([poles.real, poles.imag / (2.0 * np.pi)])
     pieces = np.stack([points[:-1], points[1:]], axis=1)
     lines = LineCollection(
-        list(pieces), cmap=colours(0.0, 0.88), norm=norm, linewidths=2.2, zorder=3
+        list(pieces), cmap=style.colours(0.0, 0.88), norm=norm, linewidths=2.2, zorder=3
     )
     lines.set_array(0.5 * (values[:-1] + values[1:]))
     ax.add_collection(lines)
@@ -323,16 +306,16 @@ def _crossed(tracks: ComplexArray, values: Array) -> list[tuple[float, float]]:
 
 
 def _window(tracks: ComplexArray) -> tuple[float, float, float]:
-    """Lowest and highest real part (1/s) and highest frequency (Hz) of the tracks that tell."""
+    """Lowest and highest real part (1/s) and highest frequency (Hz) of the tracks in the window."""
     turning = np.where(tracks.imag > 0.0, tracks, np.nan)
     if not np.isfinite(turning).any():
         turning = tracks
     with np.errstate(invalid="ignore"):
         reach = np.nanmax(np.abs(np.nan_to_num(turning.real)), axis=0)
-    told = turning[:, reach >= TELLING * reach.max()]
-    left, right = float(np.nanmin(told.real)), max(float(np.nanmax(told.real)), 0.0)
+    drawn = turning[:, reach >= LEAST_REACH * reach.max()]
+    left, right = float(np.nanmin(drawn.real)), max(float(np.nanmax(drawn.real)), 0.0)
     room = 0.08 * max(right - left, 1e-12)
-    top = float(np.nanmax(told.imag)) / (2.0 * np.pi)
+    top = float(np.nanmax(drawn.imag)) / (2.0 * np.pi)
     return left - room, right + max(room, 0.05 * (right - left)), 1.08 * top or 1.0
 
 

@@ -18,7 +18,7 @@ from drillctl.errors import InputError, nearest
 from drillctl.linear.boundary import GainBoundary
 from drillctl.plots import style
 from drillctl.plots.loop_gains import DIAMOND, GAINS, rings_of, shown_gains
-from drillctl.plots.style import beyond, colours, legend_under, picture, plain_ticks, plane
+from drillctl.plots.style import colours
 
 if TYPE_CHECKING:
     from drillctl.studies.loop_mapping.compute import LoopMap
@@ -50,7 +50,7 @@ class _Look:
     levels: tuple[float, ...]
 
 
-@picture(
+@style.picture(
     result="Over two parameters.",
     quantity="One of `drillctl.studies.loop_mapping.compute.QUANTITIES` that was mapped.",
     boundary="Outline of the stable gains, drawn over a map of both gains.",
@@ -73,19 +73,17 @@ def loop_map(
     paths = tuple(axis.path for axis in result.axes)
     if boundary is not None and set(paths) != set(GAINS):
         raise InputError(f"a boundary of gains does not fit {' and '.join(paths)}", "boundary")
-    figure, ax, x, y = plane(result, ax, 6.2, system)
     shown = NAMES.get(quantity, quantity)
-    title = f"{shown[0].upper()}{shown[1:]}\n{style.title_of(result)}"
-    ax.set_title(title, fontsize=style.TITLE, loc="left")
+    figure, ax, x, y = style.plane(result, ax, 6.2, system, f"{shown[0].upper()}{shown[1:]}")
     _colour(figure, ax, result, quantity, x, y, system)
     _stability(ax, result, x, y)
     if boundary is not None:
         _outline(ax, boundary, paths, system)
     _marks(ax, result, quantity, system)
-    ax.set_xlim(_edges(x))
-    ax.set_ylim(_edges(y))
+    ax.set_xlim(*style.edges(x)[[0, -1]])
+    ax.set_ylim(*style.edges(y)[[0, -1]])
     if ax.get_legend_handles_labels()[0]:
-        legend_under(ax, 2)
+        style.legend_under(ax, 2)
     figure.supxlabel(_caption(result, quantity), fontsize=style.SMALL)
     return figure
 
@@ -136,12 +134,9 @@ def _colour(
         x, y, np.ma.masked_invalid(values.T), cmap=look.colours, norm=look.norm,
         shading="nearest", rasterized=True,
     )  # fmt: skip
-    bar = figure.colorbar(mesh, ax=ax, extend=beyond(values, look.norm), pad=0.02)
-    if isinstance(look.norm, LogNorm):
-        plain_ticks(bar)
     name = NAMES.get(quantity, quantity)
-    bar.set_label(name if unit in ("", "1") else f"{name} ({unit})", fontsize=style.LABEL)
-    bar.ax.tick_params(labelsize=style.SMALL)
+    label = name if unit in ("", "1") else f"{name} ({unit})"
+    style.colour_bar(figure, mesh, ax, label, style.beyond(values, look.norm))
     if look.levels and min(values.shape) > 1:
         lines = ax.contour(x, y, values.T, levels=look.levels, colors="#333333", linewidths=0.8)
         ax.clabel(lines, fmt=lambda level: f"{level:g}", fontsize=8.0, inline_spacing=2)
@@ -171,10 +166,8 @@ def _marks(ax: Axes, result: LoopMap, quantity: str, system: units.System) -> No
     if quantity == "slope_margin" and result.best is not None and _varies(result.values[quantity]):
         margin, at = result.best
         x, y = (_shown(at[axis.path], axis.unit, system) for axis in result.axes)
-        ax.plot(
-            x, y, "*", color=style.VERMILLION, markeredgecolor="white", markersize=15,
-            linestyle="none", zorder=6, label=f"largest D*: {_text(margin, system)}",
-        )  # fmt: skip
+        label = f"largest D*: {_text(margin, system)}"
+        ax.plot(x, y, "*", **style.STAR, zorder=6, label=label)
     own = [_own(result, axis.path) for axis in result.axes]
     inside = all(
         axis.values.min() <= value <= axis.values.max()
@@ -207,25 +200,13 @@ def _shown(value: float, unit: str, system: units.System) -> float:
     return float(units.displayed(value, unit, system)[0])
 
 
-def _edges(values: Array) -> tuple[float, float]:
-    """From half a cell before the first value to half a cell after the last."""
-    if len(values) == 1:
-        return float(values[0] - 0.5), float(values[0] + 0.5)
-    return (
-        float(values[0] - 0.5 * (values[1] - values[0])),
-        float(values[-1] + 0.5 * (values[-1] - values[-2])),
-    )
-
-
 def _caption(result: LoopMap, quantity: str) -> str:
-    found = result.values[quantity]
-    status = result.design.tables.status
-    notes = ["string reconstructed"] if status == "reconstructed" else []
-    notes.append(f"{int(result.stable.sum())} of {result.stable.size} cells stable")
-    if np.isnan(found).any():
+    values = result.values[quantity]
+    notes = [f"{int(result.stable.sum())} of {result.stable.size} cells stable"]
+    if np.isnan(values).any():
         notes.append(REASONS.get(quantity, "grey: no steady drilling"))
-    if quantity == "spectral_abscissa" and np.isfinite(found).any():
-        least, most = float(np.nanmin(found)), float(np.nanmax(np.abs(found)))
+    if quantity == "spectral_abscissa" and np.isfinite(values).any():
+        least, most = float(np.nanmin(values)), float(np.nanmax(np.abs(values)))
         if -1e-3 * most < least < 0.0:
             notes.append(f"none under {least:.1e}/s: some mode hardly decays")
-    return "; ".join(notes)
+    return style.caption(result, "; ".join(notes), width=120)

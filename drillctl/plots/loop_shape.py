@@ -3,9 +3,9 @@ r"""The loop broken at the top torque: Nyquist and Nichols curve, sensitivities.
 Drawn is L = C/Z, the response of the top speed to the speed error with the loop open and the
 slope of the rock closed around the bit:
 
-    found = drillctl.linear.loop(design)
-    slope = found.operating_point.slope
-    omega = pole_grid(ends_of(design.string), found.poles)
+    analysis = drillctl.linear.loop(design)
+    slope = analysis.operating_point.slope
+    omega = pole_grid(ends_of(design.string), analysis.poles)
     response = frequency_response(design, omega / (2 * np.pi), "open_loop", slope=slope)
 
 The falling slope makes each mode of an undamped string grow without drive, and L circle at its
@@ -35,8 +35,7 @@ from drillctl.linear.loop_model import loop_poles
 from drillctl.linear.response import FrequencyResponse, frequency_response
 from drillctl.plots import style
 from drillctl.plots.loop_gains import GREY
-from drillctl.plots.modes import hertz
-from drillctl.plots.style import picture
+from drillctl.plots.plant import hertz
 
 Array = NDArray[np.floating[Any]]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
@@ -56,7 +55,7 @@ OF_LOOP = {
 }
 
 
-@picture(
+@style.picture(
     **OF_LOOP,
     analysis="Of the same loop: gives the disk of its margin and the number of unstable poles.",
 )
@@ -99,7 +98,7 @@ def nyquist(
     return figure
 
 
-@picture(**OF_LOOP, analysis="Of the same loop: gives the disk of its margin.")
+@style.picture(**OF_LOOP, analysis="Of the same loop: gives the disk of its margin.")
 def nichols(
     result: FrequencyResponse, ax: Axes | None = None, analysis: LoopAnalysis | None = None
 ) -> Figure:
@@ -136,7 +135,7 @@ def nichols(
     return figure
 
 
-@picture(
+@style.picture(
     **OF_LOOP,
     analysis="Of the same loop: gives the peak to full digits; by default that of the curve.",
 )
@@ -157,10 +156,10 @@ def sensitivity(
     )
     best = int(np.argmax(sensitive))
     peak, where = float(sensitive[best]), float(frequency[best])
-    found = None if analysis is None else analysis.margins
-    if found is not None and found.peak_sensitivity_hz is not None:
-        peak, where = found.peak_sensitivity, found.peak_sensitivity_hz
-    if found is None or found.peak_sensitivity_hz is not None:
+    margins = None if analysis is None else analysis.margins
+    if margins is not None and margins.peak_sensitivity_hz is not None:
+        peak, where = margins.peak_sensitivity, margins.peak_sensitivity_hz
+    if margins is None or margins.peak_sensitivity_hz is not None:
         ax.plot(
             where, peak, "o", color=style.BLACK, markersize=6,
             label=f"largest |S|: {peak:.4g} at {where:.3g} Hz",
@@ -299,7 +298,7 @@ def _times(count: int) -> str:
 
 
 def _turns(loop: ComplexArray, analysis: LoopAnalysis | None) -> str:
-    """Unstable poles and turns about -1; empty unless curve and poles tell the same."""
+    """Unstable poles and turns about -1; empty unless curve and poles agree."""
     if analysis is None or not analysis.design.simple_drive or analysis.bit_side.path is not None:
         return ""
     design = analysis.design

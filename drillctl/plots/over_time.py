@@ -1,6 +1,6 @@
 """Time responses: speeds of top drive and bit, with the times the bit is stuck shaded.
 
-One cycle of the bit speed: exact, simulated, and as one harmonic tells it.
+One cycle of the bit speed: exact, simulated, and with one harmonic.
 """
 
 from __future__ import annotations
@@ -13,24 +13,16 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.design import parameter
-from drillctl.plots.style import (
-    BLACK,
-    BLUE,
-    NAMES,
-    SMALL,
-    VERMILLION,
-    axes_or_new,
-    dress,
-    grid_or_new,
-    picture,
-)
+from drillctl.plots import style
 
 if TYPE_CHECKING:
     from drillctl.simulation import Simulation
     from drillctl.simulation.limit_cycle import LimitCycle
 
 
-@picture(paths="Parameters named in the title of each panel; by default the numbers of the drive.")
+@style.picture(
+    paths="Parameters named in the title of each panel; by default the numbers of the drive."
+)
 def time_response(
     results: Simulation | Sequence[Simulation],
     ax: Axes | Sequence[Axes] | None = None,
@@ -41,7 +33,7 @@ def time_response(
     columns = 1 if len(runs) == 1 else 2
     rows = -(-len(runs) // columns)
     given = [ax] if isinstance(ax, Axes) else ax
-    figure, panels = grid_or_new(
+    figure, panels = style.grid_or_new(
         given, rows, columns, 4.2 * columns + 1.8, 2.6 * rows + 1.0, share_x=True, share_y=True
     )
     for panel, run in zip(panels, runs, strict=False):
@@ -53,7 +45,7 @@ def time_response(
         above.tick_params(labelbottom=True)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(
-        handles, labels, loc="outside lower center", ncols=4, fontsize=SMALL, frameon=False
+        handles, labels, loc="outside lower center", ncols=4, fontsize=style.SMALL, frameon=False
     )
     return figure
 
@@ -66,13 +58,13 @@ def _panel(ax: Axes, run: Simulation, paths: Sequence[str]) -> None:
         run.time, 0.0, 1.0, where=stuck, transform=ax.get_xaxis_transform(), color="#BBBBBB",
         alpha=0.6, linewidth=0.0, label="bit stuck",
     )  # fmt: skip
-    ax.plot(run.time, bit, color=BLUE, linewidth=1.1, label="bit")
-    ax.plot(run.time, top, color=VERMILLION, linewidth=1.1, linestyle="--", label="top drive")
+    ax.plot(run.time, bit, color=style.BLUE, linewidth=1.1, label="bit")
+    ax.plot(run.time, top, color=style.VERMILLION, linewidth=1.1, linestyle="--", label="top drive")
     ax.axhline(
         run.design.speed / units.RPM, color="black", linewidth=0.7, linestyle=":", label="set speed"
     )
     ax.set_xlim(0.0, float(run.time[-1]))
-    dress(ax, "time (s)", "speed (rpm)", _title(run, paths))
+    style.dress(ax, "time (s)", "speed (rpm)", _title(run, paths))
     ax.label_outer()
 
 
@@ -93,17 +85,19 @@ def _named(run: Simulation, path: str) -> str:
     """A parameter of the run's design by its usual name, in the units people read."""
     result = parameter(run.design, path)
     value, unit = units.displayed(result.value, result.si_unit)
-    return f"{NAMES.get(path, path.rpartition('.')[2])} {value:g} {unit}".rstrip()
+    return f"{style.NAMES.get(path, path.rpartition('.')[2])} {value:g} {unit}".rstrip()
 
 
-@picture(result="Orbit, harmonic prediction and simulation; what there is none of is left out.")
+@style.picture(
+    result="Orbit, harmonic prediction and simulation; what there is none of is left out."
+)
 def limit_cycle(result: LimitCycle, ax: Axes | None = None) -> Figure:
     """Bit speed over one cycle, from the moment it rises through its mean.
 
     Speeds in rpm. The orbit grey below the last simulated cycle, which hides it where they agree;
     an orbit's harmonic prediction is drawn over the same time.
     """
-    figure, axes = axes_or_new(ax, 7.0, 4.2)
+    figure, axes = style.axes_or_new(ax, 7.0, 4.2)
     run, orbit, cycle = result.simulated, result.orbit, result.predicted
     time = run.time if orbit is None else orbit.time
     if orbit is not None:
@@ -112,18 +106,20 @@ def limit_cycle(result: LimitCycle, ax: Axes | None = None) -> Figure:
             label=f"exact orbit, {orbit.period:.2f} s",
         )  # fmt: skip
     axes.plot(
-        run.time, run.bit_speed / units.RPM, color=BLUE, linewidth=1.3,
+        run.time, run.bit_speed / units.RPM, color=style.BLUE, linewidth=1.3,
         label=f"last simulated, {run.time[-1]:.2f} s",
     )  # fmt: skip
     if cycle is not None:
         axes.plot(
-            time, cycle.bit_speed(time) / units.RPM, color=VERMILLION, linewidth=1.3,
+            time, cycle.bit_speed(time) / units.RPM, color=style.VERMILLION, linewidth=1.3,
             linestyle="--", label=f"one harmonic, {cycle.period:.2f} s",
         )  # fmt: skip
-    axes.axhline(run.mean_speed / units.RPM, color=BLACK, linewidth=0.7, linestyle=":")
+    axes.axhline(run.mean_speed / units.RPM, color=style.BLACK, linewidth=0.7, linestyle=":")
     axes.set_xlim(0.0, max(float(time[-1]), float(run.time[-1])))
-    dress(axes, "time from the rise through the mean (s)", "bit speed (rpm)", _cycle_title(result))
-    axes.legend(fontsize=SMALL, frameon=False)
+    style.dress(
+        axes, "time from the rise through the mean (s)", "bit speed (rpm)", _cycle_title(result)
+    )
+    axes.legend(fontsize=style.SMALL, frameon=False)
     return figure
 
 

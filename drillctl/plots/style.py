@@ -1,4 +1,4 @@
-"""The shared look: colours told apart by everyone, sizes, and figures without pyplot.
+"""The shared look: colours that everyone can distinguish, sizes, and figures without pyplot.
 
 What colour bars share: parts of viridis, ends that say that values go on, plain ticks.
 
@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import inspect
 import re
+import textwrap
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
-from matplotlib.colors import Colormap, ListedColormap, Normalize
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
@@ -50,6 +52,10 @@ LINE = 1.6  # width of a curve (points)
 GRID = "#DDDDDD"
 """Colour of grid and zero lines."""
 
+STAR: dict[str, Any] = {
+    "color": VERMILLION, "markeredgecolor": "white", "markersize": 15, "linestyle": "none",
+}  # fmt: skip
+"""Mark of the best."""
 USUAL = {
     "ax": "Axes to draw on; by default those of a new figure.",
     "system": "Units of axes and labels.",
@@ -163,11 +169,22 @@ def beyond(values: Array, norm: Normalize) -> Literal["neither", "both", "min", 
     return "min" if below else "max" if above else "neither"
 
 
-def plain_ticks(bar: Colorbar) -> None:
-    """Ticks at 1, 2, 5 of each decade, written out."""
-    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    bar.ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-    bar.ax.yaxis.set_minor_formatter(NullFormatter())
+def colour_bar(
+    figure: Figure,
+    drawn: ScalarMappable,
+    ax: Axes | Sequence[Axes],
+    label: str,
+    extend: Literal["neither", "both", "min", "max"] = "neither",
+) -> Colorbar:
+    """A labelled colour bar; on a log scale with ticks at 1, 2, 5 of each decade, written out."""
+    bar = figure.colorbar(drawn, ax=ax, extend=extend, pad=0.02)
+    if isinstance(drawn.norm, LogNorm):
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    bar.set_label(label, fontsize=LABEL)
+    bar.ax.tick_params(labelsize=SMALL)
+    return bar
 
 
 NAMES = {
@@ -189,15 +206,13 @@ class Plane(NamedTuple):
     y: NDArray[np.float64]
 
 
-def plane(
-    result: Any, ax: Axes | None, height: float, system: units.System, what: str = "a map shows"
-) -> Plane:
+def plane(result: Any, ax: Axes | None, height: float, system: units.System, what: str) -> Plane:
     """The plane of a result over two parameters."""
     if len(result.axes) != 2:
-        raise InputError(f"{what} 2 parameters, the result has {len(result.axes)}")
+        raise InputError(f"a map shows 2 parameters, the result has {len(result.axes)}")
     figure, ax = axes_or_new(ax, 8.0, height)
     (x, x_label), (y, y_label) = (axis_label(axis, system) for axis in result.axes)
-    dress(ax, x_label, y_label, title_of(result))
+    dress(ax, x_label, y_label, heading(result, what))
     ax.grid(visible=False)
     return Plane(figure, ax, x, y)
 
@@ -239,6 +254,44 @@ def heading(result: Any, what: str) -> str:
     return f"{what}\n{title_of(result)}"
 
 
-def origin_of(result: Any) -> str:
-    """What a caption begins with where the string is not the authors' own."""
-    return "string reconstructed; " if result.design.tables.status == "reconstructed" else ""
+def caption(result: Any, *texts: str, width: int = 110) -> str:
+    """Text under a picture in lines of at most `width` characters, a line or more for each part."""
+    guessed = result.design.tables.status == "reconstructed"
+    first, *rest = texts
+    parts = ("String reconstructed. " * guessed + first, *rest)
+    return "\n".join(line for part in parts for line in textwrap.wrap(part, width))
+
+
+def colour(number: int) -> str:
+    """Colour of one of several things."""
+    return COLOURS[number % len(COLOURS)]
+
+
+def look(number: int, width: float = LINE) -> dict[str, Any]:
+    """Colour, dashes and width of one of several curves."""
+    dashes = DASHES[number % len(DASHES)]
+    return {"color": colour(number), "linestyle": dashes, "linewidth": width}
+
+
+def edges(centres: Array) -> Array:
+    """Borders of cells around increasing centres, halfway; the outer cells are symmetric."""
+    if len(centres) == 1:
+        return np.array([centres[0] - 0.5, centres[0] + 0.5])
+    between = 0.5 * (centres[1:] + centres[:-1])
+    ends = 2.0 * centres[[0, -1]] - between[[0, -1]]
+    return np.concatenate([ends[:1], between, ends[1:]])
+
+
+def panels_or_new(
+    ax: Sequence[Axes] | None, count: int, each: tuple[float, float], rim: tuple[float, float]
+) -> tuple[Figure, list[Axes]]:
+    """So many panels, those given or new ones two by two; `each` and `rim` are sizes (inches)."""
+    if ax is not None:
+        return grid_or_new(ax, 1, count, 0.0, 0.0)
+    columns = min(count, 2)
+    rows = -(-count // columns)
+    size = columns * each[0] + rim[0], rows * each[1] + rim[1]
+    fresh, panels = grid_or_new(None, rows, columns, *size)
+    for spare in panels[count:]:
+        spare.remove()
+    return fresh, panels[:count]

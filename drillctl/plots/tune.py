@@ -5,9 +5,8 @@ How far tuned gains may drift: probability about the optimum, with the tolerance
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,31 +14,16 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.plots.style import (
-    BLACK,
-    BLUE,
-    LINE,
-    SMALL,
-    VERMILLION,
-    axes_or_new,
-    axis_label,
-    dress,
-    grid_or_new,
-    legend_under,
-    origin_of,
-    picture,
-    title_of,
-)
+from drillctl.plots import style
 
 if TYPE_CHECKING:
     from drillctl.studies.tune.certificate import FreshRuns
     from drillctl.studies.tune.compute import Tune
 
 ROW = 0.42  # height of a row (inches)
-WIDEST = 120  # longest line of a caption (characters)
 
 
-@picture(ax="Two panels.")
+@style.picture(ax="Two panels.")
 def tune_baselines(result: Tune, ax: Sequence[Axes] | None = None) -> Figure:
     """Quantiles of J1 and the probability of the level, a row the tuned gains and each baseline.
 
@@ -47,29 +31,29 @@ def tune_baselines(result: Tune, ax: Sequence[Axes] | None = None) -> Figure:
     """
     rows: dict[str, FreshRuns] = {"tuned": result.certificate.runs}
     rows |= {one.name: one.runs for one in result.baselines if one.runs is not None}
-    figure, (left, right) = grid_or_new(ax, 1, 2, 9.5, 2.0 + ROW * len(rows), share_y=True)
+    figure, (left, right) = style.grid_or_new(ax, 1, 2, 9.5, 2.0 + ROW * len(rows), share_y=True)
     for place, (name, runs) in enumerate(rows.items()):
-        colour = VERMILLION if name == "tuned" else BLUE
+        colour = style.VERMILLION if name == "tuned" else style.BLUE
         _spread(left, place, runs, colour)
         low, high = runs.interval
         right.plot([low, high], [place, place], "-", color=colour, linewidth=2.2)
         right.plot(runs.probability, place, "o", color=colour, markersize=5.5)
     level, required = result.certificate.runs.level, result.certificate.required
-    left.axvline(level, color=BLACK, linewidth=1.0, linestyle="--")
-    right.axvline(required, color=BLACK, linewidth=1.0, linestyle="--")
+    left.axvline(level, color=style.BLACK, linewidth=1.0, linestyle="--")
+    right.axvline(required, color=style.BLACK, linewidth=1.0, linestyle="--")
     left.set_yticks(range(len(rows)), list(rows))
     left.set_ylim(len(rows) - 0.5, -0.5)
     left.set_xlim(left=0.0)
     right.set_xlim(-0.03, 1.03)
-    dress(left, "J1 (s)", "", title_of(result))
-    dress(right, f"probability that J1 is at or under {level:g} s", "")
+    style.dress(left, "J1 (s)", "", style.heading(result, "J1 of tuned gains and baselines"))
+    style.dress(right, f"probability that J1 is at or under {level:g} s", "")
     right.tick_params(labelleft=False)
     text = (
-        f"{origin_of(result)}{len(result.certificate.runs.j1)} fresh realizations (seed "
+        f"{len(result.certificate.runs.j1)} fresh realizations (seed "
         f"{result.certificate.seed}). Left: 5 to 95 % (line), 25 to 75 % (bar), median (dot); "
         "right: 95 % intervals. Dashed: level and required probability."
     )
-    figure.supxlabel("\n".join(textwrap.wrap(text, WIDEST)), fontsize=SMALL)
+    figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
     return figure
 
 
@@ -86,40 +70,38 @@ def _spread(ax: Axes, place: int, runs: FreshRuns, colour: str) -> None:
         ax.plot(results["q50"], place, "o", color=colour, markeredgecolor="white", markersize=6.5)
 
 
-WIDEST_NEIGHBOURHOOD = 105  # longest line of a caption (characters)
-
-
-@picture(result="Over any number of parameters; the others stay at the optimum.")
+@style.picture(result="Over any number of parameters; the others stay at the optimum.")
 def tune_neighbourhood(result: Tune, ax: Axes | None = None, system: units.System = "si") -> Figure:
     """Probability of the level over the first two tuned parameters, or the only one.
 
     The contour is that of the required probability; bars are how far each parameter may drift
     alone, an arrow where the bound of the search ends it.
     """
-    figure, ax = axes_or_new(ax, 8.0, 6.0)
+    figure, ax = style.axes_or_new(ax, 8.0, 6.0)
     about = result.certificate.neighbourhood
-    lines = [axis_label(axis, system) for axis in about.axes]
+    lines = [style.axis_label(axis, system) for axis in about.axes]
+    title = style.heading(result, "Probability of the level about the tuned gains")
     name = f"probability that J1 is at or under {result.certificate.runs.level:g} s"
     if len(lines) == 1:
         (x, label), shares = lines[0], about.probability
-        ax.plot(x, shares, "-", color=BLACK, linewidth=LINE)
-        ax.axhline(result.certificate.required, color=BLACK, linewidth=0.9, linestyle="--")
+        ax.plot(x, shares, "-", color=style.BLACK, linewidth=style.LINE)
+        ax.axhline(result.certificate.required, color=style.BLACK, linewidth=0.9, linestyle="--")
         ax.set_ylim(-0.02, 1.02)
-        dress(ax, label, name, title_of(result))
+        style.dress(ax, label, name, title)
         _bars(result, ax, system, [result.certificate.runs.probability])
     else:
         (x, x_label), (y, y_label) = lines
         _map(result, figure, ax, x, y, name)
-        dress(ax, x_label, y_label, title_of(result))
+        style.dress(ax, x_label, y_label, title)
         ax.grid(visible=False)
         _bars(result, ax, system, [])
-    legend_under(ax, 3)
+    style.legend_under(ax, 3)
     text = (
-        f"{origin_of(result)}{about.realizations} of {len(result.certificate.runs.j1)} fresh "
+        f"{about.realizations} of {len(result.certificate.runs.j1)} fresh "
         f"realizations (seed {result.certificate.seed}) in the background, all of them for the "
         f"bars. Dashed: probability {result.certificate.required:g}."
     )
-    figure.supxlabel("\n".join(textwrap.wrap(text, WIDEST_NEIGHBOURHOOD)), fontsize=SMALL)
+    figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
     return figure
 
 
@@ -131,14 +113,11 @@ def _map(
     mesh = ax.pcolormesh(
         x, y, shares.T, cmap="cividis", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True
     )
-    bar = figure.colorbar(mesh, ax=ax, pad=0.02)
-    bar.set_label(name)
-    bar.ax.tick_params(labelsize=SMALL)
+    style.colour_bar(figure, mesh, ax, name)
     required = result.certificate.required
     if shares.min() < required <= shares.max():
-        ax.contour(
-            x, y, shares.T, levels=[required], colors=BLACK, linewidths=LINE, linestyles="--"
-        )
+        look: dict[str, Any] = {"colors": style.BLACK, "linewidths": style.LINE, "linestyles": "--"}
+        ax.contour(x, y, shares.T, levels=[required], **look)
 
 
 def _bars(result: Tune, ax: Axes, system: units.System, height: list[float]) -> None:
@@ -152,13 +131,11 @@ def _bars(result: Tune, ax: Axes, system: units.System, height: list[float]) -> 
         line[0][k], line[1][k] = ends
         (x0, y0), (x1, y1) = line
         label = "each may drift alone" if k == 0 else None
-        ax.plot([x0, x1], [y0, y1], "-", color=VERMILLION, linewidth=2.0, label=label)
+        ax.plot([x0, x1], [y0, y1], "-", color=style.VERMILLION, linewidth=2.0, label=label)
         for (x, y), bound, arrow in zip(
             line, (one.low_at_bound, one.high_at_bound), ("<v"[k], ">^"[k]), strict=True
         ):
             marker = arrow if bound else "|_"[k]
-            ax.plot(x, y, marker, color=VERMILLION, markersize=9.0, markeredgewidth=2.0)
-    ax.plot(
-        *place, "*", color=VERMILLION, markeredgecolor="white", markersize=15.0,
-        label=f"tuned, {result.certificate.runs.probability:.3f}",
-    )  # fmt: skip
+            ax.plot(x, y, marker, color=style.VERMILLION, markersize=9.0, markeredgewidth=2.0)
+    label = f"tuned, {result.certificate.runs.probability:.3f}"
+    ax.plot(*place, "*", **style.STAR, label=label)

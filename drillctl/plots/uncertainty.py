@@ -19,23 +19,7 @@ from matplotlib.patches import Patch
 from drillctl import units
 from drillctl.ensemble.probability import INNER, MEDIAN, OUTER, needed
 from drillctl.errors import InputError
-from drillctl.plots.style import (
-    BLACK,
-    BLUE,
-    COLOURS,
-    DASHES,
-    LINE,
-    NAMES,
-    OVER_TWO,
-    SMALL,
-    VERMILLION,
-    axes_or_new,
-    axis_label,
-    dress,
-    grid_or_new,
-    picture,
-    title_of,
-)
+from drillctl.plots import style
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,37 +30,37 @@ if TYPE_CHECKING:
 BEST = ("mean", "q95")  # objectives whose best cells are shown unless others are chosen
 
 
-@picture()
+@style.picture()
 def area_convergence(result: Uncertainty, ax: Axes | None = None) -> Figure:
     """Area of the 95 % regions against the number of draws, with its sampling error."""
-    figure, ax = axes_or_new(ax)
+    figure, ax = style.axes_or_new(ax)
     curves = result.convergence
     for k, (level, areas) in enumerate(curves.areas.items()):
-        colour = COLOURS[k % len(COLOURS)]
         value = 100.0 * np.array([one.value for one in areas])
         low, high = (100.0 * np.array([one.interval[end] for one in areas]) for end in (0, 1))
         # Side by side: intervals of several levels overlap.
         at = np.array(curves.counts) * 2.0 ** (0.08 * (k - 0.5 * (len(curves.areas) - 1)))
         ax.errorbar(
             at, value, yerr=np.maximum([value - low, high - value], 0.0), marker="o",
-            markersize=4, capsize=3, elinewidth=1.0, color=colour, linewidth=LINE,
-            linestyle=DASHES[k % len(DASHES)], label=f"J1 <= {level:g} s",
+            markersize=4, capsize=3, elinewidth=1.0, label=f"J1 <= {level:g} s", **style.look(k),
         )  # fmt: skip
     if len(curves.counts) > 1:
         ax.set_xscale("log", base=2)
         ax.set_xticks(curves.counts, [f"{count:,}" for count in curves.counts])
         ax.minorticks_off()
-    title = title_of(result)
-    dress(ax, "draws", "area of the 95 % region (% of the map)", title)
-    ax.legend(fontsize=SMALL, frameon=False)
+    title = style.heading(result, "Area of the inner regions against the number of draws")
+    style.dress(ax, "draws", "area of the 95 % region (% of the map)", title)
+    ax.legend(fontsize=style.SMALL, frameon=False)
     figure.supxlabel(
         "bars: 95 % interval of the sampling error, at each number of draws by itself",
-        fontsize=SMALL,
+        fontsize=style.SMALL,
     )
     return figure
 
 
-@picture(cells="Of the flattened map; by default the best of the design, and those of `BEST`.")
+@style.picture(
+    cells="Of the flattened map; by default the best of the design, and those of `BEST`."
+)
 def cell_distributions(
     result: Uncertainty,
     cells: Sequence[int] | None = None,
@@ -84,7 +68,7 @@ def cell_distributions(
     system: units.System = "si",
 ) -> Figure:
     """Distribution of J1 over the draws at some cells of the map."""
-    figure, ax = axes_or_new(ax)
+    figure, ax = style.axes_or_new(ax)
     named = _named(result) if cells is None else dict.fromkeys(cells, "")
     j1 = result.j1.reshape(result.realizations, -1)
     top = 2.0 * result.levels[-1] if not result.censored.any() else result.levels[-1]
@@ -92,23 +76,22 @@ def cell_distributions(
         column = np.sort(np.nan_to_num(j1[:, cell], nan=np.inf))
         share = np.arange(1, len(column) + 1) / len(column)
         place = ", ".join(
-            f"{NAMES.get(a.path, a.path)} {_shown(result, cell, a.path, system)}"
+            f"{style.NAMES.get(a.path, a.path)} {_shown(result, cell, a.path, system)}"
             for a in result.axes
         )
         ax.step(
-            [0.0, *column, top], [0.0, *share, share[-1]], where="post", linewidth=LINE,
-            color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)],
-            label=f"{place}{f' ({name})' if name else ''}",
+            [0.0, *column, top], [0.0, *share, share[-1]], where="post",
+            label=f"{place}{f' ({name})' if name else ''}", **style.look(k),
         )  # fmt: skip
     for level in result.levels:
         ax.axvline(level, color="#888888", linewidth=0.8, linestyle="--")
     ax.axhline(0.95, color="#BBBBBB", linewidth=0.8)
     ax.set_xlim(0.0, top)
     ax.set_ylim(0.0, 1.02)
-    dress(ax, "J1 (s)", "share of the draws at or under it",
-          title_of(result))  # fmt: skip
-    ax.legend(fontsize=SMALL, frameon=False, loc="lower right")
-    figure.supxlabel(f"{result.realizations} draws; levels dashed", fontsize=SMALL)
+    title = style.heading(result, "Distribution of J1 over the draws")
+    style.dress(ax, "J1 (s)", "share of the draws at or under it", title)
+    ax.legend(fontsize=style.SMALL, frameon=False, loc="lower right")
+    figure.supxlabel(f"{result.realizations} draws; levels dashed", fontsize=style.SMALL)
     return figure
 
 
@@ -131,59 +114,55 @@ def _shown(result: Uncertainty, cell: int, path: str, system: units.System) -> s
     return f"{value:g} {label}".rstrip()
 
 
-@picture(result="With indices.", raises="The result has no indices.")
+@style.picture(result="With indices.", raises="The result has no indices.")
 def sensitivity_bars(result: Uncertainty, ax: Sequence[Axes] | None = None) -> Figure:
     """First and total Sobol indices with their intervals, a panel a figure that they explain."""
-    found = result.sensitivity
-    if found is None:
+    sobol = result.sensitivity
+    if sobol is None:
         raise InputError("the result has no Sobol indices: ask for uncertainty.sensitivity")
-    shown = [one for one in found.indices if one.variance > 0.0]
+    shown = [one for one in sobol.indices if one.variance > 0.0]
     if not shown:
         raise InputError("nothing varies, so there are no Sobol indices")
-    columns = min(len(shown), 2)
-    rows = -(-len(shown) // columns)
-    if ax is None:
-        height = (0.24 * len(found.parameters) + 1.0) * rows + 0.8
-        figure, panels = grid_or_new(None, rows, columns, 4.6 * columns + 1.6, height)
-    else:
-        figure, panels = grid_or_new(ax, 1, len(shown), 0.0, 0.0)
-    for spare in panels[len(shown) :]:
-        spare.remove()
-    places = np.arange(len(found.parameters))
-    for number, (panel, one) in enumerate(zip(panels, shown, strict=False)):
-        for shift, key, colour in ((-0.19, "first", COLOURS[0]), (0.19, "total", COLOURS[1])):
+    height = 0.24 * len(sobol.parameters) + 1.0
+    figure, panels = style.panels_or_new(ax, len(shown), (4.6, height), (1.6, 0.8))
+    places = np.arange(len(sobol.parameters))
+    for number, (panel, one) in enumerate(zip(panels, shown, strict=True)):
+        for shift, key, colour in (
+            (-0.19, "first", style.COLOURS[0]),
+            (0.19, "total", style.COLOURS[1]),
+        ):
             panel.barh(
                 places + shift, getattr(one, key), 0.36, xerr=getattr(one, f"{key}_error"),
                 color=colour, label=f"{key} index", error_kw={"linewidth": 1.0, "capsize": 2},
             )  # fmt: skip
-        left = ax is not None or number % columns == 0
-        names = [path.removeprefix("drillstring.sections.") for path in found.parameters]
+        left = ax is not None or number % 2 == 0
+        names = [path.removeprefix("drillstring.sections.") for path in sobol.parameters]
         panel.set_yticks(places, names if left else [""] * len(places))
         panel.invert_yaxis()
         panel.set_xlim(-0.25, 1.1)  # what reaches further is error
-        dress(panel, "Sobol index", "", _short(one.of))
+        style.dress(panel, "Sobol index", "", _short(one.of))
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(
-        handles, labels, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False,
-        title=f"{found.samples} points of Saltelli's design; bars: 95 % interval of the error",
-        title_fontsize=SMALL,
+        handles, labels, loc="outside lower center", ncols=2, fontsize=style.SMALL, frameon=False,
+        title=f"{sobol.samples} points of Saltelli's design; bars: 95 % interval of the error",
+        title_fontsize=style.SMALL,
     )  # fmt: skip
     return figure
 
 
 def _short(of: str) -> str:
     """What is explained, by the usual names and without the units of gains."""
-    for path, name in NAMES.items():
+    for path, name in style.NAMES.items():
         of = of.replace(path, name)
     return of.replace(" N*m*s/rad", "").replace(" N*m/rad", "")
 
 
-SHADES = {OUTER: "#D6E6F2", MEDIAN: "#8FBFE0", INNER: BLUE}
+SHADES = {OUTER: "#D6E6F2", MEDIAN: "#8FBFE0", INNER: style.BLUE}
 """Colour of the region of each probability."""
 FEW = 20  # realizations up to which the outline of every one is drawn
 
 
-@picture(**OVER_TWO, ax="A panel for each level.")
+@style.picture(**style.OVER_TWO, ax="A panel for each level.")
 def uncertain_regions(
     result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
@@ -203,20 +182,20 @@ def uncertain_regions(
                 _outline(
                     panel, x, y, _shown_regions(result.j1[number], level), level, "#555555", 0.6
                 )
-        _outline(panel, x, y, result.nominal, level, BLACK, LINE)
+        _outline(panel, x, y, result.nominal, level, style.BLACK, style.LINE)
     handles: list[Patch | Line2D] = [
-        Line2D([], [], color=BLACK, linewidth=LINE, label="design itself"),
+        Line2D([], [], color=style.BLACK, linewidth=style.LINE, label="design itself"),
         Patch(color=SHADES[INNER], label="in at least 95 % of the draws"),
         Patch(color=SHADES[MEDIAN], label="in at least half"),
         Patch(color=SHADES[OUTER], label="in at least 5 %"),
     ]
     if few:
         handles.insert(1, Line2D([], [], color="#555555", linewidth=0.6, label="each draw"))
-    _finish(figure, result, handles, "variability, not error")
+    _finish(figure, result, "Regions by probability", handles, "variability, not error")
     return figure
 
 
-@picture(**OVER_TWO, ax="A panel for each level.")
+@style.picture(**style.OVER_TWO, ax="A panel for each level.")
 def probability_map(
     result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
@@ -235,15 +214,13 @@ def probability_map(
             at = [border(v, result.realizations) for v in shown]
             lines = panel.contour(x, y, probability.T, levels=at, colors="white", linewidths=1.0)
             names = dict(zip(at, shown, strict=True))
-            panel.clabel(lines, fmt=lambda v, names=names: f"{names[v]:.0%}", fontsize=SMALL)
-    bar = figure.colorbar(scale, ax=panels, pad=0.02)
-    bar.set_label("probability that J1 is at or under the level")
-    bar.ax.tick_params(labelsize=SMALL)
-    _finish(figure, result, [], "variability, not error")
+            panel.clabel(lines, fmt=lambda v, names=names: f"{names[v]:.0%}", fontsize=style.SMALL)
+    style.colour_bar(figure, scale, panels, "probability that J1 is at or under the level")
+    _finish(figure, result, "Probability of each level", [], "variability, not error")
     return figure
 
 
-@picture(**OVER_TWO, ax="A panel for each level.")
+@style.picture(**style.OVER_TWO, ax="A panel for each level.")
 def region_error(
     result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
@@ -255,7 +232,7 @@ def region_error(
     from matplotlib.colors import ListedColormap
 
     figure, panels, x, y = _panels(result, ax, system)
-    colours = ("#FFFFFF", "#F2C59F", VERMILLION)
+    colours = ("#FFFFFF", "#F2C59F", style.VERMILLION)
     for panel, level in zip(panels, result.levels, strict=True):
         low, high = result.maps[level].simultaneous
         kind = np.where(low >= INNER, 2, np.where(high >= INNER, 1, 0))
@@ -266,14 +243,20 @@ def region_error(
         value, (least, most) = result.areas[level][INNER]
         panel.annotate(
             f"area {value:.1%} ({100 * least:.1f} to {100 * most:.1f})", (0.98, 0.96),
-            xycoords="axes fraction", ha="right", va="top", fontsize=SMALL,
+            xycoords="axes fraction", ha="right", va="top", fontsize=style.SMALL,
         )  # fmt: skip
     names = ("not in the 95 % region", "not known", "in the 95 % region")
     handles = [
         Patch(facecolor=colour, edgecolor="#888888", label=name)
         for colour, name in zip(colours, names, strict=True)
     ]
-    _finish(figure, result, handles, "sampling error: all cells at once, with 95 %")
+    _finish(
+        figure,
+        result,
+        "Sampling error of the inner regions",
+        handles,
+        "sampling error: all cells at once, with 95 %",
+    )
     return figure
 
 
@@ -282,23 +265,15 @@ def _panels(
 ) -> tuple[Figure, list[Axes], NDArray[np.float64], NDArray[np.float64]]:
     if len(result.axes) != 2:
         raise InputError(f"a map shows 2 parameters, the result has {len(result.axes)}")
-    count = len(result.levels)
-    columns = min(count, 2)
-    rows = -(-count // columns)
-    if ax is None:
-        figure, panels = grid_or_new(None, rows, columns, 4.2 * columns + 1.0, 3.6 * rows + 0.8)
-    else:
-        figure, panels = grid_or_new(ax, 1, count, 0.0, 0.0)
-    for spare in panels[count:]:
-        spare.remove()
-    x, x_label = axis_label(result.axes[0], system)
-    y, y_label = axis_label(result.axes[1], system)
-    for panel, level in zip(panels, result.levels, strict=False):
-        dress(panel, x_label, y_label, f"J1 <= {level:g} s")
+    figure, panels = style.panels_or_new(ax, len(result.levels), (4.2, 3.6), (1.0, 0.8))
+    x, x_label = style.axis_label(result.axes[0], system)
+    y, y_label = style.axis_label(result.axes[1], system)
+    for panel, level in zip(panels, result.levels, strict=True):
+        style.dress(panel, x_label, y_label, f"J1 <= {level:g} s")
         panel.grid(visible=False)
         panel.set_xlim(x[0], x[-1])
         panel.set_ylim(y[0], y[-1])
-    return figure, panels[:count], x, y
+    return figure, panels, x, y
 
 
 def border(probability: float, total: int) -> float:
@@ -341,17 +316,16 @@ def _shown_regions(j1: NDArray[np.float64], level: float) -> NDArray[np.float64]
 
 
 def _finish(
-    figure: Figure, result: Uncertainty, handles: Sequence[Patch | Line2D], what: str
+    figure: Figure, result: Uncertainty, title: str, handles: Sequence[Patch | Line2D], what: str
 ) -> None:
-    figure.suptitle(title_of(result), fontsize=11.0, x=0.01, ha="left")
-    status = result.design.tables.status
-    origin = f"string {status}; " if status == "reconstructed" else ""
+    figure.suptitle(style.heading(result, title), fontsize=style.TITLE, x=0.01, ha="left")
     method = result.design.tables.uncertainty.sampling
-    text = f"{origin}{result.realizations} draws ({method}, seed {result.seed}); {what}"
+    draws = f"{result.realizations} draws ({method}, seed {result.seed}); {what}"
+    text = style.caption(result, draws)
     if not handles:
-        figure.supxlabel(text, fontsize=SMALL)
+        figure.supxlabel(text, fontsize=style.SMALL)
         return
     figure.legend(
-        handles=list(handles), loc="outside lower center", ncols=len(handles), fontsize=SMALL,
-        frameon=False, title=text, title_fontsize=SMALL,
+        handles=list(handles), loc="outside lower center", ncols=len(handles), fontsize=style.SMALL,
+        frameon=False, title=text, title_fontsize=style.SMALL,
     )  # fmt: skip

@@ -119,9 +119,9 @@ def _bad(result: Sweep) -> int | None:
     sticks = known & (result.status.ravel() == STATUSES.index("sticking"))
     over = known & (j1 > result.levels[-1])
     for cells in (sticks & over, over, known):
-        found = np.flatnonzero(cells)
-        if found.size:
-            return int(found[np.abs(j1[found] - 2.0 * result.levels[-1]).argmin()])
+        places = np.flatnonzero(cells)
+        if places.size:
+            return int(places[np.abs(j1[places] - 2.0 * result.levels[-1]).argmin()])
     return None
 
 

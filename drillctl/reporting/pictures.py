@@ -146,7 +146,7 @@ _COLOURS = re.compile("|".join(_INKS), re.IGNORECASE)
 
 def themed(svg: str) -> str:
     """Add a dark colour scheme to an SVG."""
-    svg = _COLOURS.sub(lambda found: f"var(--{_INKS[found[0].lower()][0]})", svg)
+    svg = _COLOURS.sub(lambda match: f"var(--{_INKS[match[0].lower()][0]})", svg)
     light = "".join(f"--{name}:{colour};" for name, colour, _ in _INKS.values())
     dark = "".join(f"--{name}:{colour};" for name, _, colour in _INKS.values())
     style = (

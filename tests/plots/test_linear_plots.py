@@ -15,7 +15,7 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import frequency_response, modes
 from drillctl.plots import bode, friction_curves, mode_shapes
-from drillctl.plots.friction import _curve
+from drillctl.plots.plant import _curve
 
 DESIGN = "monteiro-trindade-140kn"
 

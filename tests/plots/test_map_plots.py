@@ -16,7 +16,7 @@ import drillctl
 from drillctl.ensemble.audit import Audit
 from drillctl.errors import InputError
 from drillctl.plots import stability_map, sweep_line, time_response
-from drillctl.plots.map import axis_label
+from drillctl.plots.style import axis_label
 from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
 from drillctl.studies import Axis, Sweep, responses
 
@@ -84,7 +84,7 @@ def test_map_labels_units_and_levels(design, field):
     assert ax.get_xlabel() == "Kp (N m s)"
     assert ax.get_ylabel() == "weight on bit (kN)"
     assert bar.get_ylabel() == "J1 (s)"
-    assert ax.get_title(loc="left") == "A title"
+    assert ax.get_title(loc="left") == "J1 with its levels\nA title"
     assert contour_levels(ax) == [20.0, 30.0, 40.0]
     assert ax.get_ylim() == pytest.approx((87.5, 212.5))
     texts = {text.get_text() for text in ax.texts}
@@ -134,7 +134,7 @@ def test_reconstructed_strings_say_so(field):
     known = drillctl.load("monteiro-trindade-140kn", status="measured")
     guessed = drillctl.load("monteiro-trindade-140kn", status="reconstructed")
     assert "reconstructed" not in stability_map(made(known, field)).get_supxlabel()
-    assert "string reconstructed" in stability_map(made(guessed, field)).get_supxlabel()
+    assert "String reconstructed" in stability_map(made(guessed, field)).get_supxlabel()
 
 
 def test_failed_cells_are_crossed_out(design, field):

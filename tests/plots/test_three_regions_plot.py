@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import drillctl
 from drillctl.errors import InputError
-from drillctl.plots.regions import OUTLINE, three_regions
+from drillctl.plots.map import OUTLINE, three_regions
 from drillctl.studies import Axis
 from drillctl.studies.three_regions.compute import FIELDS, MASKS, ThreeRegions
 
@@ -144,7 +144,7 @@ def test_nothing_to_draw(design):
 def test_labels_and_units(result):
     ax = three_regions(result).axes[0]
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("Kp (N m s)", "weight on bit (kN)")
-    assert ax.get_title(loc="left") == "A title"
+    assert ax.get_title(loc="left") == "Local stability, J1 and attraction\nA title"
     assert ax.get_xlim() == (-50.0, 450.0)
     field = three_regions(result, system="field").axes[0]
     assert field.get_ylabel() == "weight on bit (klbf)"

@@ -21,7 +21,7 @@ from drillctl.studies.uncertainty import STUDY, indices
 def build_map(gathered: Gathered) -> tuple[Block, ...]:
     """The map, its regions and the status of its cells."""
     study = gathered.need("map")
-    found, words = study.summary, gathered.words
+    result, words = study.summary, gathered.words
     blocks: list[Block] = []
     pictures = [figure(one, "map", words.system) for one in MAP.pictures(study.result)][:1]
     place = gathered.have("cells")
@@ -33,14 +33,14 @@ def build_map(gathered: Gathered) -> tuple[Block, ...]:
                 InteractiveMap(one, lambda: cells.shown(place.folder, study.result, words))
             )
     if not pictures:
-        count = len(found["axes"])
+        count = len(result["axes"])
         blocks.append(Text(f"The map has {count} parameters: see the tables."))
     if table := regions_table(gathered):
         blocks.append(table)
-    total = sum(found["statuses"].values())
+    total = sum(result["statuses"].values())
     rows = tuple(
         (name.replace("_", " "), str(cells_), f"{100.0 * cells_ / total:.1f} %")
-        for name, cells_ in found["statuses"].items()
+        for name, cells_ in result["statuses"].items()
     )
     blocks.append(Table("statuses", "Status at the end of the runs", ("status", "cells", "share"),
                         rows))  # fmt: skip

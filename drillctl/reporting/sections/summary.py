@@ -98,13 +98,13 @@ def _strong(gathered: Gathered) -> Check | None:
     return Check("Is the peak torque below the torsional yield of the pipe?", peak < limit, detail)
 
 
-def summary(found: Verdict) -> dict[str, Any]:
+def summary(result: Verdict) -> dict[str, Any]:
     """A verdict as strict JSON values."""
     return {
-        "current_setting": found.word,
+        "current_setting": result.word,
         "checks": [
             {"question": one.question, "answer": one.answer, "detail": one.detail}
-            for one in found.checks
+            for one in result.checks
         ],
     }
 

@@ -1,12 +1,8 @@
-"""Shapes of the modes along the string.
-
-Mobility at the ends of the string: how fast an end turns per torque on it.
-
-Frequency response between any two signals, of one system or of several.
-"""
+"""The plant: mode shapes, mobility of the ends, frequency responses, friction of the bit."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -23,16 +19,19 @@ from matplotlib.ticker import (
 from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.modal import Mode, Modes
 from drillctl.linear.response import FrequencyResponse
 from drillctl.plots import style
-from drillctl.plots.style import picture
+from drillctl.rig.bit_rock import BitRockLaw
 
-SHOWN = 4  # modes drawn of each boundary condition: more cannot be told apart
+Array = NDArray[np.float64]
+
+SHOWN = 4  # modes drawn of each boundary condition: more cannot be distinguished
 
 
-@picture(
+@style.picture(
     result="From `drillctl.modes`.",
     ax="Four panels: angle and torque with the top free, then with the top held.",
 )
@@ -46,8 +45,8 @@ def mode_shapes(
     figure, panels = style.grid_or_new(ax, 2, 2, 8.5, 8.0, share_y=True)
     place, label = _places(result, system)
     rows = (("Top free", result.free_free), ("Top held", result.fixed_top))
-    for (support, found), (left, right) in zip(rows, (panels[:2], panels[2:]), strict=True):
-        for number, mode in enumerate(found[:SHOWN]):
+    for (support, lowest), (left, right) in zip(rows, (panels[:2], panels[2:]), strict=True):
+        for number, mode in enumerate(lowest[:SHOWN]):
             _draw(left, right, mode, place, number)
         style.dress(left, "angle, largest = 1", label, f"{support}: angle")
         style.dress(right, "torque, largest = 1", "", f"{support}: torque")
@@ -71,21 +70,12 @@ def _places(result: Modes, system: units.System) -> tuple[NDArray[np.float64], s
 
 
 def _draw(left: Axes, right: Axes, mode: Mode, place: NDArray[np.float64], number: int) -> None:
-    colour = style.COLOURS[number]
-    dashes = style.DASHES[number]
-    left.plot(mode.shape, place, color=colour, linestyle=dashes, linewidth=style.LINE)
+    left.plot(mode.shape, place, **style.look(number))
     # Torque is constant along an element: steps, and no more smoothness than there is.
     right.stairs(
-        mode.torque_shape,
-        place,
-        orientation="horizontal",
-        baseline=None,
-        color=colour,
-        linestyle=dashes,
-        linewidth=style.LINE,
-        zorder=2,
-        label=_name(mode),
-    )
+        mode.torque_shape, place, orientation="horizontal", baseline=None, zorder=2,
+        label=_name(mode), **style.look(number),
+    )  # fmt: skip
 
 
 def _name(mode: Mode) -> str:
@@ -103,8 +93,8 @@ ENDS = (("bit", "bit_torque", "bit_speed"), ("top", "top_torque", "top_speed"))
 """Name, input and output of each end."""
 
 
-@picture(
-    results="From `drillctl.linear.frequency_response`; told apart by their `title`.",
+@style.picture(
+    results="From `drillctl.linear.frequency_response`; distinguished by their `title`.",
     ax="A panel for the bit, and one for the top if a result has the top torque as an input.",
     raises="Nothing to draw, a result without mobility at the bit, not as many axes as panels.",
 )
@@ -145,14 +135,9 @@ def _has(one: FrequencyResponse, end: tuple[str, str, str]) -> bool:
 def _draw_mobility(
     panel: Axes, one: FrequencyResponse, end: tuple[str, str, str], number: int, count: int
 ) -> None:
-    panel.loglog(
-        one.frequency_hz,
-        np.abs(one.between(*end[1:])) * PER_TORQUE,
-        color=style.COLOURS[number % len(style.COLOURS)],
-        linestyle=style.DASHES[number % len(style.DASHES)],
-        linewidth=style.LINE if count == 1 else WIDTHS[min(number, len(WIDTHS) - 1)],
-        label=one.title,
-    )
+    width = style.LINE if count == 1 else WIDTHS[min(number, len(WIDTHS) - 1)]
+    speed = np.abs(one.between(*end[1:])) * PER_TORQUE
+    panel.loglog(one.frequency_hz, speed, label=one.title, **style.look(number, width))
 
 
 TARGETS = ("top_speed", "bit_speed")  # outputs that are drawn unless others are named
@@ -160,8 +145,8 @@ WIDTHS = (2.8, 1.6, 1.1, 0.8)
 """Widths (points) of one response after another, so that equal ones show through."""
 
 
-@picture(
-    result="From `drillctl.linear.frequency_response`; several are told apart by their `title`.",
+@style.picture(
+    result="From `drillctl.linear.frequency_response`; several are distinguished by their `title`.",
     ax="Two panels: magnitude and phase.",
     source="Input; by default the first input of each result.",
     targets="Outputs; by default top and bit speed.",
@@ -244,15 +229,15 @@ def _common_unit(
     results: Sequence[FrequencyResponse], sources: Sequence[str], targets: Sequence[str]
 ) -> str:
     """The unit of all that is drawn on one axis; refuses several."""
-    found: dict[str, str] = {}
+    by_unit: dict[str, str] = {}
     for one, source in zip(results, sources, strict=True):
         for target in targets:
             one.between(source, target)  # refuses an unknown signal by name
-            found.setdefault(one.unit(source, target), f"{spoken(source)} to {spoken(target)}")
-    if len(found) > 1:
-        pairs = "; ".join(f"{pair} in {unit or 'no known unit'}" for unit, pair in found.items())
+            by_unit.setdefault(one.unit(source, target), f"{spoken(source)} to {spoken(target)}")
+    if len(by_unit) > 1:
+        pairs = "; ".join(f"{pair} in {unit or 'no known unit'}" for unit, pair in by_unit.items())
         raise InputError(f"one axis cannot show several units: {pairs}", "targets")
-    return next(iter(found))
+    return next(iter(by_unit))
 
 
 def _level(unit: str) -> str:
@@ -265,7 +250,68 @@ def _plain(unit: str) -> str:
 
 def _look(order: int, number: int, results: int, targets: int) -> dict[str, Any]:
     """Colour by target; dash and width by result as well, so that grey print can be read."""
-    dash = style.DASHES[(order * targets + number) % len(style.DASHES)]
     width = style.LINE if results == 1 else WIDTHS[min(order, len(WIDTHS) - 1)]
-    colour = style.COLOURS[(order * targets + number) % len(style.COLOURS)]
-    return {"color": colour, "linestyle": dash, "linewidth": width}
+    return style.look(order * targets + number, width)
+
+
+BACKWARD = -20.0  # slowest speed drawn (rpm): enough to show that the torque changes sign
+FORWARD = 250.0  # highest speed drawn (rpm), unless the rig is set to turn faster
+WEIGHT = "operating_point.weight_on_bit"
+
+
+@style.picture(design="The rig.")
+def friction_curves(design: Design, ax: Axes | None = None, system: units.System = "si") -> Figure:
+    """Draw the torque on the bit against its speed, for each weight on bit of the table.
+
+    One curve for each row of the friction table, and for the operating weight on bit if it is not
+    a row. At rest the torque takes any value on the vertical segment. A dot marks the operating
+    point.
+    """
+    figure, ax = style.axes_or_new(ax)
+    weight = design.tables.operating_point.weight_on_bit
+    last = max(FORWARD, 1.2 * design.speed / units.RPM)
+    scale, torque_unit = units.displayed(1.0, "N*m", system)
+    for number, each in enumerate(_weights(design)):
+        law = design.replace({WEIGHT: units.SI(each)}).bit_rock
+        speeds, torques = _curve(law, each, last)
+        look = style.look(number) | {"linestyle": "-" if each == weight else "--"}
+        ax.plot(speeds, scale * torques, label=_weight(each, system), **look)
+    torque, _ = design.bit_rock.torque_and_slope(weight, design.speed, math.exp)
+    label = f"operating point: {_weight(weight, system)}, {design.speed / units.RPM:.4g} rpm"
+    ax.plot(design.speed / units.RPM, scale * torque, "o", color=style.BLACK, zorder=5, label=label)
+    style.dress(
+        ax, "bit speed (rpm)", f"bit torque ({torque_unit})", "Bit torque against bit speed"
+    )
+    for line in (ax.axhline, ax.axvline):
+        line(0.0, color="#888888", linewidth=0.8, zorder=1)
+    ax.set_xlim(BACKWARD, last)
+    ax.legend(fontsize=style.SMALL, frameon=False, loc="lower right")
+    return figure
+
+
+def _weight(weight: float, system: units.System) -> str:
+    shown, unit = units.displayed(weight, "N", system)
+    return f"{shown:.4g} {unit}"
+
+
+def _weights(design: Design) -> list[float]:
+    """Weights on bit (N) to draw, heaviest first, as the curves lie in the picture."""
+    rows = getattr(design.tables.bit_rock, "table", None) or ()
+    weights = {row.weight_on_bit for row in rows}
+    return sorted(weights | {design.tables.operating_point.weight_on_bit}, reverse=True)
+
+
+def _curve(law: BitRockLaw, weight: float, last: float) -> tuple[Array, Array]:
+    """Speed (rpm) and torque (N m) from `BACKWARD` to `last` (rpm), through rest."""
+    forward = np.linspace(0.0, last, 400)
+    backward = np.linspace(-BACKWARD, 0.0, 100)
+    ahead = _torques(law, weight, forward * units.RPM)
+    behind = _torques(law, weight, backward * units.RPM)
+    static = law.static_torque(weight)
+    speed = np.concatenate([-backward, [0.0, 0.0], forward])
+    torque = np.concatenate([-behind, [-static, static], ahead])
+    return speed, torque
+
+
+def _torques(law: BitRockLaw, weight: float, speeds: Array) -> Array:
+    return np.array([law.torque_and_slope(weight, speed, math.exp)[0] for speed in speeds])
