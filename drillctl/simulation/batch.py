@@ -167,10 +167,12 @@ def _run(
     run = kernel(*arguments[1:7])
     rows = ROWS + 2 * len(state) + ticks.remembered + 2 * ticks.estimated
 
-    def advance(begin: int, end: int) -> None:
-        run(begin, end, *arguments, _aligned(rows * WIDTH), measures, traces)
+    watch = np.zeros(1, dtype=np.int64)  # other than zero: stop
 
-    _in_threads(advance, len(padded) // WIDTH)
+    def advance(begin: int, end: int) -> None:
+        run(begin, end, *arguments, _aligned(rows * WIDTH), measures, traces, watch)
+
+    _in_threads(advance, len(padded) // WIDTH, watch)
     return measures[:, :count], traces[:, :, :count]
 
 
@@ -181,14 +183,14 @@ def _aligned(size: int) -> Array:
     return room[(-room.ctypes.data % line) // 8 :][:size]
 
 
-def _in_threads(advance: Callable[[int, int], Any], blocks: int) -> None:
-    """Advance all blocks, some at a time in each of numba's number of threads."""
+def _in_threads(advance: Callable[[int, int], Any], blocks: int, watch: NDArray[np.int64]) -> None:
+    """Advance all blocks, some at a time in each of numba's number of threads.
+
+    The caller's own thread waits, so that an interruption reaches it: it tells the kernels.
+    """
     import numba
 
     threads = min(numba.get_num_threads(), blocks)
-    if threads == 1:
-        advance(0, blocks)
-        return
     shares = deque(_shares(blocks, threads))
 
     def work() -> None:
@@ -199,14 +201,15 @@ def _in_threads(advance: Callable[[int, int], Any], blocks: int) -> None:
                 return
             advance(*share)
 
-    with ThreadPoolExecutor(threads - 1) as pool:
-        others = [pool.submit(work) for _ in range(threads - 1)]
+    with ThreadPoolExecutor(threads) as pool:
+        working = [pool.submit(work) for _ in range(threads)]
         try:
-            work()
-        finally:
-            shares.clear()  # interrupted: the others end what they have begun
-        for other in others:
-            other.result()
+            for one in working:
+                one.result()
+        except BaseException:  # interrupted, or one has failed: the others stop
+            shares.clear()
+            watch[0] = 1
+            raise
 
 
 def _shares(blocks: int, threads: int) -> Iterator[tuple[int, int]]:

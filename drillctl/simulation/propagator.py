@@ -145,8 +145,9 @@ def string_step(string: Drillstring, step: float, modes: int) -> StringStep:
         "pipe_by_top": float(left_out[0]),
         "pipe_by_bit": float(left_out[-1]),
     }
+    arrays = {name: np.ascontiguousarray(x) for name, x in fields.items() if np.ndim(x)}
     return StringStep(
-        string=kind(**fields, **constants),
+        string=kind(**(fields | arrays | constants)),
         angle_to_state=basis[:, :modes] @ to_modal,
         speed_to_state=basis[:, modes:] @ to_modal,
         rest=rest,

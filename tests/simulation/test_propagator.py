@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from drillctl.rig.drillstring import Drillstring, Section, assemble
 from drillctl.rig.top_drive import PI
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import OPTIONS, put
+from drillctl.simulation.kernels.arithmetic import OPTIONS
 from drillctl.simulation.kernels.observer_step import NoObserver
 from drillctl.simulation.kernels.string_step import (
     BlockString,
@@ -18,6 +18,7 @@ from drillctl.simulation.kernels.string_step import (
     complete_and_propagate,
     look,
 )
+from drillctl.simulation.kernels.vectors import emitted, put
 from drillctl.simulation.lanes import Start
 from drillctl.simulation.propagator import string_step
 
@@ -32,15 +33,25 @@ numba = pytest.importorskip("numba")
 STEP = 0.02
 
 
+@emitted
+def _pass(string, drive, observer, state, work):
+    complete_and_propagate(string, drive, observer, state, work)
+
+
+@emitted
+def _look(string, state, work):
+    speed, angle = look(string, state, work)
+    put(work, r.SEEN_TOP, speed)
+    put(work, r.SEEN_TWIST, angle)
+
+
 @numba.njit(**OPTIONS)
 def _steps(string, drive, observer, state, work, torques, seen):
     for n in range(len(torques)):
-        complete_and_propagate(string, drive, observer, state, work)
+        _pass(string, drive, observer, state, work)
         work[r.TOP_TORQUE] = torques[n, 0]
         work[r.BIT_TORQUE] = torques[n, 1]
-        speed, angle = look(string, state, work)
-        put(work, r.SEEN_TOP, speed)
-        put(work, r.SEEN_TWIST, angle)
+        _look(string, state, work)
         seen[n, 0] = work[r.SEEN_TOP]
         seen[n, 1] = work[r.SEEN_TWIST]
 

@@ -16,28 +16,27 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
+from drillctl.rig.bit_rock import contact
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import (
     OPTIONS,
     aligned_stack,
     any_of,
-    at,
-    compiled,
+    exp,
     fma,
-    inlined,
-    pick,
-    put,
+    law_at,
+    least,
+    load_block,
+    most,
 )
 from drillctl.simulation.kernels.drive_step import (
     begin_drive,
     eliminate,
     follow_drive,
+    move_top,
     sample_drive,
     top_torque_now,
 )
-from drillctl.simulation.kernels.held_rock import hold_rock
-from drillctl.simulation.kernels.lane_step import move_top
-from drillctl.simulation.kernels.laws import contact, law_at, load_block, weight_at
 from drillctl.simulation.kernels.measure_step import (
     Before,
     begin_measures,
@@ -48,9 +47,18 @@ from drillctl.simulation.kernels.measure_step import (
     measure_pipe,
 )
 from drillctl.simulation.kernels.program_step import advance_program, begin_program
-from drillctl.simulation.kernels.rock_step import meet_rock
+from drillctl.simulation.kernels.rock_step import hold_rock, meet_rock
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.kernels.string_step import complete_and_propagate, look
+from drillctl.simulation.kernels.vectors import (
+    Variable,
+    at,
+    emitted,
+    loop,
+    pick,
+    put,
+    when,
+)
 from drillctl.simulation.kernels.weight_step import (
     Memory,
     acting,
@@ -66,7 +74,7 @@ TRACED = (
 )  # fmt: skip
 """Signals of a trace, in the order in which they leave the kernel."""
 
-LOOK = 64  # steps from one look at whether lanes may be given up to the next
+LOOK = 64  # steps from one look at whether to stop, or lanes may be given up, to the next
 
 
 class Clock(NamedTuple):
@@ -84,15 +92,13 @@ class Clock(NamedTuple):
     give_up: float  # J1 (s) over which nothing more is asked of a lane; infinite for none
 
 
-@inlined
-def _share_after(begin: float, step: float, moment: float) -> float:
+def _share_after(begin: Any, step: Any, moment: Any) -> Any:
     """Share of a step that lies after a moment."""
-    return min(1.0, max(0.0, (begin + step - moment) / step))
+    return least(most((begin + step - moment) / step, 0.0), 1.0)
 
 
-@compiled
 def _load(
-    string: Any, friction: Any, drive: Any, weight: Any, speed: Any, work: Any, first: int
+    string: Any, friction: Any, drive: Any, weight: Any, speed: Any, work: Any, first: Any
 ) -> None:
     """Numbers of the laws and of the lanes."""
     load_block(friction, work, r.FRICTION, first)
@@ -108,16 +114,15 @@ def _load(
     put(work, r.PIPE_OFFSET, string.pipe_offset * set_speed)
 
 
-@compiled
 def _begin_rock(friction: Any, weight: Any, work: Any) -> None:
     """What bit and rock are to each other at time zero."""
     speed = at(work, r.BIT_SPEED)
     load = acting(weight, work)
-    at_rest = weight_at(load, 0.0 * speed)
+    at_rest = load.weight(0.0 * speed)
     put(work, r.REST_LOAD, at_rest)
     put(work, r.REST_END, at_rest)
-    put(work, r.LOAD, weight_at(load, abs(speed)))
-    torque, slope = contact(law_at(friction, work, r.FRICTION), load, abs(speed))
+    put(work, r.LOAD, load.weight(abs(speed)))
+    torque, slope = contact(law_at(friction, work, r.FRICTION), load, abs(speed), exp)
     direction = pick(speed > 0.0, 1.0, pick(speed < 0.0, -1.0, 0.0))
     put(work, r.SLOPE, slope)
     put(work, r.DIRECTION, direction)
@@ -125,32 +130,29 @@ def _begin_rock(friction: Any, weight: Any, work: Any) -> None:
     put(work, r.HOLDING, -1.0)
 
 
-@compiled
 def _begin(
     string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any, observer: Any,
-    speed: Any, start: Any, clock: Any, state: Any, work: Any, memory: Any, first: int,
+    speed: Any, start: Any, clock: Any, state: Any, work: Any, memory: Any, first: Any,
 ) -> None:  # fmt: skip
     """A block at time zero; its memory holds zeros."""
     _load(string, friction, drive, weight, speed, work, first)
-    for i in range(start.shape[0]):
-        put(state, i * WIDTH, at(start[i], first))
+    with loop(start.shape[0]) as states:
+        put(state, states.index * WIDTH, at(start[states.index], first))
     begin_program(program, before, work, first)
     begin_drive(drive, string, work, 1.0 / clock.step)
     begin_weight(weight, observer, work, memory, first)
     _begin_rock(friction, weight, work)
-    begin_measures(work)
+    begin_measures(work, top_torque_now(drive, work, at(work, r.TOP_SPEED)))
 
 
-@compiled
 def _look_around(string: Any, state: Any, work: Any) -> None:
     speed, angle = look(string, state, work)
     put(work, r.SEEN_TOP, speed)
     put(work, r.SEEN_TWIST, angle)
 
 
-@compiled
 def _sample(
-    string: Any, drive: Any, work: Any, pipe: Any, traces: Any, sample: int, first: int
+    string: Any, drive: Any, work: Any, pipe: Any, traces: Any, sample: int, first: Any
 ) -> None:
     """Store one sample of every lane; speeds and angles were seen before the pass."""
     set_speed, top_speed = at(work, r.SET_SPEED), at(work, r.SEEN_TOP)
@@ -167,7 +169,6 @@ def _sample(
     put(signals[8], first, at(work, r.LOAD))
 
 
-@inlined
 def _conclude(string: Any, drive: Any, observer: Any, swing: Any, reduced: Any, outcome: Any,
               work: Any) -> None:  # fmt: skip
     """Top torque of the step, and the state at its end."""
@@ -184,8 +185,7 @@ def _conclude(string: Any, drive: Any, observer: Any, swing: Any, reduced: Any, 
     put(work, r.HOLDING, outcome.holding)
 
 
-@compiled
-def _all_given_up(work: Any, level: float) -> bool:
+def _all_given_up(work: Any, level: Any) -> Any:
     """Note the lanes whose J1 has passed the level; whether these are all.
 
     J1 only grows. Each lane is judged by itself, at the same steps whatever its company.
@@ -193,41 +193,52 @@ def _all_given_up(work: Any, level: float) -> bool:
     j1, bound = at(work, r.J1), at(work, r.BOUND)
     over = (j1 > level * at(work, r.SET_SPEED)) & (bound == 0.0)
     put(work, r.BOUND, pick(over, j1, bound))
-    return not any_of(at(work, r.BOUND) == 0.0)
+    return ~any_of(at(work, r.BOUND) == 0.0)
 
 
-@compiled
+@emitted
 def _advance_block(
     string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any, observer: Any,
-    speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any, first: int,
+    speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any, watch: Any,
+    first: Any,
 ) -> None:  # fmt: skip
     """Advance the lanes from `first` on, one block, from time zero to the end."""
     aligned_stack()
-    work = kept[: r.ROWS * WIDTH]
-    ring = r.ROWS * WIDTH + 2 * start.shape[0] * WIDTH
+    ring = r.ROWS * WIDTH + 2 * WIDTH * start.shape[0]
     estimate = ring + clock.remembered * WIDTH
     moved = estimate + clock.estimated * WIDTH
-    state = kept[r.ROWS * WIDTH : ring]
+    work, state = kept[: r.ROWS * WIDTH], kept[r.ROWS * WIDTH : ring]
     memory = Memory(kept[ring:estimate], kept[estimate:moved], kept[moved:])
-    kept[:] = 0.0
+    with loop(kept.shape[0] // WIDTH) as rows:
+        put(kept, rows.index * WIDTH, 0.0)
     _begin(
         string, friction, before, drive, weight, program, observer,
         speed, start, clock, state, work, memory, first,
     )  # fmt: skip
     rate = 1.0 / clock.step
-    for n in range(clock.steps + 1):
+    # Steps at which the next sample is due: of a trace, of the controller.
+    traced = Variable(pick(clock.every > 0, 0, clock.steps + 1))
+    samples = Variable(0 * clock.every)
+    sampled = Variable(pick(clock.sampling > 0, 0, clock.steps + 1))
+    with loop(clock.steps + 1) as steps:
+        n = steps.index
         begin = n * clock.step
         advance_program(program, friction, weight, work, first, begin, clock.step)
-        sampled = clock.every > 0 and n % clock.every == 0
-        if sampled:
+        is_traced = n == traced.get()
+        with when(is_traced):
             _look_around(string, state, work)
         swing = complete_and_propagate(string, drive, observer, state, work)
         measure_pipe(work, swing.pipe)
-        if sampled:
-            _sample(string, drive, work, swing.pipe, traces, n // clock.every, first)
-        if n == clock.steps:
-            break
-        sample_drive(drive, work, clock.sampling > 0 and n % clock.sampling == 0)
+        with when(is_traced):
+            _sample(string, drive, work, swing.pipe, traces, samples.get(), first)
+            samples.set(samples.get() + 1)
+            traced.set(traced.get() + clock.every)
+        with when(n == clock.steps):
+            steps.leave()
+        is_sampled = n == sampled.get()
+        sample_drive(drive, work, is_sampled)
+        with when(is_sampled):
+            sampled.set(sampled.get() + clock.sampling)
         raise_weight(weight, program, work, memory, n, clock.step)
         hold_rock(friction, weight, work)
         was = Before(at(work, r.BIT_SPEED), at(work, r.TOP_SPEED), at(work, r.LOAD))
@@ -241,8 +252,11 @@ def _advance_block(
         in_window = _share_after(begin, clock.step, clock.window_from)
         measure(work, was, outcome, begin, clock.step, in_j1, in_window)
         measure_load(weight, program, work, was, outcome, clock.step)
-        if n % LOOK == LOOK - 1 and _all_given_up(work, clock.give_up):
-            break
+        with (
+            when((n & (LOOK - 1)) == LOOK - 1),
+            when((watch[0] != 0) | _all_given_up(work, clock.give_up)),
+        ):
+            steps.leave()
     conclude_bands(work, clock.steps * clock.step)
     conclude_load(weight, program, work, clock.steps * clock.step)
     for measured in range(r.MEASURES):
@@ -253,15 +267,18 @@ def _compile(on_disk: bool) -> Any:
     version = fingerprint(sources())
 
     def run(
-        begin: int, end: int,
+        begin: Any, end: Any,
         string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
         observer: Any, speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any,
+        watch: Any,
     ) -> str:  # fmt: skip
         """Advance blocks of lanes from time zero to the end."""
         for block in range(begin, end):
+            if watch[0] != 0:
+                break
             _advance_block(
                 string, friction, before, drive, weight, program, observer,
-                speed, start, clock, kept, measures, traces, block * WIDTH,
+                speed, start, clock, kept, measures, traces, watch, block * WIDTH,
             )  # fmt: skip
         return version
 
@@ -309,7 +326,7 @@ run_unkept = _compile(on_disk=False)  # `run`, compiled anew in every process
 
 run = _compile(on_disk=True)
 """Advance lanes from time zero to the end: `run(begin, end, string, friction, before,
-drive, weight, program, observer, speed, start, clock, kept, measures, traces)`.
+drive, weight, program, observer, speed, start, clock, kept, measures, traces, watch)`.
 
 - `begin`, `end`: blocks of `WIDTH` lanes to advance, of all those there are. Blocks do not see each
   other: threads may take some each, the interpreter's lock is not held.
@@ -325,6 +342,8 @@ drive, weight, program, observer, speed, start, clock, kept, measures, traces)`.
 - `kept`, shape (rows x WIDTH,): memory of one block, `rows.py`; each thread brings its own.
 - `measures`, shape (MEASURES, lanes): written; the rows from `rows.FIRST_MEASURE` on.
 - `traces`, shape (samples, len(TRACED), lanes): written if `clock.every` > 0.
+- `watch`, shape (1,), whole numbers: looked at every `LOOK` steps; another thread makes it other
+  than zero to stop the run.
 
 `lanes` must be a multiple of `WIDTH`. Returns the fingerprint of the sources.
 """

@@ -18,19 +18,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import (
-    at,
-    by_type,
-    compiled,
-    each,
-    fma,
-    inlined,
-    most,
-    pick,
-    put,
-)
-from drillctl.simulation.kernels.laws import law_at, mean_torque, torque_at
+from drillctl.simulation.kernels.arithmetic import fma, law_at, most
+from drillctl.simulation.kernels.observer_step import ObserverStep
 from drillctl.simulation.kernels.program_step import NoProgram
+from drillctl.simulation.kernels.vectors import at, each, pick, put, when
 
 
 class RealStep(NamedTuple):
@@ -130,22 +121,16 @@ class Reduced(NamedTuple):
     per_gain: Any
 
 
-def begin_drive(drive: Any, string: Any, work: Any, rate: float) -> None:
+def begin_drive(drive: Any, string: Any, work: Any, rate: Any) -> None:
     """Memory at time zero, or constants of an ideal drive; the top speed is in its row."""
-    raise NotImplementedError("compiled only")
+    if isinstance(drive, RealStep):
+        return _begin_real(drive, string, work, rate)
+    if isinstance(drive, SampledStep):
+        return _begin(work)
+    return _begin_ideal(drive, string, work, rate)
 
 
-@by_type(begin_drive)
-def _begin_drive(drive, string, work, rate):
-    if drive.instance_class is RealStep:
-        return lambda drive, string, work, rate: _begin_real(drive, string, work, rate)
-    if drive.instance_class is SampledStep:
-        return lambda drive, string, work, rate: _begin(work)
-    return lambda drive, string, work, rate: _begin_ideal(drive, string, work, rate)
-
-
-@compiled
-def _begin_real(drive: Any, string: Any, work: Any, rate: float) -> None:
+def _begin_real(drive: Any, string: Any, work: Any, rate: Any) -> None:
     """Memory, and what the drive's slopes make of a step in which nothing limits it.
 
     A motor without lag gives its torque from the first moment on.
@@ -166,18 +151,16 @@ def _begin_real(drive: Any, string: Any, work: Any, rate: float) -> None:
     put(work, r.MOTOR, pick(law.mean == 0.0, _clip(wanted, low, high), 0.0))
 
 
-@inlined
 def _begin(work: Any) -> None:
     put(work, r.SEEN, at(work, r.TOP_SPEED))
     put(work, r.SEEN_LAST, at(work, r.TOP_SPEED))
 
 
-@compiled
-def _begin_ideal(drive: Any, string: Any, work: Any, rate: float) -> None:
+def _begin_ideal(drive: Any, string: Any, work: Any, rate: Any) -> None:
     """Constants of an ideal drive: its mean torque is a line in both angles of the step."""
     law = law_at(drive, work, r.DRIVE)
-    level, slope = mean_torque(law, each(0.0), rate)
-    level_of_one, _ = mean_torque(law, each(1.0), rate)
+    level, slope = law.mean_torque(each(0.0), rate)
+    level_of_one, _ = law.mean_torque(each(1.0), rate)
     drag = at(work, r.DRAG)
     shrink = 1.0 / (1.0 + slope * string.angle_by_top)
     share = slope * string.angle_by_bit * shrink
@@ -190,13 +173,11 @@ def _begin_ideal(drive: Any, string: Any, work: Any, rate: float) -> None:
     put(work, r.PER_GAIN, 1.0 / gain)
 
 
-@inlined
 def _clip(value: Any, low: Any, high: Any) -> Any:
     value = pick(value < low, low, value)
     return pick(value > high, high, value)
 
 
-@inlined
 def _limits(law: Any, speed: Any) -> Any:
     """Limits of the torque in this step at an absolute speed (rad/s)."""
     by_power = law.power / most(abs(speed), SLOWEST)
@@ -204,26 +185,15 @@ def _limits(law: Any, speed: Any) -> Any:
     return low, pick(law.most < by_power, law.most, by_power)
 
 
-def eliminate(drive: Any, program: Any, string: Any, swing: Any, work: Any, rate: float) -> Any:
+def eliminate(drive: Any, program: Any, string: Any, swing: Any, work: Any, rate: Any) -> Any:
     """What is left of string and drive for the bit: a `Reduced`; `rate` is 1 / step."""
-    raise NotImplementedError("compiled only")
-
-
-@by_type(eliminate)
-def _eliminate(drive, program, string, swing, work, rate):
-    if drive.instance_class is RealStep:
-        return lambda drive, program, string, swing, work, rate: _by_real_drive(
-            drive, string, swing, work, rate
-        )
-    if drive.instance_class is SampledStep:
-        return lambda drive, program, string, swing, work, rate: _by_held_torque(
-            drive, string, swing, work
-        )
-    if program.instance_class is NoProgram:
-        return lambda drive, program, string, swing, work, rate: _by_ideal_drive(
-            string, swing, work, at(work, r.ANGLE), swing.top_angle
-        )
-    return lambda drive, program, string, swing, work, rate: _by_ideal_drive(
+    if isinstance(drive, RealStep):
+        return _by_real_drive(drive, string, swing, work, rate)
+    if isinstance(drive, SampledStep):
+        return _by_held_torque(drive, string, swing, work)
+    if isinstance(program, NoProgram):
+        return _by_ideal_drive(string, swing, work, at(work, r.ANGLE), swing.top_angle)
+    return _by_ideal_drive(
         string,
         swing,
         work,
@@ -232,7 +202,6 @@ def _eliminate(drive, program, string, swing, work, rate):
     )
 
 
-@inlined
 def _by_ideal_drive(string: Any, swing: Any, work: Any, angle: Any, free_angle: Any) -> Any:
     alone = fma(at(work, r.LINE_BACK), angle, at(work, r.LINE_LEVEL))
     alone = fma(at(work, r.LINE_FORTH), free_angle, alone)
@@ -241,7 +210,6 @@ def _by_ideal_drive(string: Any, swing: Any, work: Any, angle: Any, free_angle: 
     return Reduced(alone, at(work, r.SHARE), free, at(work, r.GAIN), at(work, r.PER_GAIN))
 
 
-@inlined
 def _by_number(string: Any, swing: Any, work: Any, torque: Any) -> Any:
     """A mean torque that is known beforehand."""
     free = at(work, r.SET_SPEED) + swing.bit_speed
@@ -250,8 +218,7 @@ def _by_number(string: Any, swing: Any, work: Any, torque: Any) -> Any:
     return Reduced(torque, each(0.0), free, each(gain), each(1.0 / gain))
 
 
-@inlined
-def _by_real_drive(drive: Any, string: Any, swing: Any, work: Any, rate: float) -> Any:
+def _by_real_drive(drive: Any, string: Any, swing: Any, work: Any, rate: Any) -> Any:
     law = law_at(drive, work, r.DRIVE)
     angle, motor = at(work, r.ANGLE), at(work, r.MOTOR)
     error = (at(work, r.SHIFT_NEW) - at(work, r.SHIFT) + angle) * rate
@@ -293,7 +260,6 @@ def _by_real_drive(drive: Any, string: Any, swing: Any, work: Any, rate: float) 
     )
 
 
-@inlined
 def _by_held_torque(drive: Any, string: Any, swing: Any, work: Any) -> Any:
     law = law_at(drive, work, r.DRIVE)
     motor, command = at(work, r.MOTOR), at(work, r.COMMAND)
@@ -305,19 +271,13 @@ def _by_held_torque(drive: Any, string: Any, swing: Any, work: Any) -> Any:
     return _by_number(string, swing, work, torque)
 
 
-def sample_drive(drive: Any, work: Any, due: bool) -> None:
+def sample_drive(drive: Any, work: Any, due: Any) -> None:
     """Let a sampled controller work, where it is due."""
-    raise NotImplementedError("compiled only")
+    if isinstance(drive, SampledStep):
+        with when(due):
+            _sample(drive, work)
 
 
-@by_type(sample_drive)
-def _sample_drive(drive, work, due):
-    if drive.instance_class is SampledStep:
-        return lambda drive, work, due: _sample(drive, work) if due else None
-    return lambda drive, work, due: None
-
-
-@inlined
 def _sample(drive: Any, work: Any) -> None:
     law = law_at(drive, work, r.DRIVE)
     speed = at(work, r.SEEN)
@@ -339,25 +299,15 @@ def _sample(drive: Any, work: Any) -> None:
     put(work, r.IMPULSE, 0.0)
 
 
-def follow_drive(drive: Any, work: Any, top_speed_before: Any, rate: float) -> None:
+def follow_drive(drive: Any, work: Any, top_speed_before: Any, rate: Any) -> None:
     """Memory at the end of a step whose motion is known."""
-    raise NotImplementedError("compiled only")
+    if isinstance(drive, RealStep):
+        return _follow_real(drive, work, top_speed_before, rate)
+    if isinstance(drive, SampledStep):
+        return _follow_sampled(drive, work, top_speed_before, rate)
+    return None
 
 
-@by_type(follow_drive)
-def _follow_drive(drive, work, top_speed_before, rate):
-    if drive.instance_class is RealStep:
-        return lambda drive, work, top_speed_before, rate: _follow_real(
-            drive, work, top_speed_before, rate
-        )
-    if drive.instance_class is SampledStep:
-        return lambda drive, work, top_speed_before, rate: _follow_sampled(
-            drive, work, top_speed_before, rate
-        )
-    return lambda drive, work, top_speed_before, rate: None
-
-
-@inlined
 def _see(law: Any, work: Any, before: Any) -> Any:
     """Move the encoder; returns the change of the speed that it shows."""
     after, seen = at(work, r.TOP_SPEED), at(work, r.SEEN)
@@ -366,7 +316,6 @@ def _see(law: Any, work: Any, before: Any) -> Any:
     return new - seen
 
 
-@inlined
 def _turn(law: Any, work: Any, torque: Any) -> None:
     """Move the motor under its mean torque, or by as much as its limit of rate allows."""
     motor, at_rate = at(work, r.MOTOR), at(work, r.MOVED)
@@ -375,8 +324,7 @@ def _turn(law: Any, work: Any, torque: Any) -> None:
     put(work, r.MOTOR, motor + pick(at_rate != 0.0, at_rate, moved))
 
 
-@inlined
-def _follow_real(drive: Any, work: Any, before: Any, rate: float) -> None:
+def _follow_real(drive: Any, work: Any, before: Any, rate: Any) -> None:
     step = 1.0 / rate
     law = law_at(drive, work, r.DRIVE)
     torque = at(work, r.TOP_TORQUE) + at(work, r.DRAG)
@@ -397,8 +345,7 @@ def _follow_real(drive: Any, work: Any, before: Any, rate: float) -> None:
     put(work, r.INTEGRAL, integral + step * pick(free != limit, gives_in, error))
 
 
-@inlined
-def _follow_sampled(drive: Any, work: Any, before: Any, rate: float) -> None:
+def _follow_sampled(drive: Any, work: Any, before: Any, rate: Any) -> None:
     law = law_at(drive, work, r.DRIVE)
     torque = at(work, r.TOP_TORQUE) + at(work, r.DRAG)
     _see(law, work, before)
@@ -408,15 +355,20 @@ def _follow_sampled(drive: Any, work: Any, before: Any, rate: float) -> None:
 
 def top_torque_now(drive: Any, work: Any, speed: Any) -> Any:
     """Torque of the drive at the moment, top speed in the frame (rad/s) given."""
-    raise NotImplementedError("compiled only")
+    if isinstance(drive, (RealStep, SampledStep)):
+        return at(work, r.MOTOR)
+    angle = at(work, r.ANGLE) - at(work, r.SHIFT)
+    return law_at(drive, work, r.DRIVE).torque(angle, speed - at(work, r.LEAD))
 
 
-@by_type(top_torque_now)
-def _top_torque_now(drive, work, speed):
-    if drive.instance_class in (RealStep, SampledStep):
-        return lambda drive, work, speed: at(work, r.MOTOR)
-    return lambda drive, work, speed: torque_at(
-        law_at(drive, work, r.DRIVE),
-        at(work, r.ANGLE) - at(work, r.SHIFT),
-        speed - at(work, r.LEAD),
-    )
+def asks_for_top(drive: Any, observer: Any) -> bool:
+    """Whether drive or observer need the top speed."""
+    return isinstance(drive, (RealStep, SampledStep)) or isinstance(observer, ObserverStep)
+
+
+def move_top(drive: Any, observer: Any, string: Any, swing: Any, work: Any) -> None:
+    """Top speed at the end of the step, where something asks for it."""
+    if asks_for_top(drive, observer):
+        top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
+        speed = swing.top_speed + string.top_speed_by_top * top - string.top_speed_by_bit * bit
+        put(work, r.TOP_SPEED, speed)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import at, by_type, inlined, put
 from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.vectors import Variable, at, loop, put
 
 
 class NoObserver(NamedTuple):
@@ -28,67 +28,51 @@ class ObserverStep(NamedTuple):
     start: Any  # shape (states, lanes): State at time zero
 
 
-def start_observer(observer: Any, memory: Any, first: int) -> None:
+def start_observer(observer: Any, memory: Any, first: Any) -> None:
     """Put the observer's states at time zero in."""
-    raise NotImplementedError("compiled only")
+    if isinstance(observer, NoObserver):
+        return None
+    return _copy_start(observer, memory, first)
 
 
-@by_type(start_observer)
-def _start_observer(observer, memory, first):
-    if observer.instance_class is NoObserver:
-        return lambda observer, memory, first: None
-    return lambda observer, memory, first: _copy_start(observer, memory, first)
-
-
-@inlined
-def _copy_start(observer: Any, memory: Any, first: int) -> None:
-    for i in range(observer.free.shape[0]):
+def _copy_start(observer: Any, memory: Any, first: Any) -> None:
+    with loop(observer.free.shape[0]) as states:
+        i = states.index
         put(memory.estimate, i * WIDTH, at(observer.start[i], first))
 
 
 def move_observer(observer: Any, memory: Any, work: Any, top_speed_before: Any) -> None:
     """One step of the observer."""
-    raise NotImplementedError("compiled only")
+    if isinstance(observer, NoObserver):
+        return None
+    return _propagate(observer, memory, work, top_speed_before)
 
 
-@by_type(move_observer)
-def _move_observer(observer, memory, work, top_speed_before):
-    if observer.instance_class is NoObserver:
-        return lambda observer, memory, work, top_speed_before: None
-    return lambda observer, memory, work, top_speed_before: _propagate(
-        observer, memory, work, top_speed_before
-    )
-
-
-@inlined
 def _propagate(observer: Any, memory: Any, work: Any, before: Any) -> None:
-    states = observer.free.shape[0]
+    count = observer.free.shape[0]
     torque, after = at(work, r.TOP_TORQUE), at(work, r.TOP_SPEED)
-    for i in range(states):
-        moved = observer.by_torque[i] * torque + observer.by_begin[i] * before
-        moved += observer.by_end[i] * after
-        for j in range(states):
-            moved += observer.free[i, j] * at(memory.estimate, j * WIDTH)
-        put(memory.moved, i * WIDTH, moved)
-    for i in range(states):
-        put(memory.estimate, i * WIDTH, at(memory.moved, i * WIDTH))
+    with loop(count) as states:
+        i = states.index
+        pushed = observer.by_torque[i] * torque + observer.by_begin[i] * before
+        moved = Variable(pushed + observer.by_end[i] * after)
+        with loop(count) as others:
+            j = others.index
+            moved.set(moved.get() + observer.free[i, j] * at(memory.estimate, j * WIDTH))
+        put(memory.moved, i * WIDTH, moved.get())
+    with loop(count) as states:
+        put(memory.estimate, states.index * WIDTH, at(memory.moved, states.index * WIDTH))
 
 
 def read_observer(observer: Any, memory: Any, work: Any) -> None:
     """Put the estimated bit speed in the place of the signal."""
-    raise NotImplementedError("compiled only")
+    if isinstance(observer, NoObserver):
+        return None
+    return _estimate(observer, memory, work)
 
 
-@by_type(read_observer)
-def _read_observer(observer, memory, work):
-    if observer.instance_class is NoObserver:
-        return lambda observer, memory, work: None
-    return lambda observer, memory, work: _estimate(observer, memory, work)
-
-
-@inlined
 def _estimate(observer: Any, memory: Any, work: Any) -> None:
-    speed = at(work, r.SET_SPEED)
-    for i in range(observer.free.shape[0]):
-        speed += observer.read[i] * at(memory.estimate, i * WIDTH)
-    put(work, r.SIGNAL, abs(speed))
+    speed = Variable(at(work, r.SET_SPEED))
+    with loop(observer.free.shape[0]) as states:
+        i = states.index
+        speed.set(speed.get() + observer.read[i] * at(memory.estimate, i * WIDTH))
+    put(work, r.SIGNAL, abs(speed.get()))

@@ -7,18 +7,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from drillctl.rig.bit_rock import contact
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import (
-    any_of,
-    at,
-    by_type,
-    compiled,
-    inlined,
-    least,
-    pick,
-    put,
-)
-from drillctl.simulation.kernels.laws import contact, law_at, load_block, load_where, weight_at
+from drillctl.simulation.kernels.arithmetic import any_of, exp, law_at, least, load_block
+from drillctl.simulation.kernels.vectors import at, pick, put, when
 from drillctl.simulation.kernels.weight_step import acting
 
 
@@ -45,20 +37,14 @@ class Programs(NamedTuple):
 ROUNDING = 1e-6  # share of a step by which a moment that falls on its end may miss it
 
 
-def begin_program(program: Any, before: Any, work: Any, first: int) -> None:
+def begin_program(program: Any, before: Any, work: Any, first: Any) -> None:
     """Rows at time zero; the rock there was."""
-    raise NotImplementedError("compiled only")
+    if isinstance(program, NoProgram):
+        return None
+    return _first_rows(program, before, work, first)
 
 
-@by_type(begin_program)
-def _begin_program(program, before, work, first):
-    if program.instance_class is NoProgram:
-        return lambda program, before, work, first: None
-    return lambda program, before, work, first: _first_rows(program, before, work, first)
-
-
-@compiled
-def _first_rows(program: Any, before: Any, work: Any, first: int) -> None:
+def _first_rows(program: Any, before: Any, work: Any, first: Any) -> None:
     load_block(program, work, r.PROGRAM, first)
     law = law_at(program, work, r.PROGRAM)
     put(work, r.LEAD, _value(law.speed_first, law.speed_begin, law.speed_end, 0.0))
@@ -68,30 +54,21 @@ def _first_rows(program: Any, before: Any, work: Any, first: int) -> None:
 
 
 def advance_program(
-    program: Any, friction: Any, weight: Any, work: Any, first: int, begin: float, step: float
+    program: Any, friction: Any, weight: Any, work: Any, first: Any, begin: Any, step: Any
 ) -> None:
     """Rows of the step from `begin` on; what jumps at its beginning has jumped."""
-    raise NotImplementedError("compiled only")
+    if isinstance(program, NoProgram):
+        return None
+    return _move(program, friction, weight, work, first, begin, step)
 
 
-@by_type(advance_program)
-def _advance_program(program, friction, weight, work, first, begin, step):
-    if program.instance_class is NoProgram:
-        return lambda program, friction, weight, work, first, begin, step: None
-    return lambda program, friction, weight, work, first, begin, step: _move(
-        program, friction, weight, work, first, begin, step
-    )
-
-
-@inlined
-def _value(first: Any, begin: Any, end: Any, time: float) -> Any:
+def _value(first: Any, begin: Any, end: Any, time: Any) -> Any:
     """A ramp to zero, at a time; of a step, the value after it."""
     ramp = pick(begin >= time, first, first * (end - time) / (end - begin))
     return pick(end <= time, 0.0, ramp)
 
 
-@inlined
-def _integral(first: Any, begin: Any, end: Any, time: float) -> Any:
+def _integral(first: Any, begin: Any, end: Any, time: Any) -> Any:
     """Its integral from zero."""
     level = first * least(begin, time)
     passed = least(end, time) - begin
@@ -99,9 +76,8 @@ def _integral(first: Any, begin: Any, end: Any, time: float) -> Any:
     return level + pick((begin < time) & (end > begin), sloped, 0.0)
 
 
-@compiled
 def _move(
-    program: Any, friction: Any, weight: Any, work: Any, first: int, begin: float, step: float
+    program: Any, friction: Any, weight: Any, work: Any, first: Any, begin: Any, step: Any
 ) -> None:
     # A moment that falls on the end of a step does so but for rounding.
     end, late = begin + step, ROUNDING * step
@@ -112,29 +88,27 @@ def _move(
     since, now = begin - step + late, begin + late
     changes = (law.rock_until > since) & (law.rock_until <= now)
     jumps = (law.weight_end > since) & (law.weight_end <= now)
-    if any_of(changes | jumps):
+    with when(any_of(changes | jumps)):
         _turn(program, friction, weight, work, first, now)
     _set_nominal(law, work, end - late)
 
 
-@inlined
-def _turn(program: Any, friction: Any, weight: Any, work: Any, first: int, now: float) -> None:
+def _turn(program: Any, friction: Any, weight: Any, work: Any, first: Any, now: Any) -> None:
     """Put the new rock in where it is due, and let a turning bit feel what has jumped."""
     law = law_at(program, work, r.PROGRAM)
-    load_where(law.rock_until <= now, friction, work, r.FRICTION, first)
+    load_block(friction, work, r.FRICTION, first, law.rock_until <= now)
     _set_nominal(law, work, now)
     direction, speed = at(work, r.DIRECTION), abs(at(work, r.BIT_SPEED))
     load = acting(weight, work)
-    torque, slope = contact(law_at(friction, work, r.FRICTION), load, speed)
+    torque, slope = contact(law_at(friction, work, r.FRICTION), load, speed, exp)
     turning = direction != 0.0
     put(work, r.KINETIC, pick(turning, direction * torque, at(work, r.KINETIC)))
     put(work, r.SLOPE, pick(turning, slope, at(work, r.SLOPE)))
-    put(work, r.LOAD, weight_at(load, speed))
-    put(work, r.REST_END, weight_at(load, speed * 0.0))
+    put(work, r.LOAD, load.weight(speed))
+    put(work, r.REST_END, load.weight(speed * 0.0))
 
 
-@inlined
-def _set_nominal(law: Any, work: Any, time: float) -> None:
+def _set_nominal(law: Any, work: Any, time: Any) -> None:
     """Nominal weight of the hour: the first number of every weight law."""
     over = _value(law.weight_first, law.weight_begin, law.weight_end, time)
     put(work, r.WEIGHT, at(work, r.NOMINAL) * (1.0 + over))

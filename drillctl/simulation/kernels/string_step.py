@@ -18,9 +18,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import at, by_type, each, fma, inlined, put
-from drillctl.simulation.kernels.lane_step import asks_for_top
+from drillctl.simulation.kernels.arithmetic import fma
+from drillctl.simulation.kernels.drive_step import asks_for_top
 from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.vectors import Variable, at, each, loop, put
 
 
 class UndampedString(NamedTuple):
@@ -115,153 +116,122 @@ class Swing(NamedTuple):
     pipe: Any  # pipe torque at its beginning (N m)
 
 
+def _by_modes(string: Any, state: Any, work: Any, tracks_top: bool) -> Swing:
+    top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
+    top_angle, bit_speed, top_speed = (Variable(each(0.0)) for _ in range(3))
+    pipe = Variable(fma(string.pipe_by_top, top, string.pipe_by_bit * bit))
+    with loop(string.kappa.shape[0]) as modes:
+        mode = modes.index
+        at_x = 2 * mode * WIDTH
+        at_y = at_x + WIDTH
+        force = top - string.ratio[mode] * bit
+        x = fma(string.push[mode, 0], force, at(state, at_x))
+        y = fma(string.push[mode, 1], force, at(state, at_y))
+        pipe.set(fma(string.pipe[mode], x, pipe.get()))
+        y = y - string.kappa[mode] * x
+        x = x + y
+        put(state, at_x, x)
+        put(state, at_y, y)
+        top_angle.set(top_angle.get() + x)
+        partly = fma(string.bit_speed[mode, 0], x, bit_speed.get())
+        bit_speed.set(fma(string.bit_speed[mode, 1], y, partly))
+        if tracks_top:
+            partly = fma(string.top_speed[mode, 0], x, top_speed.get())
+            top_speed.set(fma(string.top_speed[mode, 1], y, partly))
+    return Swing(top_angle.get(), bit_speed.get(), top_speed.get(), pipe.get())
+
+
+def _by_blocks(string: Any, state: Any, work: Any, tracks_top: bool) -> Swing:
+    top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
+    top_angle, bit_speed, top_speed = (Variable(each(0.0)) for _ in range(3))
+    pipe = Variable(fma(string.pipe_by_top, top, string.pipe_by_bit * bit))
+    with loop(string.free.shape[0]) as blocks:
+        block = blocks.index
+        a11, a12, a21, a22 = (string.free[block, k] for k in range(4))
+        b11, b12, b21, b22 = (string.push[block, k] for k in range(4))
+        at_x = 2 * block * WIDTH
+        at_y = at_x + WIDTH
+        x = fma(b12, bit, fma(b11, top, at(state, at_x)))
+        y = fma(b22, bit, fma(b21, top, at(state, at_y)))
+        partly = fma(string.pipe[block, 0], x, pipe.get())
+        pipe.set(fma(string.pipe[block, 1], y, partly))
+        x_free = fma(a12, y, a11 * x)
+        y_free = fma(a22, y, a21 * x)
+        put(state, at_x, x_free)
+        put(state, at_y, y_free)
+        top_angle.set(top_angle.get() + x_free)
+        bit_speed.set(bit_speed.get() + y_free)
+        if tracks_top:
+            partly = fma(string.top_speed[block, 0], x_free, top_speed.get())
+            top_speed.set(fma(string.top_speed[block, 1], y_free, partly))
+    return Swing(top_angle.get(), bit_speed.get(), top_speed.get(), pipe.get())
+
+
+def _by_matrix(string: Any, state: Any, work: Any) -> Swing:
+    states = string.free.shape[0]
+    complete = states * WIDTH
+    top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
+    top_angle, bit_speed, top_speed = (Variable(each(0.0)) for _ in range(3))
+    pipe = Variable(fma(string.pipe_by_top, top, string.pipe_by_bit * bit))
+    with loop(states) as rows:
+        i = rows.index
+        z = fma(string.push[i, 0], top, at(state, i * WIDTH))
+        z = fma(string.push[i, 1], bit, z)
+        put(state, complete + i * WIDTH, z)
+        pipe.set(fma(string.pipe[i], z, pipe.get()))
+    with loop(states) as rows:
+        i, total = rows.index, Variable(each(0.0))
+        with loop(states) as columns:
+            j = columns.index
+            total.set(fma(string.free[i, j], at(state, complete + j * WIDTH), total.get()))
+        z = total.get()
+        put(state, i * WIDTH, z)
+        top_angle.set(fma(string.top_angle[i], z, top_angle.get()))
+        bit_speed.set(fma(string.bit_speed[i], z, bit_speed.get()))
+        top_speed.set(fma(string.top_speed[i], z, top_speed.get()))
+    return Swing(top_angle.get(), bit_speed.get(), top_speed.get(), pipe.get())
+
+
 def complete_and_propagate(string: Any, drive: Any, observer: Any, state: Any, work: Any) -> Any:
     """Add the held torques to `state`, read the pipe torque, propagate freely; a `Swing`.
 
     `state` comes as the free part of z and leaves as the free part of the next z: flat, state
     after state, `WIDTH` lanes each; its second half is scratch of the dense form.
     """
-    raise NotImplementedError("compiled only")
+    if isinstance(string, DenseString):
+        return _by_matrix(string, state, work)
+    step = _by_modes if isinstance(string, UndampedString) else _by_blocks
+    return step(string, state, work, asks_for_top(drive, observer))
 
 
-def _by_modes(tracks_top: bool) -> Any:
-    # The closed-over constant prunes the sum that nothing asks for.
-    @inlined
-    def step(string: Any, state: Any, work: Any) -> Any:
-        top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-        top_angle, bit_speed, top_speed = each(0.0), each(0.0), each(0.0)
-        pipe = fma(string.pipe_by_top, top, string.pipe_by_bit * bit)
-        for mode in range(string.kappa.shape[0]):
-            at_x = 2 * mode * WIDTH
-            at_y = at_x + WIDTH
-            force = top - string.ratio[mode] * bit
-            x = fma(string.push[mode, 0], force, at(state, at_x))
-            y = fma(string.push[mode, 1], force, at(state, at_y))
-            pipe = fma(string.pipe[mode], x, pipe)
-            y = y - string.kappa[mode] * x
-            x = x + y
-            put(state, at_x, x)
-            put(state, at_y, y)
-            top_angle += x
-            bit_speed = fma(string.bit_speed[mode, 0], x, bit_speed)
-            bit_speed = fma(string.bit_speed[mode, 1], y, bit_speed)
-            if tracks_top:
-                top_speed = fma(string.top_speed[mode, 0], x, top_speed)
-                top_speed = fma(string.top_speed[mode, 1], y, top_speed)
-        return Swing(top_angle, bit_speed, top_speed, pipe)
-
-    return step
-
-
-def _by_blocks(tracks_top: bool) -> Any:
-    @inlined
-    def step(string: Any, state: Any, work: Any) -> Any:
-        top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-        top_angle, bit_speed, top_speed = each(0.0), each(0.0), each(0.0)
-        pipe = fma(string.pipe_by_top, top, string.pipe_by_bit * bit)
-        for block in range(string.free.shape[0]):
-            a11, a12 = string.free[block, 0], string.free[block, 1]
-            a21, a22 = string.free[block, 2], string.free[block, 3]
-            b11, b12 = string.push[block, 0], string.push[block, 1]
-            b21, b22 = string.push[block, 2], string.push[block, 3]
-            at_x = 2 * block * WIDTH
-            at_y = at_x + WIDTH
-            x = fma(b12, bit, fma(b11, top, at(state, at_x)))
-            y = fma(b22, bit, fma(b21, top, at(state, at_y)))
-            pipe = fma(string.pipe[block, 1], y, fma(string.pipe[block, 0], x, pipe))
-            x_free = fma(a12, y, a11 * x)
-            y_free = fma(a22, y, a21 * x)
-            put(state, at_x, x_free)
-            put(state, at_y, y_free)
-            top_angle += x_free
-            bit_speed += y_free
-            if tracks_top:
-                c1, c2 = string.top_speed[block, 0], string.top_speed[block, 1]
-                top_speed = fma(c2, y_free, fma(c1, x_free, top_speed))
-        return Swing(top_angle, bit_speed, top_speed, pipe)
-
-    return step
-
-
-@inlined
-def _by_matrix(string: Any, state: Any, work: Any) -> Any:
-    states = string.free.shape[0]
-    complete = states * WIDTH
-    top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-    top_angle, bit_speed, top_speed = each(0.0), each(0.0), each(0.0)
-    pipe = fma(string.pipe_by_top, top, string.pipe_by_bit * bit)
-    for i in range(states):
-        z = fma(string.push[i, 0], top, at(state, i * WIDTH))
-        z = fma(string.push[i, 1], bit, z)
-        put(state, complete + i * WIDTH, z)
-        pipe = fma(string.pipe[i], z, pipe)
-    for i in range(states):
-        z = each(0.0)
-        for j in range(states):
-            z = fma(string.free[i, j], at(state, complete + j * WIDTH), z)
-        put(state, i * WIDTH, z)
-        top_angle = fma(string.top_angle[i], z, top_angle)
-        bit_speed = fma(string.bit_speed[i], z, bit_speed)
-        top_speed = fma(string.top_speed[i], z, top_speed)
-    return Swing(top_angle, bit_speed, top_speed, pipe)
-
-
-@by_type(complete_and_propagate)
-def _complete_and_propagate(string, drive, observer, state, work):
-    if string.instance_class is DenseString:
-        return lambda string, drive, observer, state, work: _by_matrix(string, state, work)
-    by_kind = _by_modes if string.instance_class is UndampedString else _by_blocks
-    step = by_kind(asks_for_top(drive, observer))
-    return lambda string, drive, observer, state, work: step(string, state, work)
-
-
-def look(string: Any, state: Any, work: Any) -> Any:
+def look(string: Any, state: Any, work: Any) -> tuple[Any, Any]:
     """Top-drive speed and bit angle in the frame, torques included."""
-    raise NotImplementedError("compiled only")
-
-
-@inlined
-def _look_at_modes(string: Any, state: Any, work: Any) -> Any:
-    speed, angle = each(0.0), each(0.0)
+    speed, angle = Variable(each(0.0)), Variable(each(0.0))
     top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-    for mode in range(string.kappa.shape[0]):
-        force = top - string.ratio[mode] * bit
-        x = at(state, 2 * mode * WIDTH) + string.push[mode, 0] * force
-        y = at(state, (2 * mode + 1) * WIDTH) + string.push[mode, 1] * force
-        speed += string.top_speed[mode, 0] * x + string.top_speed[mode, 1] * y
-        angle += string.ratio[mode] * x
-    return speed, angle
+    see = {UndampedString: _see_mode, BlockString: _see_block}.get(type(string), _see_state)
+    with loop(string.push.shape[0]) as parts:
+        moves, turned = see(string, state, parts.index, top, bit)
+        speed.set(speed.get() + moves)
+        angle.set(angle.get() + turned)
+    return speed.get(), angle.get()
 
 
-@inlined
-def _look_at_blocks(string: Any, state: Any, work: Any) -> Any:
-    speed, angle = each(0.0), each(0.0)
-    top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-    for block in range(string.free.shape[0]):
-        x = at(state, 2 * block * WIDTH)
-        y = at(state, (2 * block + 1) * WIDTH)
-        x += string.push[block, 0] * top + string.push[block, 1] * bit
-        y += string.push[block, 2] * top + string.push[block, 3] * bit
-        speed += string.top_speed[block, 0] * x + string.top_speed[block, 1] * y
-        angle += string.bit_angle[block, 0] * x + string.bit_angle[block, 1] * y
-    return speed, angle
+def _see_mode(string: Any, state: Any, mode: Any, top: Any, bit: Any) -> tuple[Any, Any]:
+    force = top - string.ratio[mode] * bit
+    x = at(state, 2 * mode * WIDTH) + string.push[mode, 0] * force
+    y = at(state, (2 * mode + 1) * WIDTH) + string.push[mode, 1] * force
+    speed = string.top_speed[mode, 0] * x + string.top_speed[mode, 1] * y
+    return speed, string.ratio[mode] * x
 
 
-@inlined
-def _look_at_matrix(string: Any, state: Any, work: Any) -> Any:
-    speed, angle = each(0.0), each(0.0)
-    top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-    for i in range(string.free.shape[0]):
-        z = at(state, i * WIDTH) + string.push[i, 0] * top + string.push[i, 1] * bit
-        speed += string.top_speed[i] * z
-        angle += string.bit_angle[i] * z
-    return speed, angle
+def _see_block(string: Any, state: Any, block: Any, top: Any, bit: Any) -> tuple[Any, Any]:
+    b11, b12, b21, b22 = (string.push[block, k] for k in range(4))
+    x = at(state, 2 * block * WIDTH) + (b11 * top + b12 * bit)
+    y = at(state, (2 * block + 1) * WIDTH) + (b21 * top + b22 * bit)
+    speed = string.top_speed[block, 0] * x + string.top_speed[block, 1] * y
+    return speed, string.bit_angle[block, 0] * x + string.bit_angle[block, 1] * y
 
 
-@by_type(look)
-def _look(string, state, work):
-    if string.instance_class is UndampedString:
-        return lambda string, state, work: _look_at_modes(string, state, work)
-    if string.instance_class is BlockString:
-        return lambda string, state, work: _look_at_blocks(string, state, work)
-    return lambda string, state, work: _look_at_matrix(string, state, work)
+def _see_state(string: Any, state: Any, i: Any, top: Any, bit: Any) -> tuple[Any, Any]:
+    z = at(state, i * WIDTH) + string.push[i, 0] * top + string.push[i, 1] * bit
+    return string.top_speed[i] * z, string.bit_angle[i] * z

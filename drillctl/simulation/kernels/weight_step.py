@@ -14,25 +14,21 @@ from drillctl.rig.weight_on_bit import AlarmWeight, ConstantWeight, RealWeight
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import (
     any_of,
-    at,
-    by_type,
     exp,
     gather,
-    inlined,
     lane_number,
+    law_at,
     least,
     most,
-    pick,
-    put,
     rounded_down,
 )
-from drillctl.simulation.kernels.laws import law_at, moves, weight_at
 from drillctl.simulation.kernels.observer_step import move_observer, read_observer, start_observer
 from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.vectors import at, loop, pick, put, when
 
 # The laws' own equations; they read numbers that the laws' steps have too.
-_asked = inlined(RealWeight.command)
-_next_level = inlined(AlarmWeight.next_level)
+_asked: Any = RealWeight.command
+_next_level: Any = AlarmWeight.next_level
 
 
 class RealWeightStep(NamedTuple):
@@ -111,58 +107,48 @@ class Memory(NamedTuple):
 
 
 def has_memory(weight: Any) -> bool:
-    """Whether a weight law, as numba knows it, keeps a memory."""
-    return weight.instance_class in (RealWeightStep, ReadWeightStep, AlarmWeightStep)
+    """Whether a weight law keeps a memory."""
+    return isinstance(weight, (RealWeightStep, ReadWeightStep, AlarmWeightStep))
 
 
 def stays(weight: Any, program: Any) -> bool:
     """Whether the weight is the same throughout a run."""
-    return not (has_memory(weight) or moves(weight) or "weight_end" in program.fields)
+    return not (has_memory(weight) or weight.moves or _changes(program))
+
+
+def _changes(program: Any) -> bool:
+    return hasattr(program, "weight_end")
 
 
 def acting(weight: Any, work: Any) -> Any:
     """The weight law that the rock meets in this step."""
-    raise NotImplementedError("compiled only")
-
-
-@by_type(acting)
-def _acting(weight, work):
     if has_memory(weight):
-        return lambda weight, work: ConstantWeight(at(work, r.HOISTED))
-    return lambda weight, work: law_at(weight, work, r.WEIGHT)
+        return ConstantWeight(at(work, r.HOISTED))
+    return law_at(weight, work, r.WEIGHT)
 
 
-def begin_weight(weight: Any, observer: Any, work: Any, memory: Any, first: int) -> None:
+def begin_weight(weight: Any, observer: Any, work: Any, memory: Any, first: Any) -> None:
     """Memory at time zero."""
-    raise NotImplementedError("compiled only")
+    if isinstance(weight, (RealWeightStep, ReadWeightStep)):
+        return _begin_real(weight, observer, work, memory, first)
+    if isinstance(weight, AlarmWeightStep):
+        return _begin_alarm(weight, work)
+    return None
 
 
-@by_type(begin_weight)
-def _begin_weight(weight, observer, work, memory, first):
-    if weight.instance_class in (RealWeightStep, ReadWeightStep):
-        return lambda weight, observer, work, memory, first: _begin_real(
-            weight, observer, work, memory, first
-        )
-    if weight.instance_class is AlarmWeightStep:
-        return lambda weight, observer, work, memory, first: _begin_alarm(weight, work)
-    return lambda weight, observer, work, memory, first: None
-
-
-@inlined
-def _begin_real(weight: Any, observer: Any, work: Any, memory: Any, first: int) -> None:
+def _begin_real(weight: Any, observer: Any, work: Any, memory: Any, first: Any) -> None:
     start_observer(observer, memory, first)
     put(work, r.SIGNAL, abs(at(work, r.BIT_SPEED)))
     read_observer(observer, memory, work)
     signal = at(work, r.SIGNAL)
-    for place in range(0, memory.ring.shape[0], WIDTH):
-        put(memory.ring, place, signal)
+    with loop(memory.ring.shape[0] // WIDTH) as slots:
+        put(memory.ring, slots.index * WIDTH, signal)
     law = law_at(weight, work, r.WEIGHT)
     asked = _asked(law, signal, law.nominal)
     put(work, r.CALLED, asked)
     put(work, r.HOISTED, asked)
 
 
-@inlined
 def _begin_alarm(weight: Any, work: Any) -> None:
     speed = abs(at(work, r.BIT_SPEED))
     law = law_at(weight, work, r.WEIGHT)
@@ -177,35 +163,26 @@ def _begin_alarm(weight: Any, work: Any) -> None:
     put(work, r.WINDOW_HIGH, speed)
 
 
-def raise_weight(weight: Any, program: Any, work: Any, memory: Any, n: int, step: float) -> None:
+def raise_weight(weight: Any, program: Any, work: Any, memory: Any, n: Any, step: Any) -> None:
     """Weight at the end of step `n`, as far as it is known beforehand."""
-    raise NotImplementedError("compiled only")
+    if isinstance(weight, RealWeightStep):
+        return _raise_real(weight, work, memory, n)
+    if isinstance(weight, ReadWeightStep):
+        return _raise_read(weight, work, memory, n)
+    if isinstance(weight, AlarmWeightStep):
+        return _raise_alarm(weight, work, (n + 1) * step)
+    if _changes(program):
+        return _rest(weight, work)
+    return None
 
 
-@by_type(raise_weight)
-def _raise_weight(weight, program, work, memory, n, step):
-    if weight.instance_class is RealWeightStep:
-        return lambda weight, program, work, memory, n, step: _raise_real(weight, work, memory, n)
-    if weight.instance_class is ReadWeightStep:
-        return lambda weight, program, work, memory, n, step: _raise_read(weight, work, memory, n)
-    if weight.instance_class is AlarmWeightStep:
-        return lambda weight, program, work, memory, n, step: _raise_alarm(
-            weight, work, (n + 1) * step
-        )
-    if "weight_end" in program.fields:
-        return lambda weight, program, work, memory, n, step: _rest(weight, work)
-    return lambda weight, program, work, memory, n, step: None
-
-
-@inlined
 def _rest(weight: Any, work: Any) -> None:
     """Weight on a bit at rest, on the mean over the step."""
-    end = weight_at(acting(weight, work), 0.0 * at(work, r.BIT_SPEED))
+    end = acting(weight, work).weight(0.0 * at(work, r.BIT_SPEED))
     put(work, r.REST_LOAD, 0.5 * (at(work, r.REST_END) + end))
     put(work, r.REST_END, end)
 
 
-@inlined
 def _hoist(law: Any, work: Any, asked: Any, followed: Any) -> None:
     """Let the hoist follow what is asked for, `followed` of its change by the end of the step."""
     before, weight = at(work, r.CALLED), at(work, r.HOISTED)
@@ -216,7 +193,6 @@ def _hoist(law: Any, work: Any, asked: Any, followed: Any) -> None:
     put(work, r.CALLED, asked)
 
 
-@inlined
 def _between(ring: Any, older: Any, share: Any) -> Any:
     """A signal between two steps of the ring; one that is not known yet continues the last ones."""
     steps = ring.shape[0] // WIDTH
@@ -230,16 +206,14 @@ def _between(ring: Any, older: Any, share: Any) -> Any:
     return most(left + share * (right - left), 0.0)  # a speed is not negative
 
 
-@inlined
-def _raise_real(weight: Any, work: Any, memory: Any, n: int) -> None:
+def _raise_real(weight: Any, work: Any, memory: Any, n: Any) -> None:
     law = law_at(weight, work, r.WEIGHT)
     seen = _between(memory.ring, n - law.back, law.share)
     _hoist(law, work, _asked(law, seen, law.nominal), law.hoist_ramp)
     _rest(weight, work)
 
 
-@inlined
-def _raise_read(weight: Any, work: Any, memory: Any, n: int) -> None:
+def _raise_read(weight: Any, work: Any, memory: Any, n: Any) -> None:
     law = law_at(weight, work, r.WEIGHT)
     place = n + 1.0 - law.delay
     # A reading whose time falls on the end of a step is there, but for rounding.
@@ -253,8 +227,7 @@ def _raise_read(weight: Any, work: Any, memory: Any, n: int) -> None:
     _rest(weight, work)
 
 
-@inlined
-def _raise_alarm(weight: Any, work: Any, end: float) -> None:
+def _raise_alarm(weight: Any, work: Any, end: Any) -> None:
     law = law_at(weight, work, r.WEIGHT)
     due = at(work, r.LEVEL_FROM) <= end
     level = pick(due, at(work, r.LEVEL_NEXT), at(work, r.LEVEL))
@@ -265,39 +238,22 @@ def _raise_alarm(weight: Any, work: Any, end: float) -> None:
 
 def move_load(weight: Any, program: Any, work: Any) -> None:
     """Weight on the bit at the end of the step, where it moves at all."""
-    raise NotImplementedError("compiled only")
-
-
-@by_type(move_load)
-def _move_load(weight, program, work):
     if stays(weight, program):
-        return lambda weight, program, work: None
-    return lambda weight, program, work: put(
-        work, r.LOAD, weight_at(acting(weight, work), abs(at(work, r.BIT_SPEED)))
-    )
+        return None
+    return put(work, r.LOAD, acting(weight, work).weight(abs(at(work, r.BIT_SPEED))))
 
 
 def follow_weight(
-    weight: Any, observer: Any, work: Any, memory: Any, before: Any, n: int, step: float
+    weight: Any, observer: Any, work: Any, memory: Any, before: Any, n: Any, step: Any
 ) -> None:
     """Signal at the end of step `n`; `before`: `Before`, what moved as it began."""
-    raise NotImplementedError("compiled only")
+    if isinstance(weight, (RealWeightStep, ReadWeightStep)):
+        return _follow_real(weight, observer, work, memory, before, n)
+    if isinstance(weight, AlarmWeightStep):
+        return _follow_alarm(weight, work, before, (n + 1) * step)
+    return None
 
 
-@by_type(follow_weight)
-def _follow_weight(weight, observer, work, memory, before, n, step):
-    if weight.instance_class in (RealWeightStep, ReadWeightStep):
-        return lambda weight, observer, work, memory, before, n, step: _follow_real(
-            weight, observer, work, memory, before, n
-        )
-    if weight.instance_class is AlarmWeightStep:
-        return lambda weight, observer, work, memory, before, n, step: _follow_alarm(
-            weight, work, before, (n + 1) * step
-        )
-    return lambda weight, observer, work, memory, before, n, step: None
-
-
-@inlined
 def _sense(law: Any, work: Any, speed_before: Any) -> Any:
     """Move the sensor's filter; returns what it shows."""
     before, after = abs(speed_before), abs(at(work, r.BIT_SPEED))
@@ -307,8 +263,7 @@ def _sense(law: Any, work: Any, speed_before: Any) -> Any:
     return shown
 
 
-@inlined
-def _follow_real(weight: Any, observer: Any, work: Any, memory: Any, before: Any, n: int) -> None:
+def _follow_real(weight: Any, observer: Any, work: Any, memory: Any, before: Any, n: Any) -> None:
     _sense(law_at(weight, work, r.WEIGHT), work, before.bit_speed)
     move_observer(observer, memory, work, before.top_speed)
     read_observer(observer, memory, work)
@@ -316,8 +271,7 @@ def _follow_real(weight: Any, observer: Any, work: Any, memory: Any, before: Any
     put(memory.ring, slot, at(work, r.SIGNAL))
 
 
-@inlined
-def _follow_alarm(weight: Any, work: Any, before: Any, end: float) -> None:
+def _follow_alarm(weight: Any, work: Any, before: Any, end: Any) -> None:
     law = law_at(weight, work, r.WEIGHT)
     signal_before = at(work, r.SIGNAL)
     speed = _sense(law, work, before.bit_speed)
@@ -326,7 +280,7 @@ def _follow_alarm(weight: Any, work: Any, before: Any, end: float) -> None:
     count, ends = at(work, r.WINDOW_COUNT) + 1.0, at(work, r.WINDOW_END)
     # A window that ends within rounding of a step's end ends with it.
     over = ends <= end * (1.0 + 1e-12)
-    if any_of(over):
+    with when(any_of(over)):
         level = _next_level(law, at(work, r.LEVEL), low, high, total / count)
         put(work, r.LEVEL_NEXT, pick(over, level, at(work, r.LEVEL_NEXT)))
         put(work, r.LEVEL_FROM, pick(over, ends + law.delay, at(work, r.LEVEL_FROM)))
