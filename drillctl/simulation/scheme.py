@@ -24,6 +24,9 @@ the bit could have more than one root."""
 FEWEST_STEPS = 20
 """Fewest steps in a period of the first elastic mode; fewer would not show stick-slip."""
 
+MOST_STEPS = 10**8
+"""Most steps of a run: some twenty seconds, however few its lanes are."""
+
 
 @dataclass(frozen=True)
 class Accuracy:
@@ -128,12 +131,34 @@ def choose_scheme(
         )
     else:
         step = table.step
+    if table.duration / min(step, period or step) > MOST_STEPS:
+        _refuse_steps(table, step, period)
     steps, sampling = _whole_steps(table.duration, step, period, turns)
     step = table.duration / steps
     modes = table.modes
     if modes is None:
         modes = int((frequency * step <= accuracy.phase).sum())
     return Scheme(step, steps, min(max(modes, 2), string.nodes), sampling)
+
+
+def _refuse_steps(table: SimulationTable, step: float, period: float | None) -> None:
+    """Refuse a run that nobody can mean."""
+    sampled = period is not None and period < step
+    step = min(step, period or step)
+    raise InputError(
+        f"{table.duration / step:.3g} steps of {_time(step)} are too many: a run of "
+        f"{_time(table.duration)} has at most {MOST_STEPS:.0e}, of "
+        f"{_time(table.duration / MOST_STEPS)}",
+        "controller.drive.sampling_period" if sampled
+        else "simulation.step" if table.step is not None
+        else "simulation.duration",
+    )  # fmt: skip
+
+
+def _time(seconds: float) -> str:
+    units = (("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9))
+    unit, factor = next((one for one in units if seconds * one[1] >= 1.0), units[-1])
+    return f"{seconds * factor:.3g} {unit}"
 
 
 def _whole_steps(

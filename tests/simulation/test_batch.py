@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -151,6 +153,15 @@ def test_both_engines_agree(name, values):
         assert fine.settling_time_wide == pytest.approx(exact.settling_time_wide, abs=5e-3)
 
 
+@pytest.mark.parametrize("controller", [{}, {"drive": {"torque_limit": "30 kN*m"}}], ids=str)
+def test_the_top_torque_of_the_first_moment_counts(controller):
+    # A drive this stiff gives its largest torque before anything has moved.
+    values = {"simulation.duration": "5 s", "start.speed": "30 rpm"}
+    design = paper(1e4, 125, 140, **values, **{f"controller.{k}": v for k, v in controller.items()})
+    exact = drillctl.simulate(design).measures.peak_top_torque
+    assert measured(design).peak_top_torque == pytest.approx(exact, rel=1e-9)
+
+
 def test_signals_agree():
     design = paper(625, 125, 140, **{"simulation.duration": "30 s", "simulation.step": "2 ms"})
     exact = drillctl.simulate(design, interval=0.1)
@@ -228,6 +239,38 @@ def test_the_same_bits_for_any_block_width_and_threads(width, threads, tmp_path)
     lanes = lanes_over_gains(design, GAINS)
     here = run_batch(lanes, prepare(lanes, design.tables.simulation)).measures["j1"]
     assert json.loads(other.stdout.splitlines()[-1]) == [float(x).hex() for x in here]
+
+
+def test_a_run_that_nobody_can_mean_is_refused_with_the_count():
+    with pytest.raises(drillctl.errors.InputError, match=r"1e\+11 steps of 1 ns .*at most 1e\+08"):
+        measured(paper(600, 100, 140, **{"simulation.step": "1 ns"}))
+    sampled = {"controller.drive": {"sampling_period": "1 ns"}}
+    with pytest.raises(drillctl.errors.InputError, match="sampling_period"):
+        measured(paper(600, 100, 140, **sampled))
+
+
+_LONG_RUN = """
+import drillctl
+design = drillctl.load("monteiro-trindade-140kn", **{"simulation.duration": "1 s"})
+drillctl.simulate(design, "batch")  # compiled
+print("ready", flush=True)
+drillctl.simulate(design, "batch", **{"simulation.duration": "100 s", "simulation.step": "2 us"})
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no signals to send")
+def test_a_long_run_is_interrupted_within_a_second():
+    run = subprocess.Popen(
+        [sys.executable, "-c", _LONG_RUN], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert run.stdout.readline().strip() == "ready"
+    time.sleep(1.5)
+    assert run.poll() is None
+    run.send_signal(signal.SIGINT)
+    begin = time.monotonic()
+    _, told = run.communicate(timeout=20)
+    assert time.monotonic() - begin < 1.0 + 1.0  # and the interpreter's own end
+    assert "KeyboardInterrupt" in told
 
 
 def test_a_lane_that_overflows_fails_alone():
