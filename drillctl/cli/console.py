@@ -76,6 +76,12 @@ class Bar:
 def progress() -> Iterator[Progress]:
     """Progress on stderr while the block runs; cleared at its end, absent from files and pipes."""
     from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield SILENT
+        return
+
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -95,10 +101,6 @@ def progress() -> Iterator[Progress]:
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(),
         TimeRemainingColumn(),
     )  # fmt: skip
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield SILENT
-        return
     with RichBar(*columns, console=console, transient=True) as bar:
         yield Bar(bar)
 

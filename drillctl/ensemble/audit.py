@@ -115,11 +115,12 @@ def references(
     designs: list[Design], progress: Progress = SILENT, seconds: float = math.inf
 ) -> Array:
     """J1 of designs by the reference solver (s), on all cores; NaN for those that fail."""
+    if not designs:
+        return np.empty(0)
+
     import joblib
     import numba
 
-    if not designs:
-        return np.empty(0)
     progress.begin("auditing cells", len(designs))
     begin, result = time.perf_counter(), list[float]()
     # As many as the lanes may use, which is what `--threads` sets.
