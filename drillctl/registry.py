@@ -21,14 +21,13 @@ FRICTION_LAWS = (
 """Each module holds `LAWS`, a tuple of `drillctl.rig.bit_rock.law.FrictionLaw`."""
 
 DRIVE_LAWS = (
-    "drillctl.rig.top_drive.pi",
-    "drillctl.rig.top_drive.constant_torque",
+    "drillctl.rig.top_drive.ideal",
     "drillctl.rig.top_drive.tuned",
 )
 """Each module holds `LAWS`, a tuple of `drillctl.rig.top_drive.law.DriveLaw`."""
 
 WEIGHT_LAWS = (
-    "drillctl.rig.weight_on_bit.constant",
+    "drillctl.rig.weight_on_bit.law",
     "drillctl.rig.weight_on_bit.following_speed",
     "drillctl.rig.weight_on_bit.stick_slip_alarm",
 )

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import drillctl
-from drillctl.design.starter import write_starter
+from drillctl.design.reading import write_starter
 
 
 def main(folder: Path) -> None:

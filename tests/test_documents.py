@@ -60,7 +60,7 @@ def test_the_rig_of_the_readme_is_a_valid_design(tmp_path):
 
 def test_the_starter_file_is_a_valid_design(tmp_path, monkeypatch):
     import drillctl
-    from drillctl.design.starter import write_starter
+    from drillctl.design.reading import write_starter
 
     monkeypatch.chdir(tmp_path)
     design = drillctl.load(write_starter("my-rig"))

@@ -74,7 +74,7 @@ def new(
 ) -> None:
     """Write a commented design file to start from."""
     from drillctl.cli import console
-    from drillctl.design.starter import write_starter
+    from drillctl.design.reading import write_starter
 
     console.line(f"written: {write_starter(name)}")
 

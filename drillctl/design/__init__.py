@@ -6,8 +6,8 @@
 - `validation.py`: errors in the user's words.
 - `parts.py`: the physical parts and laws that the tables describe.
 - `design.py`: the `Design` itself.
-- `reading.py`, `paths.py`: files in, files out, values by dotted path; `starter.py`: a file to
-  begin with.
+- `reading.py`, `paths.py`: files in, files out, values by dotted path; `starter.toml`: the file
+  to begin with.
 """
 
 from drillctl.design.design import Design

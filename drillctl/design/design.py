@@ -17,7 +17,7 @@ from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.program import Program
 from drillctl.rig.top_drive import PI, ConstantTorque, TopDriveLaw
 from drillctl.rig.top_drive.law import top_drive
-from drillctl.rig.weight_on_bit import ObservedWeight, RealWeight, WeightLaw
+from drillctl.rig.weight_on_bit import RealWeight, WeightLaw
 
 if TYPE_CHECKING:
     import control
@@ -126,9 +126,7 @@ class Design:
 
         An alarm, which drilling steadily never sets off, is none.
         """
-        return self.simple_drive and not isinstance(
-            self.weight_on_bit, (RealWeight, ObservedWeight)
-        )
+        return self.simple_drive and not isinstance(self.weight_on_bit, RealWeight)
 
     @property
     def table_range(self) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from drillctl.rig.bit_rock.law import changed_rock, form_of, friction_laws
 from drillctl.rig.drillstring import GRADES, PIPES, Drillstring, Section, assemble, polar_moment
 from drillctl.rig.drillstring.section import torsional_yield
 from drillctl.rig.program import STILL, Program, Ramp
-from drillctl.rig.top_drive.constant_torque import ConstantTorqueTable
+from drillctl.rig.top_drive.ideal import ConstantTorqueTable
 from drillctl.rig.weight_on_bit.law import HEAVIEST, WeightLaw, weight_laws
 
 STEEL_SHEAR_MODULUS = 79.3e9  # shear modulus (Pa) where a design gives none: drill-pipe steel

@@ -163,3 +163,21 @@ def _plain(value: Any, kind: units.Kind | None) -> Any:
     if kind is not None and isinstance(value, float):
         return units.write(value, kind)
     return value
+
+
+def write_starter(name: str) -> Path:
+    """Write a commented file to start one's own rig from."""
+    path = Path(name)
+    if not path.name or not name.isprintable():
+        raise InputError(f"{shown(name)} is not a file name")
+    path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
+    title = path.stem.replace("\\", "").replace('"', "")
+    text = Path(__file__).with_name("starter.toml").read_text(encoding="utf-8")
+    try:
+        with path.open("x", encoding="utf-8") as stream:
+            stream.write(text.replace("{name}", title))
+    except FileExistsError:
+        raise InputError("exists already; it is not overwritten", str(path)) from None
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}", str(path)) from None
+    return path

@@ -24,10 +24,9 @@ from drillctl.rig import table as q
 from drillctl.rig.bit_rock.law import friction_laws
 from drillctl.rig.drillstring import GRADES, PIPES
 from drillctl.rig.table import Table, one_of
+from drillctl.rig.top_drive.ideal import PITable
 from drillctl.rig.top_drive.law import drive_laws
-from drillctl.rig.top_drive.pi import PITable
-from drillctl.rig.weight_on_bit.constant import ConstantWeightTable
-from drillctl.rig.weight_on_bit.law import weight_laws
+from drillctl.rig.weight_on_bit.law import ConstantWeightTable, weight_laws
 
 if TYPE_CHECKING:  # a law's own keys are known to its file alone
     BitRockTable = Any

@@ -15,7 +15,7 @@ from drillctl.design import Design
 from drillctl.ensemble.grid import Axis, cell_design, shape_of
 from drillctl.errors import SimulationError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 
 Array = NDArray[np.float64]
 

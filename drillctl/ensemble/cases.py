@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.tables import Estimate, open_estimate
 
 Array = NDArray[np.float64]

@@ -29,7 +29,7 @@ from drillctl.errors import InputError
 from drillctl.rig.top_drive.law import tracking
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.simulation.measures import BATCH_MEASURES
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.tables import texts
 
 Array = NDArray[np.float64]

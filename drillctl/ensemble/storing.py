@@ -25,7 +25,7 @@ from drillctl.simulation.batch import Prepared
 from drillctl.simulation.measures import MEASURES, STATUSES
 from drillctl.simulation.propagator import StringStep
 from drillctl.simulation.scheme import Scheme as StringScheme
-from drillctl.store.labels import stored_name
+from drillctl.store.codec import stored_name
 
 if TYPE_CHECKING:
     from drillctl.ensemble.realizations import Realizations

@@ -43,7 +43,7 @@ from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.batch import CHUNK, Prepared, prepare
 from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 
 Array = NDArray[np.float64]

@@ -3,8 +3,8 @@
 From a string to its answers:
 
 - `transmission.py`: sections as transmission lines, of finite elements and of the continuum.
-- `ends.py`: the string seen from its two ends, by lines, by modes (`expansion.py`) or by
-  solving M, C and K (`banded.py`). All frequency-domain results below take this alone.
+- `ends.py`: the string seen from its two ends, by lines, by modes or by solving M, C and K. All
+  frequency-domain results below take this alone.
 - `response.py`: `frequency_response` from any input to any output, open and closed loop.
 - `operating_point.py`: steady drilling and the slope of the rock there.
 - `slope_margin.py`: D*, the falling slope that a loop tolerates.
@@ -15,7 +15,7 @@ From a string to its answers:
 As a state space:
 
 - `state_space.py`: `plant`, `closed_loop`, `open_loop` as `control.StateSpace`, named signals.
-- `modal.py`, `poles.py`: natural frequencies, damping ratios and shapes.
+- `modal.py`: natural frequencies, damping ratios and shapes.
 - `loop_model.py`: poles of the loop; `boundary.py` holds those against a parameter as well.
 - `export.py`: the nonlinear loop as `control.NonlinearIOSystem`; matrices for other programs.
 

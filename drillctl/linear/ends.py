@@ -29,7 +29,7 @@ from drillctl.linear.transmission import Banded, EndMobility, Lines
 from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.drillstring import Drillstring, Parts
 from drillctl.rig.drillstring.frequencies import Model, natural_frequencies
-from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
+from drillctl.rig.weight_on_bit import FollowingSpeed, RealWeight
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
@@ -178,7 +178,7 @@ def weight_path(design: Design, speed: float) -> WeightPath | None:
     steadily never sets off.
     """
     law = design.weight_on_bit
-    if not isinstance(law, (FollowingSpeed, RealWeight, ObservedWeight)):
+    if not isinstance(law, (FollowingSpeed, RealWeight)):
         return None
     slope = float(FollowingSpeed(*law[:5]).slope(speed))
     if slope == 0.0:

@@ -19,7 +19,7 @@ from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
 from drillctl.linear.slope_margin import slope_margin
 from drillctl.rig.weight_on_bit import PATHS
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.simulation import measures as m
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, Piece
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 
 Array = NDArray[np.float64]

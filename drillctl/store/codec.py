@@ -1,5 +1,10 @@
 """Results on disk: arrays as variables of a zarr store, everything else as JSON.
 
+A result is a frozen dataclass. Its arrays are labelled where they are declared:
+
+    axes: tuple[Axis, ...]
+    j1: Array = label("axes", unit="s", means="J1; NaN where the run failed")
+
 One codec for every result: a tree of frozen dataclasses, named tuples, tuples, lists,
 dictionaries, numbers, text, designs and arrays. `result.json` names the class of each object and,
 in place of an array, the variable that holds it. Classes are looked up in this package only, and
@@ -12,7 +17,7 @@ import dataclasses
 import math
 import shutil
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -26,10 +31,43 @@ from drillctl.design.validation import validated
 from drillctl.errors import StoreError
 from drillctl.provenance import provenance
 from drillctl.store.json_files import read_json, write_json
-from drillctl.store.labels import Label, stored_name
 
 if TYPE_CHECKING:
     import xarray
+
+
+@dataclass(frozen=True)
+class Label:
+    """Dimensions, unit and meaning of an array or of a dictionary of arrays."""
+
+    # "axes" means the paths of the axes of the object; {name} an attribute of the object
+    dims: tuple[str, ...] = ()
+    unit: str | Callable[[str], str] = "1"  # SI; for a dictionary a function of the key
+    means: str | Callable[[str], str] = ""
+    name: str = ""  # of the variable; default: that of the field
+    flat: bool = False  # whether names inside omit the name of this field
+    over: str = ""  # dimension along which arrays of a tuple of objects are stacked
+    flags: tuple[str, ...] = ()  # meanings of the integers 0, 1, ...
+
+
+def label(
+    *dims: str,
+    unit: str | Callable[[str], str] = "1",
+    means: str | Callable[[str], str] = "",
+    name: str = "",
+    flat: bool = False,
+    over: str = "",
+    flags: tuple[str, ...] = (),
+    **options: Any,
+) -> Any:
+    """Declare a field of a result with its label; other options are those of a dataclass field."""
+    return field(metadata={"label": Label(dims, unit, means, name, flat, over, flags)}, **options)
+
+
+def stored_name(name: str) -> str:
+    """Name of a variable on disk: zarr reads a slash, which a section name may hold, as a group."""
+    return name.replace("/", "%2F")
+
 
 TREE = "result.json"
 DATA = "data.zarr"

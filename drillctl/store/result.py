@@ -1,4 +1,4 @@
-"""Base class of results: labelled data, saved to a folder; see `labels` and `codec`."""
+"""Base class of results: labelled data, saved to a folder; see `codec`."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from drillctl.design import Design
 from drillctl.errors import InputError, StoreError
-from drillctl.store.codec import TREE, dataset, read, write
+from drillctl.store.codec import TREE, Label, dataset, read, write
 from drillctl.store.folder import Growing, about_run, claim
-from drillctl.store.labels import Label
 
 if TYPE_CHECKING:
     import xarray

@@ -31,7 +31,7 @@ def test_the_fingerprint_covers_every_source():
 
     sources = advance.sources()
     names = {path.name for path in sources}
-    assert {"pi.py", "navarro_lopez_suarez.py", "constant.py", "rock_step.py"} <= names
+    assert {"ideal.py", "navarro_lopez_suarez.py", "following_speed.py", "rock_step.py"} <= names
     assert advance.fingerprint(sources) != advance.fingerprint(sources[:-1])
 
 

@@ -21,9 +21,8 @@ goes around any of them (`law.py`).
 
 from __future__ import annotations
 
-from drillctl.rig.top_drive.constant_torque import ConstantTorque
+from drillctl.rig.top_drive.ideal import PI, ConstantTorque
 from drillctl.rig.top_drive.law import TopDriveLaw
-from drillctl.rig.top_drive.pi import PI
 from drillctl.rig.top_drive.real_drive import RealDrive, SampledDrive
 
 __all__ = ["PI", "ConstantTorque", "RealDrive", "SampledDrive", "TopDriveLaw"]

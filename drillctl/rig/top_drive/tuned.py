@@ -14,8 +14,8 @@ from pydantic import field_validator
 from drillctl.errors import InputError
 from drillctl.rig import table as q
 from drillctl.rig.table import Table
+from drillctl.rig.top_drive.ideal import PI
 from drillctl.rig.top_drive.law import Controller, DriveLaw, DriveTable, Ranges, TopDriveLaw
-from drillctl.rig.top_drive.pi import PI
 
 # The rules.
 

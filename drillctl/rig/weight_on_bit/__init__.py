@@ -11,12 +11,11 @@ made from them, and its `LAWS` entry.
 
 from __future__ import annotations
 
-from drillctl.rig.weight_on_bit.constant import ConstantWeight
 from drillctl.rig.weight_on_bit.following_speed import FollowingSpeed, ObservedWeight, RealWeight
-from drillctl.rig.weight_on_bit.law import WeightLaw
+from drillctl.rig.weight_on_bit.law import ConstantWeight, WeightLaw
 from drillctl.rig.weight_on_bit.stick_slip_alarm import AlarmWeight
 
-PATHS = (RealWeight, ObservedWeight, AlarmWeight)
+PATHS = (RealWeight, AlarmWeight)
 """Laws with a memory: the weight does not follow from the bit speed of the moment."""
 
 __all__ = [

@@ -128,40 +128,16 @@ class RealWeight(NamedTuple):
         return kept + (kept > self.most) * (self.most - kept)
 
 
-class ObservedWeight(NamedTuple):
-    r"""The law of `RealWeight` with a bit speed estimated at the surface.
+class ObservedWeight(RealWeight):
+    """The law of `RealWeight` with a bit speed estimated at the surface.
 
     An observer of the string reads top speed and top torque and estimates the bit speed (see
     `drillctl.linear.observer`); no signal comes up from the bit. What the bit does reaches the
-    top, and the estimate, one travel time of the pipe later.
-
-    Attributes
-    ----------
-    nominal, gain, set_speed, least, most, delay, period, hoist, rate : float
-        As in `RealWeight`; the delay is that of the computation.
-    sensor : float
-        Not used: the observer filters by itself.
+    top, and the estimate, one travel time of the pipe later. The delay is that of the computation;
+    `sensor` is not used, as the observer filters by itself.
     """
 
-    nominal: Any
-    gain: Any
-    set_speed: Any
-    least: Any
-    most: Any
-    delay: Any
-    period: Any
-    sensor: Any
-    hoist: Any
-    rate: Any
-
-    @property
-    def moves(self) -> bool:
-        """Whether the weight changes at once with the bit speed: it does not."""
-        return False
-
-    def command(self, seen: Any, nominal: Any) -> Any:
-        """Commanded weight (N) at a measured speed (rad/s) and the present nominal weight (N)."""
-        return RealWeight.command(self, seen, nominal)  # type: ignore[arg-type]
+    __slots__ = ()
 
 
 # Keys of a design.

@@ -1,11 +1,14 @@
-"""What a weight-on-bit law must offer, and what a design file and the documents know of it."""
+"""What a weight-on-bit law must offer, and what a design file and the documents know of it.
+
+The constant weight, which is the default.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 from drillctl import registry
 from drillctl.errors import InputError
@@ -88,3 +91,45 @@ def refuse_outside(nominal: float, least: float, most: float) -> None:
             f"{least / 1e3:g} to {most / 1e3:g} kN",
             "operating_point.weight_on_bit",
         )
+
+
+class ConstantWeight(NamedTuple):
+    """Weight on bit held at its operating value.
+
+    Attributes
+    ----------
+    level : float
+        Weight on bit (N).
+    """
+
+    level: Any
+
+    @property
+    def moves(self) -> bool:
+        """Whether the weight changes with the bit speed."""
+        return False
+
+    def weight(self, speed: Any) -> Any:
+        """Weight on bit (N); the same at any bit speed `speed` (rad/s)."""
+        return self.level
+
+    def slope(self, speed: Any) -> Any:
+        """Weight per bit speed (N s/rad): none."""
+        return 0.0 * speed
+
+
+class ConstantWeightTable(Table):
+    """Weight on bit held at the operating point's value; its path waits for another law."""
+
+    law: Literal["constant"] = "constant"
+    path: PathTable = PathTable()
+
+
+LAWS = (
+    WeightOnBitLaw(
+        ConstantWeightTable,
+        lambda table, nominal, speed: ConstantWeight(nominal),
+        moves=False,
+        forms=((ConstantWeight, '`law = "constant"`', "The default."),),
+    ),
+)

@@ -22,7 +22,7 @@ from drillctl.simulation.limit_cycle.describing import (
 )
 from drillctl.simulation.limit_cycle.returns import Returns, judge, long_run
 from drillctl.simulation.limit_cycle.shooting import Orbit
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from drillctl.simulation.lanes import Kind
 from drillctl.simulation.limit_cycle.flow import Flow
 from drillctl.simulation.limit_cycle.shooting import Orbit, find_orbit
 from drillctl.simulation.reference import Motion, Piece, solve
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 
 Array = NDArray[np.float64]
 

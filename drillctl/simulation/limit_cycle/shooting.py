@@ -23,7 +23,7 @@ from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.simulation.limit_cycle.describing import HarmonicCycle, mean_torque_and_slope
 from drillctl.simulation.limit_cycle.flow import LATER, Flow, Leg
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from drillctl.design import Design
 from drillctl.ensemble.cases import Estimate, Runs, percentile_estimate
 from drillctl.ensemble.draws import CommonDraws, matching_shift
 from drillctl.progress import Progress
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.studies.advantage.policies import (
     CONSTANT,
     GAIN,

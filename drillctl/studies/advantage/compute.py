@@ -14,7 +14,7 @@ from drillctl.ensemble.cases import Estimate
 from drillctl.ensemble.grid import refuse_too_large
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 from drillctl.studies.advantage.cases import (
     ALL_TERMS,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from drillctl.ensemble.cases import Crossing, percentile_estimate, resampled_crossing
 from drillctl.ensemble.draws import CommonDraws
 from drillctl.progress import Progress
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.studies.advantage.cases import Optima, less, measured, optimum_beside
 from drillctl.studies.advantage.policies import DELAY, Optimum, Policies, Policy
 

@@ -17,7 +17,7 @@ from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.probability import INNER, OUTER, Area, Scatter, probability_map, region_areas
 from drillctl.ensemble.sweeps import sweep
 from drillctl.progress import Progress
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.studies.advantage.cases import Measured, Optima, measured, optimum_beside
 from drillctl.studies.advantage.policies import (
     GAIN,

@@ -23,7 +23,7 @@ from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.ensemble.regions import Region, region
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 from drillctl.studies.compare.cases import (
     Nominal,

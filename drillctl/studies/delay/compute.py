@@ -33,7 +33,7 @@ from drillctl.ensemble.grid import refuse_too_large
 from drillctl.ensemble.parameters import draw, refuse_dependent
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 from drillctl.studies.delay.lanes import KEPT, delayed_lanes, following_design
 

@@ -27,7 +27,7 @@ from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
 from drillctl.simulation.scheme import PROMISES
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 from drillctl.studies.doctor.scheme import (
     REFINEMENTS,

@@ -32,7 +32,7 @@ from drillctl.simulation.scheme import (
     _whole_steps,
     bit_inertia,
 )
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 
 SHORTENED = 1e-3
 """Share by which a step must be shorter than its bound for whole steps to be the reason."""

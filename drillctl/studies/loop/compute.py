@@ -10,7 +10,7 @@ from drillctl.ensemble.grid import axes_of
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import LoopAnalysis, loop
 from drillctl.progress import Progress
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.studies.loop_mapping.compute import LoopMap, loop_map
 
 MOST_NODES = 120

@@ -17,7 +17,7 @@ from drillctl.linear.loop_margins import peak_sensitivities
 from drillctl.linear.loop_model import many_loop_poles
 from drillctl.progress import SILENT, Progress
 from drillctl.rig.drillstring.frequencies import natural_frequencies
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 from drillctl.studies.three_regions.compute import gains_of, slopes_tolerated, steady_drilling
 

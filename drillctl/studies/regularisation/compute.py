@@ -16,7 +16,7 @@ from drillctl.ensemble.grid import Axis, axes_of, other_axes, span
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 
 Array = NDArray[np.float64]

@@ -41,7 +41,7 @@ from drillctl.progress import SILENT, Progress
 from drillctl.simulation.batch import Prepared, prepare, trace
 from drillctl.simulation.lanes import Kind, Lanes
 from drillctl.simulation.measures import NARROW_BAND, STATUSES, WINDOW
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 
 Array = NDArray[np.float64]

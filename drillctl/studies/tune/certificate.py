@@ -34,7 +34,7 @@ from drillctl.ensemble.grid import Axis
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.studies.tune.problem import GainProblem, Point, rank_weights
 from drillctl.studies.tune.runs import GainRuns
 from drillctl.studies.tune.tuned import Tuned

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from drillctl.design import Design
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 from drillctl.studies.tune.baselines import Baseline, baselines
 from drillctl.studies.tune.certificate import Certificate, FreshDraws, certified

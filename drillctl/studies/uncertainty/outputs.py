@@ -17,9 +17,8 @@ from drillctl.ensemble.running import Block
 from drillctl.ensemble.storing import FILES, ZarrBlocks, disk_errors
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
-from drillctl.store.codec import TREE, encoded
+from drillctl.store.codec import TREE, encoded, stored_name
 from drillctl.store.json_files import write_json
-from drillctl.store.labels import stored_name
 from drillctl.store.tables import texts, write_columns
 from drillctl.studies.uncertainty.best import Mean, Quantile, TailMean
 

@@ -29,8 +29,8 @@ from drillctl.ensemble.sampling import sampling_of
 from drillctl.errors import InputError
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import MEASURES, STATUSES
+from drillctl.store.codec import label
 from drillctl.store.folder import Growing, growing_realizations
-from drillctl.store.labels import label
 from drillctl.store.result import Result
 from drillctl.studies.uncertainty.best import (
     NEEDS_FULL,

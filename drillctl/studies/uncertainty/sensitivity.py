@@ -20,7 +20,7 @@ from drillctl.ensemble.cases import CONFIDENCE
 from drillctl.ensemble.parameters import uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
-from drillctl.store.labels import label
+from drillctl.store.codec import label
 from drillctl.studies.uncertainty.best import NEEDS_FULL
 
 Array = NDArray[np.float64]
