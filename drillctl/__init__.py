@@ -69,7 +69,7 @@ def _studies() -> dict[str, str]:
 
 
 def _is_module(name: str) -> bool:
-    """Whether a name is that of a module, which the import system looks for itself."""
+    """Whether a name is that of a module, which the import system locates itself."""
     here = Path(__file__).parent
     return (here / name).is_dir() or (here / f"{name}.py").is_file()
 

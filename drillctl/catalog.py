@@ -1,6 +1,6 @@
 """Shipped models and designs by name.
 
-In a wheel they lie inside the package, in a checkout beside it; both are looked at.
+In a wheel they lie inside the package, in a checkout beside it; both are searched.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def find(name_or_path: str, shelves: tuple[Shelf, ...] = ("designs", "models")) 
     name_or_path : str
         A shipped name, or a path (anything with a slash or ending in `.toml`).
     shelves : tuple of {'models', 'designs'}
-        Which shipped files to look among, in this order.
+        Which shipped files to search, in this order.
 
     Raises
     ------

@@ -21,33 +21,33 @@ class Silent:
     """Reports nothing."""
 
     def begin(self, task: str, total: int) -> None:
-        """A task begins; nobody is told."""
+        """A task begins; nothing is shown."""
 
     def advance(self, done: int) -> None:
-        """Parts are done; nobody is told."""
+        """Parts are done; nothing is shown."""
 
 
 class Within:
     """Reports a task that is a part of a larger one, as parts of that one.
 
-    A task that begins anew, as a sweep does for each kernel, and tells again what is done
-    already, is not counted twice.
+    A task that begins anew, as a sweep does for each kernel, and reports again what is
+    done already, is not counted twice.
     """
 
     def __init__(self, whole: Progress) -> None:
         self._whole = whole
-        self._done = self._told = 0
+        self._done = self._reported = 0
 
     def begin(self, task: str, total: int) -> None:
         """The part begins, perhaps once more; the larger task goes on."""
         self._done = 0
 
     def advance(self, done: int) -> None:
-        """Parts are done; those not yet told of are told."""
+        """Parts are done; those not yet reported are reported."""
         self._done += done
-        if self._done > self._told:
-            self._whole.advance(self._done - self._told)
-            self._told = self._done
+        if self._done > self._reported:
+            self._whole.advance(self._done - self._reported)
+            self._reported = self._done
 
 
 SILENT = Silent()

@@ -255,16 +255,10 @@ _DISPLAY: dict[str, dict[str, tuple[str, str]]] = {
         "N*m/rad": ("N*m/rad", "N m"),
         "kg*m^2": ("kg*m^2", "kg m²"),
     },
-    "field": {
-        "rad/s": ("rpm", "rpm"),
-        "N": ("klbf", "klbf"),
-        "N*m": ("klbf*ft", "klbf ft"),
-        "m": ("ft", "ft"),
-        "N*m*s/rad": ("N*m*s/rad", "N m s"),
-        "N*m/rad": ("N*m/rad", "N m"),
-        "kg*m^2": ("kg*m^2", "kg m²"),
-    },
 }
+_DISPLAY["field"] = _DISPLAY["si"] | {
+    "N": ("klbf", "klbf"), "N*m": ("klbf*ft", "klbf ft"), "m": ("ft", "ft"),
+}  # fmt: skip
 
 
 def displayed(value: Any, si_unit: str, system: System = "si") -> tuple[Any, str]:

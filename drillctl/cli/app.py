@@ -9,6 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from drillctl import __version__
+from drillctl.cli import console
 from drillctl.errors import DrillctlError, InputError
 from drillctl.studies.base import Group
 
@@ -61,16 +62,12 @@ def run(arguments: list[str]) -> int:
 
 
 def _failed(message: str, code: int) -> int:
-    from drillctl.cli import console
-
     console.note(f"drillctl: {message}")
     return code
 
 
 def _version(requested: bool) -> None:
     if requested:
-        from drillctl.cli import console
-
         console.line(f"drillctl {__version__}")
         raise typer.Exit
 

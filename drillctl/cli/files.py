@@ -1,7 +1,4 @@
-"""Commands on files: list shipped ones, print, check or start a design.
-
-The command that writes the report of a design.
-"""
+"""Commands on files: list shipped ones, print, check or start a design, write its report."""
 
 from __future__ import annotations
 
@@ -19,7 +16,6 @@ if TYPE_CHECKING:
 
 def _listed(kind: Literal["models", "designs"], as_json: bool) -> None:
     from drillctl import catalog
-    from drillctl.cli import console
 
     entries = catalog.entries(kind)
     if as_json:
@@ -41,7 +37,6 @@ def designs(json: Json = False, debug: Debug = False) -> None:
 
 def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False) -> None:
     """Print a design with its model and every default."""
-    from drillctl.cli import console
     from drillctl.design import to_toml
     from drillctl.design.reading import to_tree
 
@@ -56,7 +51,6 @@ def validate(
     design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False
 ) -> None:
     """Check keys, units and ranges, axes, draws and cases."""
-    from drillctl.cli import console
     from drillctl.studies.base import studies
 
     loaded_design = loaded(design, sets)
@@ -73,7 +67,6 @@ def new(
     debug: Debug = False,
 ) -> None:
     """Write a commented design file to start from."""
-    from drillctl.cli import console
     from drillctl.design.reading import write_starter
 
     console.line(f"written: {write_starter(name)}")

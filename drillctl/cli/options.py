@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from drillctl.cli import console
 from drillctl.errors import InputError
 from drillctl.studies.base import Option
 
@@ -27,10 +28,6 @@ Axes = Annotated[
         "--axis", metavar="PATH=MIN:MAX:POINTS", help="Add an axis to the map; repeatable."
     ),
 ]
-Draws = Annotated[
-    int | None, typer.Option("--realizations", help="Number of draws of the uncertain parameters.")
-]
-Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the draws.")]
 Out = Annotated[Path | None, typer.Option("--out", help="Write results to this folder.")]
 Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on stdout, nothing else.")
@@ -118,7 +115,6 @@ def _parameter(option: Option) -> inspect.Parameter:
 
 def loaded(name: str, sets: list[str] | None) -> Design:
     """Load a design by name or path with the values set; print its warnings."""
-    from drillctl.cli import console
     from drillctl.design import load, parse_setting
 
     design = load(name, **dict(parse_setting(text) for text in sets or []))

@@ -1,6 +1,6 @@
 """The linear side: the string and its loops before any simulation.
 
-From a string to its answers:
+From a string to its results:
 
 - `transmission.py`: sections as transmission lines, of finite elements and of the continuum.
 - `ends.py`: the string seen from its two ends, by lines, by modes or by solving M, C and K. All
@@ -10,7 +10,7 @@ From a string to its answers:
 - `slope_margin.py`: D*, the falling slope that a loop tolerates.
 - `boundary.py`: the boundary of the stable gains in closed form.
 - `loop_margins.py`: sensitivity, disk margins, delay margin at the top torque.
-- `tuning.py`: the top drive as the string feels it; gains from the string.
+- `tuning.py`: impedance of the top drive; gains from the string.
 
 As a state space:
 

@@ -8,7 +8,7 @@ imaginary part give the gains:
           K_i(\omega) = \omega\, \mathrm{Im}\, Z(i\omega).
 
 The curve, and the line Ki = 0 of a pole at zero, cut the plane into faces with one number of
-unstable poles each; the stable ones, asked for their slope margin, are the region. Every mode
+unstable poles each; those with a sufficient slope margin are the region. Every mode
 brings a branch: those of high modes of an undamped string are all but one vertical line.
 
 Poles of the loop against any one parameter of the design.
@@ -40,12 +40,12 @@ Array = NDArray[np.float64]
 
 FINEST = 1.0 / 800.0  # longest piece of a curve, over the window
 CLOSE = 1e-3
-"""Faces whose slope margin is as near to the slope as this are asked again, to all digits."""
+"""Faces whose slope margin is as near to the slope as this are computed again, to all digits."""
 HALVINGS = 60  # most halvings of an interval of frequency
 
 Window = tuple[tuple[float, float], tuple[float, float]]
 WINDOW: Window = ((0.0, 1000.0), (0.0, 500.0))
-"""Gains looked at by default: Kp (N m s/rad), Ki (N m/rad)."""
+"""Window of gains by default: Kp (N m s/rad), Ki (N m/rad)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ speed through filter, delay and hoist is
 
 .. math:: W' = K_w \frac{e^{-s \tau}}{(1 + s \tau_s)(1 + s \tau_h)}\, w_b,
 
-one that follows an observer has the observer's answer to top speed and top torque in place of
+one that follows an observer has the observer's response to top speed and top torque in place of
 w_b / (1 + s tau_s). A signal that is sampled counts as half a period late.
 """
 
@@ -34,12 +34,12 @@ from drillctl.rig.weight_on_bit import FollowingSpeed, RealWeight
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-WAVE_MODES = 40  # modes of a continuum that are looked at; it has no end of them
+WAVE_MODES = 40  # modes of a continuum that are computed; there are infinitely many
 BETWEEN = 24  # frequencies between two neighbouring natural frequencies
 
 
 class Ends(Protocol):
-    """A string that tells the speeds of its ends per torque on them."""
+    """A string that gives the speeds of its ends per torque on them."""
 
     @property
     def parts(self) -> Parts:
@@ -80,7 +80,7 @@ def ends_of(string: Drillstring, model: Route = "finite-elements") -> Ends:
     Raises
     ------
     InputError
-        Unknown model, or the continuum was asked for of a string whose damping is given mode
+        Unknown model, or the continuum of a string whose damping is given mode
         by mode.
     """
     if model not in ROUTES:
@@ -103,14 +103,14 @@ def model_of(ends: Ends) -> Model:
 
 
 def count_of(ends: Ends) -> int:
-    """Modes that are looked at: all of the elements', `WAVE_MODES` of the continuum."""
+    """Modes that are computed: all of the elements', `WAVE_MODES` of the continuum."""
     if model_of(ends) == "wave":
         return WAVE_MODES
     return 1 + sum(section.elements for section in ends.parts.sections)
 
 
 def telling_grid(ends: Ends) -> Array:
-    """Angular frequencies (rad/s) at which nothing that a string does goes unseen.
+    """Angular frequencies (rad/s) that resolve every resonance of a string.
 
     They cluster at the natural frequencies with either end free or held: whatever is put at the
     ends, resonances lie between these, and where two of them are close a response turns fast.

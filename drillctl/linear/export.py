@@ -38,7 +38,7 @@ def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearI
     python-control integrates smooth systems, and set-valued friction is not one: here the
     torque of the law is multiplied by tanh(bit speed / width). A bit that should stand still
     creeps instead, and J1 shifts by several per cent (by up to half of it for wide ones). For
-    answers use `drillctl.simulate`, which regularises nothing.
+    results use `drillctl.simulate`, which regularises nothing.
     """
     import control
 

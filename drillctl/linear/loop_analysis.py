@@ -1,4 +1,4 @@
-"""What a control engineer asks of a loop before any simulation, in one result."""
+"""Stability, margins and critical operating points of a loop, without simulation."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 ROUNDING = 1e-11  # real part of a pole over the largest pole that is rounding
 SPEEDS = np.geomspace(1e-3, 20.0, 401)
-"""Speeds at which a critical one is looked for, over the set speed."""
+"""Speeds between which a critical one is searched, over the set speed."""
 WEIGHTS = np.geomspace(1e-3, 20.0, 201)
-"""Weights at which a critical one is looked for, over that of the design."""
+"""Weights between which a critical one is searched, over that of the design."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ def loop(design: Design) -> LoopAnalysis:
     Returns
     -------
     LoopAnalysis
-        An unstable loop is an answer: its margins at the top are None.
+        Of an unstable loop the margins at the top are None.
 
     Raises
     ------
@@ -137,39 +137,12 @@ def loop(design: Design) -> LoopAnalysis:
         There is no steady drilling: the drive cannot turn the bit.
     """
     point = operating_point(design)
-    if design.simple_loop:
-        return _of_gains(design, point)
-    return _of_any(design, point)
-
-
-def _of_gains(design: Design, point: OperatingPoint) -> LoopAnalysis:
-    """A drive that two gains tell, and a weight that acts at once, in the slope already."""
-    kp, ki = design.top_drive.gains()
-    ends = ends_of(design.string)
-    tolerated, omega = slope_margin(ends, kp, ki)
-    poles = loop_poles(design.string, kp, ki, point.slope)
-    stable = point.slope < tolerated
-    return LoopAnalysis(
-        design=design,
-        operating_point=point,
-        stable=stable,
-        poles=poles,
-        slope_margin=tolerated,
-        deciding_frequency_hz=omega / (2.0 * math.pi),
-        continuum_slope_margin=_continuum(design, kp, ki),
-        margins=margins(ends, design.top_drive, BitSide(point.slope), poles) if stable else None,
-        weight_delay_margin=_delay_margin(design, point) if stable else None,
-        critical_speed=critical_speed(design, tolerated),
-        critical_weight_on_bit=critical_weight_on_bit(design, tolerated),
-    )
-
-
-def _of_any(design: Design, point: OperatingPoint) -> LoopAnalysis:
-    """Any drive and any moving weight; what takes gains alone is left out."""
-    ends = ends_of(design.string)
-    bit = _bit_side(design, point)
-    poles = model_poles(design, bit)
+    ends, bit = ends_of(design.string), _bit_side(design, point)
     tolerated, omega = tolerated_slope(design, point.speed)
+    # Two gains describe the drive, and a weight that acts at once is in the slope already.
+    simple = design.simple_loop
+    gains = design.top_drive.gains()
+    poles = loop_poles(design.string, *gains, point.slope) if simple else model_poles(design, bit)
     stable = bool(point.slope < tolerated)
     return LoopAnalysis(
         design=design,
@@ -178,11 +151,11 @@ def _of_any(design: Design, point: OperatingPoint) -> LoopAnalysis:
         poles=poles,
         slope_margin=tolerated,
         deciding_frequency_hz=omega / (2.0 * math.pi),
-        continuum_slope_margin=None,
+        continuum_slope_margin=_continuum(design, *gains) if simple else None,
         margins=margins(ends, design.top_drive, bit, poles) if stable else None,
         weight_delay_margin=_delay_margin(design, point) if stable else None,
-        critical_speed=None,
-        critical_weight_on_bit=None,
+        critical_speed=critical_speed(design, tolerated) if simple else None,
+        critical_weight_on_bit=critical_weight_on_bit(design, tolerated) if simple else None,
     )
 
 

@@ -15,7 +15,7 @@ Slope margin and delay margin of any loop: any drive, and a weight on bit that m
 With F the impedance of the bit, drive and moving weight closed, poles lie where F = D. Along the
 axis :math:`s = i\omega` a real F is a slope at which a pair of poles crosses; the least of them is
 the slope margin, provided that the loop without slope is stable. Unlike a PI a drive with filters,
-and a weight that comes late, may give energy; whether that proviso holds is asked of the poles.
+and a weight that comes late, may supply energy; whether that proviso holds follows from the poles.
 
 With the feedback of the moving weight apart, F = F_0 + P, a further delay tau of the weight leads
 to poles on the axis where :math:`F_0 - D = -P e^{-i\omega\tau}`: at frequencies where both have
@@ -40,9 +40,9 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 CLUSTER = np.geomspace(0.03, 1e7, 90)
-"""Distances from a pole at which a response is looked at, over that of the pole from the axis."""
-COARSE = np.geomspace(0.1, 1e6, 29)  # the same where many loops are looked at
-SLOWEST = 1e-3  # lowest frequency looked at, over the magnitude of the smallest pole
+"""Distances from a pole at which a response is computed, over that of the pole from the axis."""
+COARSE = np.geomspace(0.1, 1e6, 29)  # the same for many loops
+SLOWEST = 1e-3  # lowest frequency computed, over the magnitude of the smallest pole
 NEAREST = 1e-13  # least distance from the axis that a pole is taken to have, over its frequency
 
 

@@ -1,7 +1,7 @@
 """The whole linear loop of any design in state space: string, drive, rock and moving weight.
 
 The equations are those of the physics rooms, written once there; with limits away they are
-linear, and each column of the state matrix is their answer to one unit of state.
+linear, and each column of the state matrix is their response to one unit of state.
 
 Poles of the loop, the slope of the rock included.
 """
@@ -83,7 +83,7 @@ class _Drive:
         self.gain = gain
         self.held: Delay | None = None
         kp, ki = law.gains()
-        if isinstance(law, (RealDrive, SampledDrive)):
+        if isinstance(law, RealDrive):
             numbers = {name: getattr(law, name) for name in RealDrive._fields}
             free = {"least": -math.inf, "most": math.inf, "power": math.inf, "rate": math.inf}
             self.law = RealDrive(**(numbers | free | {"feedforward": 0.0, "tracking": 0.0}))
@@ -167,7 +167,7 @@ def loop_model(design: Design, bit: BitSide) -> StateMatrices:
     weight = _Weight(bit.path)
     ends = np.cumsum([size, drive.states, weight.states])
 
-    def answer(state: Array, lead: float, load: float) -> tuple[Array, Array]:
+    def response(state: Array, lead: float, load: float) -> tuple[Array, Array]:
         x, memory, path = np.split(state, ends[:2])
         speed, turning = float(top @ x), float(bit_row @ x)
         # The torque of the top reaches an observer after that of the rock is known.
@@ -182,8 +182,8 @@ def loop_model(design: Design, bit: BitSide) -> StateMatrices:
 
     total = int(ends[-1])
     zero = np.zeros(total)
-    columns = [answer(unit, 0.0, 0.0) for unit in np.eye(total)]
-    inputs = [answer(zero, 1.0, 0.0), answer(zero, 0.0, 1.0)]
+    columns = [response(unit, 0.0, 0.0) for unit in np.eye(total)]
+    inputs = [response(zero, 1.0, 0.0), response(zero, 0.0, 1.0)]
     return _seen_only(StateMatrices(
         np.column_stack([rates for rates, _ in columns]),
         np.column_stack([rates for rates, _ in inputs]),

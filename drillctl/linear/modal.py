@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.transmission import EndMobility
-from drillctl.rig.drillstring import Drillstring, Parts
+from drillctl.linear.transmission import EndMobility, FromMobility
+from drillctl.rig.drillstring import Drillstring
 from drillctl.store.codec import label
 from drillctl.store.result import Result
 
@@ -71,7 +71,7 @@ def _size(pole: Pole) -> float:
 
 def _poles(frequency: Array, damping: Array, shapes: Array) -> list[Pole]:
     """Poles of q'' + D q' + w^2 q = 0; of a mode with w = 0 that of its speed alone."""
-    # Which modes a damping matrix couples depends on the boundary: it is asked here for each.
+    # Which modes a damping matrix couples depends on the boundary: tested here for each.
     off_diagonal = damping - np.diag(np.diagonal(damping))
     if np.all(np.abs(off_diagonal) <= DIAGONAL * np.abs(damping).max(initial=0.0)):
         return [
@@ -271,16 +271,11 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 CHUNK = 256  # frequencies solved at a time where the modes are coupled
 
 
-class Expansion:
+class Expansion(FromMobility):
     """Mobility of a finite-element string from its undamped free-free modes."""
 
     def __init__(self, string: Drillstring) -> None:
         self.string = string
-
-    @property
-    def parts(self) -> Parts:
-        """Sections and ends."""
-        return self.string.parts
 
     @cached_property
     def _internal_damping(self) -> Array:
@@ -314,14 +309,6 @@ class Expansion:
             pipe_from_bit=first / s * (across - below_bit) * closed,
         )
 
-    def bit_impedance(self, s: ComplexArray, top: ComplexArray | complex = 0.0) -> ComplexArray:
-        """Torque per speed at the bit (N m s/rad), with `top` added at the drive."""
-        return 1.0 / self.mobility(s, top=top).bit
-
-    def top_impedance(self, s: ComplexArray, bit: ComplexArray | complex = 0.0) -> ComplexArray:
-        """Torque per speed at the top (N m s/rad), with `bit` added at the rock."""
-        return 1.0 / self.mobility(s, bit=bit).top
-
     def _free(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Speeds of nodes 0, 1 and last per torque on first and last, with both ends free.
 
@@ -333,8 +320,8 @@ class Expansion:
         off = damping - np.diag(np.diagonal(damping))
         flat = s.ravel()
         if np.abs(off).max() <= DIAGONAL * np.abs(damping).max():
-            # The rigid body apart: of slow motion it is nearly all, and the determinant lives
-            # on the rest.
+            # The rigid body apart: of slow motion it is nearly all, and the determinant follows
+            # from the rest.
             rigid = 1.0 / (flat + damping[0, 0])
             column = flat[:, None]
             each = column / (column**2 + column * np.diagonal(damping)[1:] + frequency[1:] ** 2)

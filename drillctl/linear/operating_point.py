@@ -17,8 +17,8 @@ from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
 
 Array = NDArray[np.float64]
 
-FASTEST = 1e4  # highest speed that is looked at (rad/s)
-SCAN = 4000  # speeds at which the balance is looked at before its zeros are located
+FASTEST = 1e4  # highest speed of the scan (rad/s)
+SCAN = 4000  # speeds at which the balance is evaluated before its zeros are located
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def equilibria(design: Design) -> tuple[OperatingPoint, ...]:
 
 
 def _speeds(design: Design) -> Array:
-    """Speeds to look at (rad/s): decades from next to rest, and evenly about the set speed."""
+    """Speeds of the scan (rad/s): decades from next to rest, and evenly about the set speed."""
     decades = np.geomspace(1e-6, FASTEST, SCAN)
     about = design.speed * np.linspace(0.0, 3.0, SCAN)[1:]
     return np.unique(np.concatenate([decades, about]))

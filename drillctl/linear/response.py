@@ -31,7 +31,7 @@ LOOPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "open_loop": (("speed_error", "bit_torque"), LOOP_OUTPUTS),
     "closed_loop": (("set_speed", "bit_torque"), LOOP_OUTPUTS),
 }
-"""Inputs and outputs of what can be looked at; those of `state_space.py`."""
+"""Inputs and outputs of each loop; those of `state_space.py`."""
 
 FREQUENCIES = tuple(np.geomspace(0.02, 5.0, 1200).tolist())
 """Frequencies (Hz) where none are given: from under the first mode to well above stick-slip."""
@@ -159,7 +159,7 @@ def frequency_response(
         The rig; a bare string has no loop but `plant`.
     frequency_hz : array_like, shape (frequencies,)
         Frequencies (Hz), each more than zero: the rigid body has no response at rest. On an
-        undamped string the height of a peak tells only how near a frequency is to resonance.
+        undamped string the height of a peak shows only how near a frequency is to resonance.
     loop : {'plant', 'open_loop', 'closed_loop'}
         The string alone; drive and string in series, from the speed error; or closed, from the
         set speed. Signals and signs are those of `drillctl.linear.plant`, `open_loop` and

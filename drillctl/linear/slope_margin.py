@@ -28,7 +28,7 @@ from drillctl.linear.ends import Ends, telling_grid
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-CHUNK = 256  # gain pairs looked at together: their signs on the grid fit the second-level cache
+CHUNK = 256  # gain pairs computed together: their signs on the grid fit the second-level cache
 CANDIDATES = 5
 """Crossings of a gain pair that are refined in a map: those that look lowest on the grid, and
 the one of lowest frequency."""
@@ -150,7 +150,7 @@ class _Search:
         self.lossy = self.rigid > parts.bit_damping or parts.modal_damping > 0.0 or any(
             x.coupling_damping > 0.0 or x.stiffness_damping > 0.0 for x in parts.sections
         )  # fmt: skip
-        # Without inertia at the bit resonances are so sharp that the grid tells little of them.
+        # Without inertia at the bit resonances are so sharp that the grid does not resolve them.
         self.candidates = candidates if parts.bit_inertia > 0.0 else len(self.grid)
         resistor = max(x.impedance for x in parts.sections) or np.sqrt(
             parts.sections[0].stiffness * (parts.top_inertia + parts.bit_inertia)

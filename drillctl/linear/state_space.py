@@ -138,7 +138,7 @@ def open_loop(design: Design) -> control.StateSpace:
     """
     if not design.simple_drive:
         raise InputError(
-            "a drive that feels its own torque or has filters is not cut at the speed error; see "
+            "a drive with torque feedback or filters is not cut at the speed error; see "
             "closed_loop",
             "controller",
         )

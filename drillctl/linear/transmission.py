@@ -1,6 +1,6 @@
 """Sections as transmission lines: the same two numbers for finite elements and the continuum.
 
-Seen from its ends a uniform section is told by its characteristic impedance Z and its
+Seen from its ends a uniform section is given by its characteristic impedance Z and its
 propagation G, both functions of frequency: an impedance z at one end appears at the other as
 (z cosh G + Z sinh G) / (cosh G + z/Z sinh G). For the continuum, with K the stiffness of the
 whole section and I its inertia (losses make both complex), Z = sqrt(K I) and G = i w sqrt(I/K).
@@ -13,8 +13,8 @@ Impedances are torque over speed (N m s/rad), time goes with exp(i w t).
 
 A string seen from its ends by solving M, C and K at each frequency.
 
-The slowest of the three ways and the most direct: it takes any viscous damping, knows nothing
-of sections, and checks the other two.
+The slowest of the three ways and the most direct: it takes any viscous damping, does not use
+sections, and checks the other two.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Line(NamedTuple):
     shunt: ComplexArray  # (1 - exp(-2 G)) / Z (rad/(N m s))
 
     def seen_through(self, end: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """What an impedance at one end looks like at the other."""
+        """Impedance at one end that an impedance at the other gives, and speed over speed."""
         both = 1.0 + self.decay**2
         ratio = both + end * self.shunt
         return (end * both + self.series) / ratio, 2.0 * self.decay / ratio
@@ -178,7 +178,32 @@ class Lines:
         return carried(down), carried(-above)
 
 
-class Banded:
+class FromMobility:
+    """A string whose impedances follow from its mobility."""
+
+    string: Drillstring
+
+    @property
+    def parts(self) -> Parts:
+        """Sections and ends."""
+        return self.string.parts
+
+    def mobility(
+        self, s: ComplexArray, top: ComplexArray | complex = 0.0, bit: ComplexArray | complex = 0.0
+    ) -> EndMobility:
+        """Response to torques on the two ends; see `Lines.mobility`."""
+        raise NotImplementedError
+
+    def bit_impedance(self, s: ComplexArray, top: ComplexArray | complex = 0.0) -> ComplexArray:
+        """Torque per speed at the bit (N m s/rad), with `top` added at the drive."""
+        return 1.0 / self.mobility(s, top=top).bit
+
+    def top_impedance(self, s: ComplexArray, bit: ComplexArray | complex = 0.0) -> ComplexArray:
+        """Torque per speed at the top (N m s/rad), with `bit` added at the rock."""
+        return 1.0 / self.mobility(s, bit=bit).top
+
+
+class Banded(FromMobility):
     """Mobility of a finite-element string from its matrices."""
 
     def __init__(self, string: Drillstring) -> None:
@@ -190,11 +215,6 @@ class Banded:
         matrices = (string.mass, string.damping, string.stiffness)
         shape = _bands if self.tridiagonal else _dense
         self._m, self._c, self._k = (shape(x) for x in matrices)
-
-    @property
-    def parts(self) -> Parts:
-        """Sections and ends."""
-        return self.string.parts
 
     def mobility(
         self, s: ComplexArray, top: ComplexArray | complex = 0.0, bit: ComplexArray | complex = 0.0
@@ -215,14 +235,6 @@ class Banded:
             pipe_from_top=pipe[..., 0],
             pipe_from_bit=pipe[..., 1],
         )
-
-    def bit_impedance(self, s: ComplexArray, top: ComplexArray | complex = 0.0) -> ComplexArray:
-        """Torque per speed at the bit (N m s/rad), with `top` added at the drive."""
-        return 1.0 / self.mobility(s, top=top).bit
-
-    def top_impedance(self, s: ComplexArray, bit: ComplexArray | complex = 0.0) -> ComplexArray:
-        """Torque per speed at the top (N m s/rad), with `bit` added at the rock."""
-        return 1.0 / self.mobility(s, bit=bit).top
 
     def _tridiagonal(self, s: complex, top: complex, bit: complex) -> ComplexArray:
         """Angles of nodes 0, 1 and last (rad) per torque on first and last (N m)."""

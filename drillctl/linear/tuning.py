@@ -1,7 +1,4 @@
-"""The top drive as the string feels it: impedance, and what it reflects of a wave.
-
-Gains of a top drive from the string it turns.
-"""
+"""Impedance of the top drive, its reflection of waves, and gains from the string."""
 
 from __future__ import annotations
 
@@ -93,7 +90,7 @@ def drive_impedance(
     Parameters
     ----------
     design : Design
-        Its drive and its uppermost pipe are looked at.
+        The rig; its drive and its uppermost pipe count.
     frequency_hz : array_like, shape (frequencies,)
         Frequencies (Hz), each more than zero.
     label : str, optional

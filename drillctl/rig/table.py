@@ -16,7 +16,7 @@ from drillctl.errors import InputError, shown
 from drillctl.units import Kind
 
 Check = Callable[[float, object], None]
-"""Refuses a number (SI) out of its range, telling what was written."""
+"""Refuses a number (SI) out of its range; the message quotes what was written."""
 
 LARGEST_COUNT = 10**9  # of anything that is counted: what is larger is a slip of the pen
 

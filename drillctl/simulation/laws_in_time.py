@@ -71,10 +71,10 @@ class DriveInTime(Protocol):
 
 def drive_in_time(law: Any, set_speed: float, program: Ramp) -> DriveInTime:
     """The drive of a law; `set_speed` is the final one (rad/s), `program` what leads to it."""
-    if isinstance(law, RealDrive):
-        return _Continuous(law, set_speed, program)
     if isinstance(law, SampledDrive):
         return _Sampled(law, set_speed, program)
+    if isinstance(law, RealDrive):
+        return _Continuous(law, set_speed, program)
     return _Ideal(law, program)
 
 

@@ -38,11 +38,12 @@ def ramp_followed(lag: Array, step: float) -> Array:
 
 def drive_step(drive: Any, step: float, string: Any) -> Any:
     """The kernel's form of a drive law on a string made ready; an ideal one as it is."""
-    if not isinstance(drive, (RealDrive, SampledDrive)):
+    if not isinstance(drive, RealDrive):
         return drive
-    made = _real_step(drive, step, string) if isinstance(drive, RealDrive) else _sampled_step(
-        drive, step
-    )  # fmt: skip
+    if isinstance(drive, SampledDrive):
+        made = _sampled_step(drive, step)
+    else:
+        made = _real_step(drive, step, string)
     shape = drive.kp.shape
     return type(made)(*(np.ascontiguousarray(np.broadcast_to(x, shape), dtype=float) for x in made))
 

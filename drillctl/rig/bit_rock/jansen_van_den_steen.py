@@ -17,8 +17,8 @@ class JansenVanDenSteen(NamedTuple):
     .. math:: T(\omega) = a_1 W \, \mathrm{sign}\,\omega, \qquad T(0) \in [-a_2 W, a_2 W]
 
     After Jansen & van den Steen, J. Sound Vib. 179 (1995) 647-668. With a1 = a2 it is Coulomb's
-    law. A turning bit feels no falling slope: every equilibrium is locally stable, and
-    stick-slip lives on the peak alone.
+    law. The torque on a turning bit does not fall with speed: every equilibrium is locally stable,
+    and the peak alone causes stick-slip.
 
     Attributes
     ----------

@@ -71,7 +71,7 @@ class PrintedThreeBranch(NamedTuple):
     def torque_and_slope(self, weight: Any, speed: Any, exp: Exp) -> tuple[Any, Any]:
         """Torque (N m) and slope (N m s/rad) of Equation 5 at `speed` >= 0 (rad/s).
 
-        Within the tolerance the torque depends on the string, which only a simulation knows.
+        Within the tolerance the torque depends on the string, which only a simulation computes.
         """
         return self.turning.torque_and_slope(weight, speed, exp)
 

@@ -1,7 +1,7 @@
 """Natural frequencies of a string of lines, none missed (after Wittrick & Williams 1971).
 
 Walk down the string with the dynamic stiffness of all that lies above. How often it passes
-through infinity is how many natural frequencies lie under the one looked at, were the string held
+through infinity is how many natural frequencies lie below a given one with the string held
 there; where the end is free, one more if the stiffness there is negative. Along a line the
 stiffness is a tangent whose angle falls by the phase of the wave, so that nothing is lost near
 its poles. Bisection on that count finds each frequency, however close to the next, at any number

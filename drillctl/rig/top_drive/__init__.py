@@ -9,7 +9,7 @@ that both are zero in steady drilling.
   `angle`, as the pair (offset, slope) of `offset - slope * angle_at_the_end`; the batch
   engine's form.
 - `impedance(s)`: torque against the motion per speed (N m s/rad) of the linearised law; what
-  the string feels of the drive, its inertia apart.
+  acts on the string, without the drive inertia.
 
 `RealDrive` and `SampledDrive` have a memory: filters, integral, motor. They have an `impedance` and
 the `torque` of steady motion; how they move is in `real_drive`.

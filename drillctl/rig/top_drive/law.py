@@ -106,7 +106,7 @@ class DriveLaw:
     # Of the table and the string (a `Drillstring` or `StringNumbers`). Pure: its numbers may be
     # floats, arrays, or symbols of CasADi.
     controller: Callable[[Any, Any], Controller]
-    ideal: Callable[[Controller], TopDriveLaw]  # law of an ideal drive that feels no torque
+    ideal: Callable[[Controller], TopDriveLaw]  # law of an ideal drive without torque feedback
     tuned: tuple[str, ...]  # keys that may be tuned
     ranges: Callable[[Any, Any], Ranges]  # of table and string: what is tuned by default, and where
     tuned_to_string: bool = True  # whether anything follows from the string
@@ -139,7 +139,7 @@ def top_drive(table: Any, string: Callable[[], Any]) -> TopDriveLaw:
     return _real(controller, table.drive)
 
 
-def _real(controller: Controller, drive: DriveTable) -> RealDrive | SampledDrive:
+def _real(controller: Controller, drive: DriveTable) -> RealDrive:
     least, most = limits(drive)
     rate = math.inf if drive.torque_rate_limit is None else drive.torque_rate_limit
     numbers = {
@@ -167,7 +167,7 @@ def limits(drive: DriveTable) -> tuple[float, float]:
 
 
 def tracking(kp: Any, ki: Any, drive: DriveTable) -> Any:
-    """Rate (1/s) at which a limited integral gives in; gains may be arrays or symbols."""
+    """Rate (1/s) of back-calculation of a limited integral; gains may be arrays or symbols."""
     if drive.anti_windup == "none":
         return 0.0 * (kp + ki)
     if drive.tracking_time is not None:

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 class RealDrive(NamedTuple):
     r"""Speed control with what makes a drive real, in continuous time.
 
-    The encoder shows the speed late, the torque that the controller feels is that of the motor
-    less what an inertia takes, the command is limited, and the motor follows with a lag:
+    The encoder signal lags the speed, the torque fed back is that of the motor less what an
+    inertia takes, the command is limited, and the motor follows with a lag:
 
     .. math:: \tau_e \dot\omega_e = \omega - \omega_e, \quad
               \tau_x \dot x = T - J_x \dot\omega_e - x, \quad
@@ -36,7 +36,7 @@ class RealDrive(NamedTuple):
     pipe takes, and m = a / zeta is Z-torque (impedance matching; a = 1 the torsional
     rectification of Tucker & Wang 1999 in its ideal limit). With J_x = 0 it is the motor torque,
     and m = 1 / c_f, corner k_f / c_f is active damping (after Jansen & van den Steen 1995): the
-    drive looks like a spring k_f and a damper c_f. Anti-windup is by back-calculation (Astrom &
+    drive acts as a spring k_f and a damper c_f. Anti-windup is by back-calculation (Astrom &
     Hagglund, PID Controllers, 1995).
 
     Attributes
@@ -46,11 +46,11 @@ class RealDrive(NamedTuple):
     kp, ki : float
         Gains (N m s/rad, N m/rad).
     mobility : float
-        m, by how much the set speed gives way to the torque felt (rad/s per N m).
+        m, by how much the torque fed back lowers the set speed (rad/s per N m).
     sensed_inertia : float
         J_x, whose torque is taken off that of the motor (kg m2).
     corner : float
-        omega_c of the high-pass on the torque felt (rad/s).
+        omega_c of the high-pass on the torque fed back (rad/s).
     encoder, torque_filter, lag : float
         Time constants tau_e, tau_x, tau_T (s); zero for none.
     least, most : float
@@ -60,7 +60,11 @@ class RealDrive(NamedTuple):
     rate : float
         Limit R of the torque's rate (N m/s); infinite for none, else with a lag.
     tracking : float
-        k_t (1/s), rate at which a limited integral gives in; 0 without anti-windup.
+        k_t (1/s), rate of back-calculation of a limited integral; 0 without anti-windup.
+    period : float
+        h, between two samples of a `SampledDrive` (s).
+    late : float
+        Periods that its command waits before it is given out: 0 or 1.
     """
 
     feedforward: Any
@@ -77,6 +81,8 @@ class RealDrive(NamedTuple):
     power: Any
     rate: Any
     tracking: Any
+    period: Any = 0.0
+    late: Any = 0.0
 
     def gains(self) -> tuple[Any, Any]:
         """Proportional (N m s/rad) and integral (N m/rad) gain of the speed controller."""
@@ -91,49 +97,15 @@ class RealDrive(NamedTuple):
         return _impedance(self, s, 1.0)
 
 
-class SampledDrive(NamedTuple):
-    r"""The drive of `RealDrive` with a controller that works at equal intervals.
+class SampledDrive(RealDrive):
+    """The drive of `RealDrive` with a controller that works at equal intervals.
 
     At the times k h the controller reads speed and torque, computes its command and holds it for
     one period; the filters of the torque work on the mean torque of the last period, the encoder
     and the motor stay what they are. With `late` the command is given out one period later.
-
-    Attributes
-    ----------
-    feedforward, kp, ki, mobility, sensed_inertia, corner, encoder, torque_filter, lag : float
-        As in `RealDrive`.
-    least, most, power, rate, tracking : float
-        As in `RealDrive`.
-    period : float
-        h (s).
-    late : float
-        Periods that a command waits before it is given out: 0 or 1.
     """
 
-    feedforward: Any
-    kp: Any
-    ki: Any
-    mobility: Any
-    sensed_inertia: Any
-    corner: Any
-    encoder: Any
-    torque_filter: Any
-    lag: Any
-    least: Any
-    most: Any
-    power: Any
-    rate: Any
-    tracking: Any
-    period: Any
-    late: Any
-
-    def gains(self) -> tuple[Any, Any]:
-        """Proportional (N m s/rad) and integral (N m/rad) gain of the speed controller."""
-        return self.kp, self.ki
-
-    def torque(self, angle: Any, speed: Any) -> Any:
-        """Torque (N m) in steady motion at `angle` (rad) and `speed` (rad/s) in the frame."""
-        return self.feedforward - self.kp * speed - self.ki * angle
+    __slots__ = ()
 
     def impedance(self, s: Any) -> Any:
         """Impedance (N m s/rad) at `s` (1/s); sampling counts as its mean delay.
@@ -144,7 +116,7 @@ class SampledDrive(NamedTuple):
         return _impedance(self, s, np.exp(-s * (0.5 + self.late) * self.period))
 
 
-def _impedance(drive: RealDrive | SampledDrive, s: Any, held: Any) -> Any:
+def _impedance(drive: RealDrive, s: Any, held: Any) -> Any:
     """Torque per speed with the command passed on by the factor `held`.
 
     T = -g (c - loss), with the command's response to speed and to the torque itself eliminated.
@@ -185,7 +157,7 @@ def respond(
     """Torque of a `RealDrive` and the rates of its memory."""
     encoder, filtered, slow, integral, motor = memory.tolist()
     seen = encoder if drive.encoder > 0.0 else speed
-    # The torque felt is a T + b: the motor's, less what the sensed inertia takes.
+    # The torque fed back is a T + b: the motor's, less what the sensed inertia takes.
     a, b = _felt(drive, speed, encoder, acceleration)
     error = lead - seen + drive.mobility * slow
     fixed = drive.feedforward + drive.kp * error + drive.ki * integral
@@ -254,7 +226,7 @@ def sample(drive: SampledDrive, memory: Array, speed: float, lead: float, absolu
     return np.array([encoder, filtered, slow, integral, motor, command, given, seen, 0.0])
 
 
-def limits(drive: RealDrive | SampledDrive, speed: float) -> tuple[float, float]:
+def limits(drive: RealDrive, speed: float) -> tuple[float, float]:
     """Least and largest torque (N m) that a drive gives at an absolute speed (rad/s)."""
     by_power = drive.power / max(abs(speed), 1e-9)
     return max(drive.least, -by_power), min(drive.most, by_power)
@@ -265,16 +237,14 @@ def clipped(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)
 
 
-def _integral_rate(
-    drive: RealDrive | SampledDrive, error: float, command: float, given: float
-) -> float:
+def _integral_rate(drive: RealDrive, error: float, command: float, given: float) -> float:
     """Rate of the integral (rad/s) at an error (rad/s), a command and what is given of it (N m)."""
     if drive.ki == 0.0:
         return error
     return error + drive.tracking * (given - command) / drive.ki
 
 
-def _motor_rate(drive: RealDrive | SampledDrive, command: float, torque: float) -> float:
+def _motor_rate(drive: RealDrive, command: float, torque: float) -> float:
     """Rate of the motor torque (N m/s) of a drive with a lag."""
     wanted = (command - torque) / drive.lag
     return clipped(wanted, -drive.rate, drive.rate) if math.isfinite(drive.rate) else wanted

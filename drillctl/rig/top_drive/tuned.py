@@ -39,12 +39,12 @@ def soft_torque(string: Any, share: Any = 0.25) -> tuple[Any, Any]:
 def z_torque(string: Any, absorption: Any = 1.0) -> Any:
     r"""Mobility of an impedance-matched drive (Z-torque): m = a / zeta.
 
-    The set speed of a stiff speed controller gives way to the torque that the pipe takes,
+    The set speed of a stiff speed controller is lowered by the torque that the pipe takes,
 
     .. math:: e = \Omega - \omega - \frac{a}{\zeta} (T_p - \bar T_p), \qquad
               T_p = T - J_d \dot\omega,
 
-    so that above the high-pass of that torque the drive looks like the resistor zeta / a, its own
+    so that above the high-pass of that torque the drive acts as the resistor zeta / a, its own
     inertia compensated, and reflects (1 - a) / (1 + a) of every wave from below. The filters of a
     public model of it: motor lag 5 ms, encoder 2 ms, high-pass 20 s, as periods (time constant:
     that over 2 pi).
@@ -111,10 +111,10 @@ class SoftTorqueTable(Table):
 
 
 class ZTorqueTable(Table):
-    """Z-torque (impedance matching): the set speed gives way to the pipe torque.
+    """Z-torque (impedance matching): the pipe torque lowers the set speed.
 
     The speed controller is that of `stiff-speed`. `absorption` 1 absorbs every wave from below,
-    0 none. The pipe torque is felt without its slow part: `high_pass` is the period below which
+    0 none. The pipe torque is fed back without its slow part: `high_pass` is the period below which
     it passes (time constant: that over 2 pi).
     """
 
@@ -140,9 +140,9 @@ class TorsionalRectificationTable(Table):
 
 
 class ActiveDampingTable(Table):
-    """Active damping (after Jansen & van den Steen 1995): the set speed gives way to the motor.
+    """Active damping (after Jansen & van den Steen 1995): the motor torque lowers the set speed.
 
-    The drive comes to look like a spring k_f and a damper c_f, by default those that make the
+    The drive then acts as a spring k_f and a damper c_f, by default those that make the
     lowest two pairs of poles of pipe, bit and drive coincide. The speed controller is that of
     `stiff-speed`.
     """
@@ -159,7 +159,7 @@ class ActiveDampingTable(Table):
 
 
 def _matched(table: Any, string: Any, mobility: Any) -> Controller:
-    """A stiff controller that gives way to the torque of the pipe."""
+    """A stiff controller whose set speed the pipe torque lowers."""
     kp, ki = stiff_speed(string, table.stiffness, table.rate)
     corner = 2.0 * math.pi / table.high_pass
     return Controller(kp, ki, 0.0, mobility, string.top_inertia, corner)

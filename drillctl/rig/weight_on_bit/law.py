@@ -36,7 +36,7 @@ class WeightLaw(Protocol):
 class PathTable(Table):
     """From the bit speed to the weight on the bit; at once where nothing is given.
 
-    `delay`: until the driller knows. `sampling_period`: between two readings. `sensor_lag`,
+    `delay`: from the bit to the driller. `sampling_period`: between two readings. `sensor_lag`,
     `hoist_lag`: time constants of the filter downhole and of the hoist. With `rate_limit` the
     hoist follows with a lag of 0.1 s at least.
     """

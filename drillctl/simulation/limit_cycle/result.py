@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import PrintedThreeBranch
-from drillctl.rig.top_drive import RealDrive, SampledDrive
+from drillctl.rig.top_drive import RealDrive
 from drillctl.rig.weight_on_bit import PATHS
 from drillctl.simulation.lanes import Kind
 from drillctl.simulation.limit_cycle.describing import (
@@ -132,7 +132,7 @@ def limit_cycle(
 def _refuse_memory(design: Design) -> None:
     """Cycles are found for laws that are functions of the motion (`InputError`)."""
     why = "has a memory or changes by the clock; cycles are found without. Simulate it instead"
-    if isinstance(design.top_drive, (RealDrive, SampledDrive)):
+    if isinstance(design.top_drive, RealDrive):
         raise InputError(f"this drive {why}", "controller")
     if isinstance(design.weight_on_bit, PATHS):
         raise InputError(f"this weight on bit {why}", "weight_on_bit")
