@@ -106,7 +106,7 @@ class Design:
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What is allowed but hardly meant, reported once when a design is used."""
+        """What is allowed but probably not meant, reported once when a design is used."""
         return parts.warnings_of(self.tables, self.bit_rock.static_torque(self._weight_at_rest))
 
     @property

@@ -109,7 +109,7 @@ class SectionTable(Table):
         given += ["drag"] if self.drag else []
         given += ["tool_joint_factor"] if self.tool_joint_factor != 1.0 else []
         for key in given:
-            raise InputError(f"{key} does not go with stiffness (a lumped spring)")
+            raise InputError(f"{key} is not allowed with stiffness (a lumped spring)")
         if (self.elements or 1) != 1:
             raise InputError("elements must be 1 for a lumped spring (stiffness)")
 
@@ -117,9 +117,9 @@ class SectionTable(Table):
         if self.length is None:
             raise InputError('length is missing, e.g. length = "3000 m"')
         if self.inertia is not None:
-            raise InputError("inertia goes with stiffness (a lumped spring) only")
+            raise InputError("inertia requires stiffness (a lumped spring)")
         if self.outer_diameter is None and self.inner_diameter is not None:
-            raise InputError("inner_diameter goes with outer_diameter only")
+            raise InputError("inner_diameter requires outer_diameter")
         if self.outer_diameter is not None:
             if self.inner_diameter is None:
                 raise InputError('inner_diameter is missing ("0 mm" for a solid bar)')
@@ -133,7 +133,7 @@ class SectionTable(Table):
         if self.shear_modulus is not None and self.youngs_modulus is not None:
             raise InputError("give shear_modulus or youngs_modulus, not both")
         if self.poisson_ratio is not None and self.youngs_modulus is None:
-            raise InputError("poisson_ratio goes with youngs_modulus only")
+            raise InputError("poisson_ratio requires youngs_modulus")
         if self.poisson_ratio is not None and not -1.0 < self.poisson_ratio < 0.5:
             raise InputError(f"poisson_ratio {self.poisson_ratio:g} must lie between -1 and 0.5")
 
@@ -188,7 +188,7 @@ class StartTable(Table):
     @model_validator(mode="after")
     def _speed_when_turning(self) -> StartTable:
         if self.kind != "turning" and self.speed is not None:
-            raise InputError(f"speed does not go with kind = {self.kind!r}, only with 'turning'")
+            raise InputError(f"speed is not allowed with kind = {self.kind!r}, only with 'turning'")
         return self
 
 

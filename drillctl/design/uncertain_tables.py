@@ -106,7 +106,9 @@ class DistributionTable(Table):
         ]  # fmt: skip
         for key in given:
             if key not in keys:
-                raise InputError(f"{key} does not go with {self.distribution}, {_list(keys)} do")
+                raise InputError(
+                    f"{key} is not allowed with {self.distribution}; allowed are {_list(keys)}"
+                )
         if self.file is not None:
             raise InputError("file is read when a design is loaded; give samples here")
         ways = _NEEDED[self.distribution]
@@ -117,9 +119,9 @@ class DistributionTable(Table):
         if self.distribution in ("uniform", "triangular") and self.cov is not None:
             for key in ("min", "max", "mode"):
                 if key in given:
-                    raise InputError(f"{key} does not go with cov: give limits, or mean and cov")
+                    raise InputError(f"{key} is not allowed with cov: give limits, or mean and cov")
         if self.distribution in ("uniform", "triangular") and self.cov is None and "mean" in given:
-            raise InputError("mean does not go with min and max: give limits, or mean and cov")
+            raise InputError("mean is not allowed with min and max: give limits, or mean and cov")
         return self
 
 
@@ -215,7 +217,7 @@ class UncertaintyTable(Table):
                 f"replicates of {self.sampling}, for instance {more}"
             )
         if self.until is not None and self.sampling == "latin-hypercube":
-            raise InputError("until does not go with latin-hypercube, whose number is fixed")
+            raise InputError("until is not allowed with latin-hypercube, whose number is fixed")
         first = 0 if self.until is None else self.until.first_look
         if self.sampling == "sobol" and first % self.replicates:
             raise InputError(
@@ -262,7 +264,7 @@ def _inlined(path: str, table: Any, folder: Path) -> Any:
         if key in table and not isinstance(table[key], str):
             raise InputError(f"got {shown(table[key])}; it must be text in quotes", where)
     if "samples" in table:
-        raise InputError("goes without samples: the file holds them", where)
+        raise InputError("is not allowed with samples: the file holds them", where)
     numbers = _numbers(folder / table["file"], table.get("column"), where)
     unit = table.get("unit")
     samples = [f"{value!r} {unit}" for value in numbers] if unit else numbers
@@ -282,7 +284,9 @@ def _numbers(path: Path, column: str | None, where: str) -> list[float]:
     if rows and not _is_number(rows[0][0]):
         heads = [head.strip() for head in rows[0]]
         if column is None and len(heads) > 1:
-            raise InputError(f"{path} has {len(heads)} columns: which? {', '.join(heads)}", where)
+            raise InputError(
+                f"{path} has {len(heads)} columns; column must be one of {', '.join(heads)}", where
+            )
         if column is not None and column not in heads:
             raise InputError(f"{path} has no column {column!r}; {nearest(column, heads)}", where)
         index = 0 if column is None else heads.index(column)

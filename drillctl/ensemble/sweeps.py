@@ -77,7 +77,7 @@ class Sweep(Result):
         """J1 over the grid (s)."""
         return self.measures["j1"]
 
-    @property
+    @cached_property
     def regions(self) -> dict[float, Region]:
         """Region of each level."""
         return {level: region(self.j1, self.axes, level) for level in self.levels}

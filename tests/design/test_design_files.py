@@ -314,7 +314,7 @@ def test_section_names_may_hold_dots_and_spaces(tmp_path):
 
 def test_a_whole_section_can_be_set(over_rig):
     value = {"stiffness": "500 N*m/rad", "length": "1 m"}
-    with pytest.raises(InputError, match="length does not go with stiffness"):
+    with pytest.raises(InputError, match="length is not allowed with stiffness"):
         over_rig("", **{"drillstring.sections.pipe": value})
     value = {"polar_moment": "1e-5 m^4", "elements": 3}
     section = over_rig("", **{"drillstring.sections.pipe": value}).tables.drillstring.sections[0]

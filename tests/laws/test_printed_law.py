@@ -222,7 +222,7 @@ def test_a_table_over_the_weight():
         0.026 * 1.1, 0.085, 0.098, 2e-4
     )
     moving = {"law": "navarro-lopez-suarez", "gain": "1 kN*s/rad"}
-    with pytest.raises(InputError, match=r"bit_rock\.table: does not go with .* moves"):
+    with pytest.raises(InputError, match=r"bit_rock\.table: is not allowed with .* moves"):
         design.replace({"bit_rock": rock, "weight_on_bit": moving})
 
 

@@ -246,7 +246,7 @@ def test_a_constant_weight_has_no_delay_margin():
             {"path": {"rate_limit": "0 kN/s"}},
             "rate_limit: '0 kN/s' is not",
         ),
-        ("surface-observer", {"path": {"sensor_lag": "1 s"}}, "sensor_lag does not go with"),
+        ("surface-observer", {"path": {"sensor_lag": "1 s"}}, "sensor_lag is not allowed with"),
         ("stick-slip-alarm", {"path": {"delay": "11 s"}}, "delay 11 s must not exceed window 10"),
         ("stick-slip-alarm", {"calm": 0.9}, "calm = 0.9 must be less than alarm = 0.8"),
         ("stick-slip-alarm", {"reduction": 1.0}, "reduction = 1 must be more than 0"),

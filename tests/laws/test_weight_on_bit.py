@@ -180,7 +180,7 @@ def test_maps_take_the_gain_as_an_axis():
         ({"weight_on_bit.gain": "-1 kN*s/rad"}, "0 or more"),
         ({"weight_on_bit.gain": 4}, "kN\\*s/rad"),
         ({"weight_on_bit.minimum": "150 kN", "weight_on_bit.maximum": "100 kN"}, "more than min"),
-        ({"bit_rock.regularised_over": "0.1 rad/s"}, "does not go with a weight"),
+        ({"bit_rock.regularised_over": "0.1 rad/s"}, "is not allowed with a weight"),
         ({"weight_on_bit.maximum": "120 kN"}, "outside the limits of the weight-on-bit law"),
     ],
 )

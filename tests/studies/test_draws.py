@@ -199,7 +199,7 @@ NORMAL = {"distribution": "normal", "cov": 0.1}
         (A1, {**NORMAL, "cov": 0}, "cov: 0 is not allowed"),
         (A1, {**NORMAL, "cv": 1}, "cv: unknown key; did you mean 'cov'"),
         (A1, {"distribution": "normal"}, "cov is missing"),
-        (A1, {**NORMAL, "mode": 1}, "mode does not go with normal"),
+        (A1, {**NORMAL, "mode": 1}, "mode is not allowed with normal"),
         (A1, {**NORMAL, "mean": -1}, "mean: -1: -1.0 is not allowed: it must be greater"),
         (A1, {**NORMAL, "max": 0.5}, "mean: 1: it must lie between min and max"),
         (A1, {"distribution": "uniform", "min": 1}, "max is missing"),

@@ -426,7 +426,7 @@ def _of_radius(table: BitRadiusFrictionTable, weight: float, moves: bool) -> Nav
 def _regularised(law: Any, table: Any) -> Stribeck:
     if not isinstance(law, NavarroLopezSuarez):
         raise InputError(
-            "does not go with a weight on bit that moves over a friction table",
+            "is not allowed with a weight on bit that moves over a friction table",
             "bit_rock.regularised_over",
         )
     return Stribeck(law.a2, law.a1, law.beta, 1.0 / table.regularised_over)

@@ -86,7 +86,7 @@ class PrintedThreeBranchTable(FrictionCoefficients):
 def _law(table: PrintedThreeBranchTable, weight: float, moves: bool) -> PrintedThreeBranch:
     if table.table is not None and moves:
         raise InputError(
-            f"does not go with a weight on bit that moves under {table.law!r}; "
+            f"is not allowed with a weight on bit that moves under {table.law!r}; "
             "give a1, a2 and beta",
             "bit_rock.table",
         )

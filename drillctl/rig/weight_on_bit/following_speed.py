@@ -172,7 +172,7 @@ class SurfaceObserverTable(FollowingSpeedTable):
     def _no_sensor(self) -> SurfaceObserverTable:
         if self.path.sensor_lag:
             raise InputError(
-                "sensor_lag does not go with an observer, which has no sensor downhole"
+                "sensor_lag is not allowed with an observer, which has no sensor downhole"
             )
         return self
 

@@ -106,7 +106,7 @@ class StickSlipAlarmTable(Table):
             )
         if self.path.sampling_period:
             raise InputError(
-                "path.sampling_period does not go with windows, which sample by themselves"
+                "path.sampling_period is not allowed with windows, which sample by themselves"
             )
         return self
 
