@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from drillctl.store.tables import Table as Results
 from drillctl.studies.base import Picture
@@ -54,6 +54,12 @@ class Checks:
     name: str  # of its CSV file
     caption: str
     checks: tuple[Check, ...]  # in reading order
+    heads: ClassVar = ("question", "answer", "detail")
+
+    @property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """As those of a table."""
+        return tuple((one.question, one.word, one.detail) for one in self.checks)
 
 
 @dataclass(frozen=True)

@@ -64,12 +64,8 @@ def _write_tables(document: Document, folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     for section in document.sections:
         for block in section.blocks:
-            if isinstance(block, Table):
+            if isinstance(block, Table | Checks):
                 _write_csv(folder / f"{section.name}-{block.name}.csv", block.heads, block.rows)
-            elif isinstance(block, Checks):
-                rows = tuple((one.question, one.word, one.detail) for one in block.checks)
-                heads = ("question", "answer", "detail")
-                _write_csv(folder / f"{section.name}-{block.name}.csv", heads, rows)
 
 
 def _write_csv(path: Path, heads: tuple[str, ...], rows: tuple[tuple[str, ...], ...]) -> None:

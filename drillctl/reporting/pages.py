@@ -1,7 +1,4 @@
-"""A report as one self-contained HTML file, and as PDF printed by a headless browser.
-
-A report as Markdown, with figures as PNG files.
-"""
+"""A report as one HTML file, as PDF printed by a headless browser, and as Markdown."""
 
 from __future__ import annotations
 
@@ -11,22 +8,13 @@ import re
 import shutil
 import subprocess
 import tempfile
-from functools import cache, singledispatch
+from functools import cache
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from drillctl.errors import DrillctlError
-from drillctl.reporting.blocks import (
-    Block,
-    Checks,
-    Code,
-    Document,
-    Figure,
-    InteractiveMap,
-    Table,
-    Text,
-)
+from drillctl.reporting.blocks import Document, Figure
 from drillctl.reporting.pictures import FigureFiles, themed
 
 _UNIT = re.compile(
@@ -62,13 +50,12 @@ def _environment() -> Any:
     import jinja2
 
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("drillctl.reporting"), autoescape=True, trim_blocks=True,
-        lstrip_blocks=True, undefined=jinja2.StrictUndefined,
+        loader=jinja2.PackageLoader("drillctl.reporting"), trim_blocks=True, lstrip_blocks=True,
+        autoescape=jinja2.select_autoescape(["html.j2"]), undefined=jinja2.StrictUndefined,
     )  # fmt: skip
     environment.globals["kind"] = lambda block: type(block).__name__
-    environment.filters["figures"] = _figures
-    environment.filters["kept"] = _kept
-    environment.filters["short"] = _short
+    for one in (_figures, _kept, _short, _plain, _fence):
+        environment.filters[one.__name__.strip("_")] = one
     return environment
 
 
@@ -140,70 +127,21 @@ _MARKS = re.compile(r"([\\`*_{}\[\]#|~])")
 
 def markdown_page(document: Document, files: FigureFiles) -> str:
     """The whole document."""
-    lines = [f"# {_text(document.title)}", ""]
-    if document.problems:
-        lines += ["**This report is not complete.**", ""]
-        lines += [f"- {_text(problem)}" for problem in document.problems] + [""]
-    lines += [_text(document.subtitle), ""]
-    lines += [f"- {_text(name)}: {_text(value)}" for name, value in document.facts] + [""]
-    for section in document.sections:
-        lines += [f"## {_text(section.title)}", ""]
-        for block in section.blocks:
-            lines += [_block(block, files), ""]
-    if document.left_out:
-        lines += ["## Not in this report", ""]
-        lines += [f"- {_text(name)}: {_text(why)}" for name, why in document.left_out] + [""]
-    return "\n".join(lines)
+
+    def picture(figure: Figure) -> str:
+        files.picture(figure)
+        return f"figures/{figure.name}.png"
+
+    template = _environment().get_template("report.md.j2")
+    text: str = template.render(document=document, picture=picture)
+    return text.rstrip() + "\n"
 
 
-def _text(text: str) -> str:
+def _plain(text: str) -> str:
     """Escape markup, on one line."""
     return _MARKS.sub(r"\\\1", escape(" ".join(text.split()), quote=False))
 
 
-@singledispatch
-def _block(block: Block, files: FigureFiles) -> str:
-    raise TypeError(type(block).__name__)
-
-
-@_block.register
-def _(block: Text, files: FigureFiles) -> str:
-    return _text(block.text) if block.kind == "plain" else f"> {_text(block.text)}"
-
-
-@_block.register
-def _(block: Table, files: FigureFiles) -> str:
-    return _table(block.caption, block.heads, block.rows)
-
-
-@_block.register
-def _(block: Checks, files: FigureFiles) -> str:
-    rows = tuple((one.question, one.word, one.detail) for one in block.checks)
-    return _table(block.caption, ("question", "answer", "detail"), rows)
-
-
-def _table(caption: str, heads: tuple[str, ...], rows: tuple[tuple[str, ...], ...]) -> str:
-    lines = [f"**{_text(caption)}**", ""]
-    lines.append("| " + " | ".join(map(_text, heads)) + " |")
-    lines.append("|" + "---|" * len(heads))
-    lines += ["| " + " | ".join(map(_text, row)) + " |" for row in rows]
-    return "\n".join(lines)
-
-
-@_block.register
-def _(block: Figure, files: FigureFiles) -> str:
-    files.picture(block)
-    return f"![{_text(block.alt)}](figures/{block.name}.png)\n\n*{_text(block.caption)}*"
-
-
-@_block.register
-def _(block: InteractiveMap, files: FigureFiles) -> str:
-    return _block(block.figure, files)
-
-
-@_block.register
-def _(block: Code, files: FigureFiles) -> str:
-    fence = "```"
-    while fence in block.text:
-        fence += "`"
-    return f"{_text(block.caption)}\n\n{fence}{block.language}\n{block.text.rstrip()}\n{fence}"
+def _fence(text: str) -> str:
+    """More backquotes than there are in a row in a text."""
+    return "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))

@@ -5,6 +5,8 @@ The rig: a drawing by depth and tables of its parts; the glossary.
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.axes import Axes
@@ -186,55 +188,15 @@ def _alt(gathered: Gathered) -> str:
     return f"Drawing of the drillstring from top drive to bit: {', '.join(names)}."
 
 
-def entries(words: Words) -> tuple[tuple[str, str, str], ...]:
-    """Symbol or word, meaning and unit."""
-    speed, torque, force = (words.unit(unit) for unit in ("rad/s", "N*m", "N"))
-    slope, length = words.unit("N*m*s/rad"), words.unit("m")
-    return (
-        ("J1", "integral of |bit speed − set speed| / set speed over the run; small is good", "s"),
-        ("level", "value of J1 that bounds a region", "s"),
-        ("region", "cells of the map with J1 at or under a level", "cells, %"),
-        ("Kp", "proportional gain of the top drive: torque per speed error", "N m s"),
-        ("Ki", "integral gain: torque per integral of the speed error", "N m"),
-        ("ω", "speed; set speed: the speed that the drive controls to", speed),
-        ("WOB", "weight on bit", force),
-        ("bit torque", "of the rock on the bit, positive when it brakes", torque),
-        ("top torque", "of the drive", torque),
-        ("pipe torque", "in the uppermost element, positive when the top leads", torque),
-        ("twist", "top angle minus bit angle", "rad"),
-        ("D = −dT/dω", "falling slope of the bit torque at the operating speed", slope),
-        ("D*", "slope margin: the falling slope at which steady drilling becomes unstable", slope),
-        ("S", "sensitivity at the top torque; a high peak means little margin", "1"),
-        ("disk margin", "simultaneous change of gain and phase at the top torque that the loop "
-         "tolerates", "dB, °"),
-        ("ζ", "impedance of the pipe, J √(G ρ): torque per speed of a travelling wave", slope),
-        ("reflection", "share of the amplitude of a wave that the drive reflects", "1"),
-        ("a1, a2, β", "friction: torque = [a1 + (a2 − a1) exp(−β |ω|)] x weight on bit",
-         "m, m, s/rad"),
-        ("set-valued", "a bit at rest takes any torque up to the static one", ""),
-        ("stick-slip index", "(max − min) / (2 mean) of the bit speed over the last 20 s", "1"),
-        ("settling time", "time after which the bit speed stays within 2 % of the set speed", "s"),
-        ("ROP proxy", "mean of weight x |bit speed|, over nominal weight x set speed", "1"),
-        ("work per turn", "work on the rock over the turns of the bit", "J"),
-        ("cell", "one point of a map", ""),
-        ("draw, realization", "one set of values of the uncertain parameters", ""),
-        ("P(J1 ≤ level)", "share of the draws at or below the level", "%"),
-        ("95 % interval", "of an estimate: Clopper-Pearson for shares, bootstrap for areas and "
-         "means", ""),
-        ("q95, cvar95", "95 % quantile of J1; mean of the worst 5 %", "s"),
-        ("Sobol index", "share of the variance of J1 that a parameter explains alone (first) or "
-         "with interactions (total)", "1"),
-        ("status", "end of a run: ok (settled), sticking, stalled, not settled, censored "
-         "(stopped early), failed", ""),
-        ("reconstructed", "not printed in the source; chosen to reproduce its statements", ""),
-        ("reference solver", "locates every stick and release; slow and accurate", ""),
-        ("batch engine", "fixed step, thousands of runs at once; audited by the reference solver",
-         ""),
-        ("depth", "measured along the string", length),
-    )  # fmt: skip
+GLOSSARY = Path(__file__).parents[1] / "templates" / "glossary.tsv"  # SI units in braces
 
 
 def build_glossary(gathered: Gathered) -> tuple[Block, ...]:
-    """One table."""
-    heads = ("symbol or term", "meaning", "unit")
-    return (Table("glossary", "Symbols and terms", heads, entries(gathered.words)),)
+    """One table, in the units of the reader."""
+
+    def unit(match: re.Match[str]) -> str:
+        return gathered.words.unit(match[1])
+
+    text = re.sub(r"\{(.*?)\}", unit, GLOSSARY.read_text(encoding="utf-8"))
+    heads, *rows = (tuple(line.split("\t")) for line in text.splitlines())
+    return (Table("glossary", "Symbols and terms", heads, tuple(rows)),)
