@@ -3,7 +3,7 @@
 Reads results and calls studies; computes nothing itself.
 
 - `making.py`: `report`, from a design to files.
-- `recipes.py`: profiles, and how each study is run; `gather.py`: reads or runs them.
+- `gather.py`: profiles, and the studies of a report, read or run.
 - `cells.py`: values and time responses of the cells of a map.
 - `sections/`: sections that no study makes by itself; `blocks.py`: what they are made of.
 - `words.py`: numbers and units as text.
@@ -11,8 +11,8 @@ Reads results and calls studies; computes nothing itself.
 - `pictures.py`: figures as files.
 """
 
+from drillctl.reporting.gather import FULL, PROFILES, QUICK, STANDARD, Profile
 from drillctl.reporting.making import FORMATS, Report, report
-from drillctl.reporting.recipes import FULL, PROFILES, QUICK, STANDARD, Profile
 from drillctl.reporting.sections import SECTIONS
 
 __all__ = [

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from drillctl.store.tables import Table as Results
-from drillctl.studies.base import Picture
+from drillctl.studies.base import Check, Picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
@@ -31,20 +31,6 @@ class Table:
     caption: str  # what it shows
     heads: tuple[str, ...]  # with units in brackets
     rows: tuple[tuple[str, ...], ...]  # as long as the heads
-
-
-@dataclass(frozen=True)
-class Check:
-    """A question with its answer."""
-
-    question: str
-    answer: bool | None  # None: undecided
-    detail: str  # the numbers
-
-    @property
-    def word(self) -> str:
-        """The answer in a word."""
-        return {True: "yes", False: "no", None: "open"}[self.answer]
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from drillctl import store, units
 from drillctl.design import Design, parameter
 from drillctl.ensemble.grid import Axis, groups, shape_of
 from drillctl.progress import Progress
+from drillctl.reporting.blocks import Block, Figure, InteractiveMap
 from drillctl.reporting.words import Words, name_of
 from drillctl.simulation.batch import prepare, trace
 from drillctl.simulation.measures import STATUSES
@@ -21,6 +22,7 @@ from drillctl.studies.applies import fitting_map
 from drillctl.studies.base import Recipe, Run, Study
 
 if TYPE_CHECKING:
+    from drillctl.reporting.gather import Gathered
     from drillctl.studies import Sweep
 
 Array = NDArray[np.float64]
@@ -65,6 +67,14 @@ def traced(design: Design, run: Run) -> dict[str, Any]:
         "traced": len(chosen),
         "cells": int(result.j1.size),
     }
+
+
+def interactive(gathered: Gathered, block: Block) -> Block:
+    """The picture of the map with values and time responses of its cells, where there are some."""
+    if not (isinstance(block, Figure) and block.name == "map" and (own := gathered.have("cells"))):
+        return block
+    result = gathered.need("map").result
+    return InteractiveMap(block, lambda: shown(own.folder, result, gathered.words))
 
 
 def shown(folder: Path, result: Sweep, words: Words) -> dict[str, object]:
@@ -165,7 +175,7 @@ CELLS = Study(
     command=False,
     recipes=(
         Recipe("cells", "the responses over the map", fitting_map, needs=("map",), summary=dict,
-               order=50),
+               says=lambda summary: (), order=50),
     ),
 )  # fmt: skip
 """What the cells of the map show in a page: of reports alone."""

@@ -15,10 +15,16 @@ from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError, nearest
 from drillctl.progress import SILENT, Progress
 from drillctl.reporting.blocks import Checks, Document, Section, Table
-from drillctl.reporting.gather import INTERRUPTED, Gathered, NotThereError, gather
+from drillctl.reporting.gather import (
+    INTERRUPTED,
+    PROFILES,
+    Gathered,
+    NotThereError,
+    Profile,
+    gather,
+)
 from drillctl.reporting.pages import html_page, markdown_page, printed
 from drillctl.reporting.pictures import FigureFiles
-from drillctl.reporting.recipes import PROFILES, Profile
 from drillctl.reporting.sections import SECTIONS
 from drillctl.reporting.sections.summary import summary as verdict_summary
 from drillctl.reporting.sections.summary import verdict

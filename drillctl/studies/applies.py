@@ -1,8 +1,11 @@
-"""Why a study does not apply to a design; empty where it does."""
+"""What studies have in common: why one does not apply, empty where it does; the check of audits."""
 
 from __future__ import annotations
 
-from drillctl.studies.base import Requested
+from collections.abc import Iterator
+from typing import Any
+
+from drillctl.studies.base import Check, Requested
 
 
 def fitting_map(request: Requested) -> str:
@@ -31,3 +34,13 @@ def in_batch(request: Requested) -> str:
     if request.design.tables.bit_rock.law == "printed-three-branch":
         return "the batch engine does not take the friction law printed-three-branch"
     return ""
+
+
+def audited(audit: Any, what: str, cells: str) -> Iterator[Check]:
+    """Whether the reference solver agrees, if anything was audited."""
+    from drillctl.store.tables import number
+
+    if len(audit.cells):
+        detail = f"{len(audit.cells)} {cells}, worst relative difference in J1 "
+        question = f"Does the reference solver agree with {what}?"
+        yield Check(question, audit.verdict == "ok", detail + number(audit.worst, 2))

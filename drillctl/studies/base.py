@@ -88,6 +88,19 @@ class Picture(NamedTuple):
     paper: bool = False  # whether it needs light paper, as maps with dark contours do
 
 
+class Check(NamedTuple):
+    """A question about a result, with its answer."""
+
+    question: str
+    answer: bool | None  # None: undecided
+    detail: str  # the numbers
+
+    @property
+    def word(self) -> str:
+        """The answer in a word."""
+        return "open" if self.answer is None else "yes" if self.answer else "no"
+
+
 @dataclass(frozen=True)
 class Requested:
     """A study that a report needs."""
@@ -110,6 +123,10 @@ def _as_it_is(request: Requested) -> Design:
     return request.design
 
 
+def _nothing_computed(design: Design) -> str:
+    return "nothing of it was computed"
+
+
 def _summary(result: Any) -> dict[str, Any]:
     return dict(result.summary())
 
@@ -126,6 +143,8 @@ class Recipe:
     options: Mapping[str, Any] = field(default_factory=dict)
     compute: Callable[[Design, Run], Any] | None = None  # if not that of the study
     summary: Callable[[Any], dict[str, Any]] = _summary
+    # sentences from the summary, in place of all that the study shows of a result
+    says: Callable[[dict[str, Any]], Iterable[str]] | None = None
     order: int = 50  # those with less are done first
 
 
@@ -137,8 +156,10 @@ class Section:
     title: str
     reads: tuple[str, ...]  # recipes
     order: int  # place among the sections
-    # tables and pictures in their order; by default remarks, pictures and tables of all recipes
+    # tables and pictures in their order; by default remarks, checks, pictures and tables of all
+    # recipes, except for what another section of the study shows
     shows: tuple[str, ...] = ()
+    absent: Callable[[Design], str] = _nothing_computed  # why none of `shows` is there
     text: str = ""  # last paragraph
     # blocks from what was gathered, for what cannot be said so
     build: Callable[[Any], tuple[Any, ...]] | None = None
@@ -174,6 +195,7 @@ class Study:
     tables: Callable[[Any], Iterable[Table]] = _none
     pictures: Callable[[Any], Iterable[Picture]] = _none
     remarks: Callable[[Any, units.System], Iterable[str]] = _none
+    checks: Callable[[Any], Iterable[Check]] = _none  # of the numbers, for a report
     notes: Callable[[Any], Iterable[str]] = _none
     summary: Callable[[Any], dict[str, Any]] = _summary
     files: Callable[[Any, Path], None] = _nothing  # further files of a folder

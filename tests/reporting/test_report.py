@@ -45,7 +45,7 @@ def test_pictures_and_tables_lie_beside_it(small):
     assert {"rig", "map", "responses", "nyquist", "impedance", "convergence"} <= drawn
     with (small.folder / "tables" / "map-regions.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0][:2] == ["region", "cells"]
+    assert rows[0][:2] == ["J1 at or under (s)", "cells"]
     assert [int(row[1]) for row in rows[1:]] == [
         one["cells"] for one in small.content["studies"]["map"]["regions"].values()
     ]

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drillctl.reporting.blocks import Block, Text, block, figure
-from drillctl.reporting.gather import Gathered
-from drillctl.reporting.sections import audit, rig, runs, summary
+from drillctl.reporting.blocks import Block, Checks, Text
+from drillctl.reporting.cells import interactive
+from drillctl.reporting.gather import Gathered, NotThereError
+from drillctl.reporting.sections import rig, runs, summary
 from drillctl.studies.base import Section, studies
 
 
@@ -28,45 +29,37 @@ KINDS = (
     Kind("summary", "Summary and verdict",
          ("simulate", "loop", "setting", "map", "cells", "uncertainty", "tune"), summary.build),
     Kind("rig", "The rig", (), rig.build),
-    Kind("map", "J1 over the map", ("map", "cells"), runs.build_map),
     Kind("responses", "Time responses", ("simulate", "cells", "best", "bad"), runs.build_responses),
-    Kind("uncertainty", "Uncertainty", ("uncertainty", "setting"), runs.build_uncertainty),
-    Kind("sensitivity", "Sensitivity", ("uncertainty",), runs.build_sensitivity),
     Kind("audit", "Accuracy audit",
          ("simulate", "map", "uncertainty", "doctor", "mesh-1", "mesh-2", "mesh-4", "step-2",
-          "step-4"), audit.build),
+          "step-4"), runs.build_audit),
     Kind("glossary", "Glossary", (), rig.build_glossary),
 )  # fmt: skip
 """Every section that is not of a study object, in the order in which they are read."""
 _ORDER = {
-    "summary": 0, "rig": 10, "operating-point": 20, "modes": 30, "loop": 40, "map": 50,
-    "responses": 60, "uncertainty": 70, "sensitivity": 80,
-     "audit": 120, "glossary": 130,
+    "summary": 0, "rig": 10, "responses": 60, "audit": 120, "glossary": 130,
 }  # fmt: skip
 
 
-def _generic(section: Section) -> Callable[[Gathered], tuple[Block, ...]]:
-    """Remarks, figures and tables of the studies of a section, or those that it names."""
-    owners = {recipe.name: study for study in studies().values() for recipe in study.recipes}
+def _generic(section: Section, others: set[str]) -> Callable[[Gathered], tuple[Block, ...]]:
+    """What the studies of a section show, without what other sections do, or what it names."""
 
     def build(gathered: Gathered) -> tuple[Block, ...]:
-        system = gathered.words.system
         gathered.need(section.reads[0])
-        said: list[Block] = []
-        parts: list[tuple[str, Block]] = []
-        for name in section.reads:
-            found = gathered.have(name)
-            if found is None:
-                continue
-            study, result = owners[name], found.result
-            said += [Text(remark) for remark in study.remarks(result, system)]
-            parts += [(p.name, figure(p, name, system)) for p in study.pictures(result)]
-            parts += [(t.name, block(t, system)) for t in study.tables(result) if t.shown]
+        shown = [gathered.shown(name) for name in section.reads]
+        parts = [part for one in shown for part in one.parts]
+        blocks: list[Block] = []
         if section.shows:
-            said = []
-            parts = [one for wanted in section.shows for one in parts if one[0] == wanted]
-        last = (Text(section.text),) if section.text else ()
-        return (*said, *(part for _, part in parts), *last)
+            blocks += [part for want in section.shows for name, part, _ in parts if name == want]
+            if not blocks:
+                raise NotThereError(section.absent(gathered.requested))
+        else:
+            blocks += [remark for one in shown for remark in one.remarks]
+            if checks := tuple(check for one in shown for check in one.checks):
+                blocks.append(Checks("checks", "Checks", checks))
+            blocks += [part for name, part, usual in parts if usual and name not in others]
+        blocks += [Text(section.text)] if section.text else []
+        return tuple(interactive(gathered, one) for one in blocks)
 
     return build
 
@@ -76,7 +69,8 @@ def _sections() -> dict[str, Kind]:
     placed = [(_ORDER[kind.name], kind) for kind in KINDS]
     for study in studies().values():
         for one in study.sections:
-            build = one.build or _generic(one)
+            others = {name for other in study.sections if other is not one for name in other.shows}
+            build = one.build or _generic(one, others)
             placed.append((one.order, Kind(one.name, one.title, one.reads, build)))
     return {kind.name: kind for _, kind in sorted(placed, key=lambda pair: pair[0])}
 

@@ -1,87 +1,16 @@
-"""J1 over the map: figure with values and responses, regions, audit.
-
-Regions by probability with intervals, the setting at its own draws, sensitivity.
-
-Time responses at the current, the best and a bad setting.
-"""
+"""Time responses at the current, the best and a bad setting; accuracy of the numbers."""
 
 from __future__ import annotations
 
+from typing import Any
+
 from drillctl import plots
-from drillctl.reporting import cells
-from drillctl.reporting.blocks import Block, Figure, InteractiveMap, Table, Text, block, figure
+from drillctl.design import parameter, to_toml
+from drillctl.provenance import provenance
+from drillctl.reporting.blocks import Block, Checks, Code, Figure, Table
 from drillctl.reporting.gather import Gathered, NotThereError, Study
-from drillctl.reporting.sections.summary import regions_table
-from drillctl.reporting.words import NOTHING, Words, chance, number
+from drillctl.reporting.words import NOTHING, Words, number, percent
 from drillctl.simulation.measures import MEASURES, Measure
-from drillctl.studies.map import STUDY as MAP
-from drillctl.studies.uncertainty import STUDY, indices
-
-
-def build_map(gathered: Gathered) -> tuple[Block, ...]:
-    """The map, its regions and the status of its cells."""
-    study = gathered.need("map")
-    result, words = study.summary, gathered.words
-    blocks: list[Block] = []
-    pictures = [figure(one, "map", words.system) for one in MAP.pictures(study.result)][:1]
-    place = gathered.have("cells")
-    for one in pictures:
-        if place is None:
-            blocks.append(one)
-        else:
-            blocks.append(
-                InteractiveMap(one, lambda: cells.shown(place.folder, study.result, words))
-            )
-    if not pictures:
-        count = len(result["axes"])
-        blocks.append(Text(f"The map has {count} parameters: see the tables."))
-    if table := regions_table(gathered):
-        blocks.append(table)
-    total = sum(result["statuses"].values())
-    rows = tuple(
-        (name.replace("_", " "), str(cells_), f"{100.0 * cells_ / total:.1f} %")
-        for name, cells_ in result["statuses"].items()
-    )
-    blocks.append(Table("statuses", "Status at the end of the runs", ("status", "cells", "share"),
-                        rows))  # fmt: skip
-    return tuple(blocks)
-
-
-def build_uncertainty(gathered: Gathered) -> tuple[Block, ...]:
-    """Areas, figures, distributions, failures."""
-    result, system = gathered.need("uncertainty").result, gathered.words.system
-    blocks: list[Block] = [Text(remark) for remark in STUDY.remarks(result, system)]
-    if (own := gathered.have("setting")) is not None:
-        held = own.summary
-        blocks.append(
-            Text(
-                f"At the current setting, with {held['realizations']} draws: P(J1 ≤ "
-                f"{number(held['level'])} s) = {chance(held['probability'], held['interval_95'])}."
-            )
-        )
-    blocks += [
-        block(table, system)
-        for table in STUDY.tables(result)
-        if table.shown and table.name != "sensitivity"
-    ]
-    blocks += [
-        figure(picture, "uncertainty", system)
-        for picture in STUDY.pictures(result)
-        if picture.name != "sensitivity"
-    ]
-    return tuple(blocks)
-
-
-def build_sensitivity(gathered: Gathered) -> tuple[Block, ...]:
-    """Indices with their errors."""
-    study, system = gathered.need("uncertainty"), gathered.words.system
-    if "sensitivity" not in study.summary:
-        if gathered.requested.tables.uncertainty.sensitivity is None:
-            raise NotThereError("the design requests no indices ([uncertainty.sensitivity])")
-        raise NotThereError("indices are computed with --profile standard or full")
-    *_, picture = STUDY.pictures(study.result)
-    return figure(picture, "uncertainty", system), block(indices(study.result), system)
-
 
 NAMES = {"simulate": "current", "best": "best of the map", "bad": "a bad cell"}
 SHOWN = (
@@ -125,8 +54,6 @@ def _places(gathered: Gathered, runs: dict[str, Study]) -> list[list[str]]:
     study = gathered.have("cells")
     if study is None:
         return []
-    from drillctl.design import parameter
-
     best = study.summary["best"] or study.summary["bad"] or {}
     rows = []
     for path in best:
@@ -148,3 +75,56 @@ def _alt(runs: dict[str, Study]) -> str:
         for name, study in runs.items()
     ]
     return f"Time responses of bit and top speed. {'; '.join(text)}."
+
+
+CHECKED = ("simulate", "map", "uncertainty", "doctor")  # whose numbers are checked
+DETAILS = ("energy", "scheme", "errors")  # their tables and pictures beside the checks
+
+
+def build_audit(gathered: Gathered) -> tuple[Block, ...]:
+    """Checks, convergence, errors, versions, design."""
+    shown = [gathered.shown(name) for name in CHECKED]
+    checks = tuple(check for one in shown for check in one.checks)
+    details = [part for one in shown for name, part, _ in one.parts if name in DETAILS]
+    return (
+        Checks("audit", "Checks of the numbers of this report", checks),
+        *_convergence(gathered), *details, _versions(gathered),
+        Code("The design in full", to_toml(gathered.requested)),
+    )  # fmt: skip
+
+
+def _convergence(gathered: Gathered) -> tuple[Table, ...]:
+    base = gathered.have("mesh-1")
+    if base is None:
+        return ()
+    rows = []
+    reference = gathered.have("simulate")
+    if reference is not None and reference.summary["engine"] == "reference":
+        rows.append(_row("reference solver", reference.summary, base.summary))
+    rows.append(_row("batch engine, as used", base.summary, base.summary))
+    for name, text in (
+        ("step-2", "half the step"), ("step-4", "a quarter of the step"),
+        ("mesh-2", "twice the elements"), ("mesh-4", "four times the elements"),
+    ):  # fmt: skip
+        study = gathered.have(name)
+        if study is not None:
+            rows.append(_row(f"batch engine, {text}", study.summary, base.summary))
+    caption = "Convergence of the run at the current setting with step and mesh"
+    heads = ("run", "step (ms)", "modes", "J1 (s)", "difference from the run as used")
+    return (Table("convergence-of-this-run", caption, heads, tuple(rows)),)
+
+
+def _row(text: str, result: dict[str, Any], base: dict[str, Any]) -> tuple[str, ...]:
+    j1, own = result["measures"]["j1"], base["measures"]["j1"]
+    apart = NOTHING if not own or j1 is None or result is base else percent(j1 / own - 1.0, 2)
+    step = NOTHING if result["step"] is None else number(1e3 * result["step"])
+    modes = NOTHING if result["modes"] is None else str(result["modes"])
+    return text, step, modes, number(j1, 7), apart
+
+
+def _versions(gathered: Gathered) -> Table:
+    table = gathered.design.tables.uncertainty
+    rows = [*provenance().items(), ("seed of the draws", str(table.seed))]
+    rows.append(("profile", f"{gathered.profile.name}: {gathered.profile.meaning}"))
+    return Table("versions", "Versions, machine and seed", ("item", "value"),
+                 tuple(rows))  # fmt: skip

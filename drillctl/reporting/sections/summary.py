@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from drillctl.design import parameter
 from drillctl.reporting.blocks import Block, Check, Checks, Table, Text
 from drillctl.reporting.gather import Gathered
 from drillctl.reporting.words import NOTHING, between, chance, number, percent
@@ -118,8 +117,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
         blocks.append(Checks("verdict", caption, result.checks))
     if best := _best(gathered):
         blocks.append(best)
-    if regions := regions_table(gathered):
-        blocks.append(regions)
+    blocks += [part for name, part, _ in gathered.shown("map").parts if name == "regions"]
     if gathered.design.tables.status:
         blocks.append(Text(f"Status of the rig: {gathered.design.tables.status}.", "note"))
     return tuple(blocks)
@@ -203,29 +201,3 @@ def _best_of_draws(gathered: Gathered, name: str, best: dict[str, Any]) -> tuple
     # Runs stopped early leave the upper end of the interval open.
     ends = f"at least {number(low)} s" if high is None else f"{between(low, high)} s"
     return MEANINGS.get(name, name), place, f"{number(value)} s", ends
-
-
-def regions_table(gathered: Gathered) -> Table | None:
-    """Bounds of the regions of the map."""
-    study = gathered.have("map")
-    if study is None:
-        return None
-    design, words = gathered.design, gathered.words
-    paths = list(study.summary["axes"])
-    rows = []
-    for level, one in study.summary["regions"].items():
-        spans = []
-        for path in paths:
-            bounds = one["bounds"].get(path)
-            unit = parameter(design, path).si_unit
-            if bounds is None:
-                spans.append(NOTHING)
-                continue
-            low, high = (words.scaled(bound, unit) for bound in bounds)
-            spans.append(between(low, high))
-        rows.append(
-            (f"J1 ≤ {level} s", str(one["cells"]), percent(one["area_fraction"]), *spans)
-        )  # fmt: skip
-    heads = ("region", "cells", "share of the map", *(words.head(design, path) for path in paths))
-    caption = "Regions of the map; bounds are centres of the outermost cells"
-    return Table("regions", caption, heads, tuple(rows))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from drillctl.studies.base import Option, Picture, Recipe, Run, Study
+from drillctl.studies.base import Check, Option, Picture, Recipe, Run, Study
 
 if TYPE_CHECKING:
     from drillctl import units
@@ -147,6 +147,21 @@ def remarks(result: Doctor, system: units.System) -> Iterator[str]:
         yield f"advice: {result.advice}"
 
 
+def checks(result: Doctor) -> Iterator[Check]:
+    """Whether the accuracy is reached."""
+    from drillctl.store.tables import number
+
+    if result.refused is None:
+        errors = result.estimate.errors
+        detail = (
+            f"median {number(errors.median, 2)}, 99th percentile {number(errors.p99, 2)} over "
+            f"{errors.lanes} cells"
+        )
+        better = f"; better: {result.advice}" if result.advice else ""
+        reached = result.verdict in ("ok", "check")
+        yield Check(f"Is the accuracy {result.accuracy!r} reached?", reached, detail + better)
+
+
 STUDY = Study(
     name="doctor",
     help="Explain step, modes, errors and speed of the engine",
@@ -161,5 +176,6 @@ STUDY = Study(
     tables=tables,
     pictures=pictures,
     remarks=remarks,
+    checks=checks,
     recipes=(Recipe("doctor", "the errors of the batch engine", options={"audit": 0}, order=130),),
 )

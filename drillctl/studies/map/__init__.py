@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl.errors import InputError
-from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Study
+from drillctl.studies.applies import audited
+from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Section, Study
 
 if TYPE_CHECKING:
     from drillctl import units
@@ -46,6 +47,13 @@ def tables(result: Sweep) -> Iterator[Table]:
         rows.append([level, region.cells, region.area_fraction, *ends])
     title = "regions of the map, bounds between the centres of their outermost cells"
     yield Table("regions", title, tuple(columns), rows)
+    counts = result.summary()["statuses"]
+    yield Table(
+        "statuses", "status at the end of the runs",
+        (Column("status"), Column("cells"), Column("share", percent=True)),
+        [[name.replace("_", " "), n, n / result.j1.size] for name, n in counts.items()],
+        shown=False,
+    )  # fmt: skip
 
 
 def pictures(result: Sweep) -> Iterator[Picture]:
@@ -94,6 +102,11 @@ def remarks(result: Sweep, system: units.System) -> Iterator[str]:
         f"{result.j1.size} cells: {result.seconds:.3f} s in the lanes, "
         f"{result.total_seconds:.1f} s in all"
     )
+
+
+def checks(result: Sweep) -> Iterator[Check]:
+    """Whether the reference solver agrees."""
+    yield from audited(result.audit, "the map", "cells")
 
 
 def notes(result: Sweep) -> Iterator[str]:
@@ -146,8 +159,13 @@ STUDY = Study(
     tables=tables,
     pictures=pictures,
     remarks=remarks,
+    checks=checks,
     notes=notes,
     files=files,
     check=check,
     recipes=(Recipe("map", "the J1 map", not_applicable, order=40),),
+    sections=(
+        Section("map", "J1 over the map", ("map", "cells"), order=50,
+                shows=("map", "regions", "statuses")),
+    ),
 )  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Literal
 
 from drillctl.studies.applies import in_batch
-from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Study
+from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Study
 
 if TYPE_CHECKING:
     from drillctl.design import Design
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from drillctl.store.tables import Table
 
 HIDDEN = ("j1_rate", "work_at_bit", "time_outside_table")  # measures that are in the summary alone
+BALANCED = 1e-6  # largest relative residual of a balanced run
 FREE = 20.0  # interval (s) between the samples of a run that is kept for its measures alone
 FINE = 0.05  # and of one that is drawn (s)
 
@@ -50,6 +51,24 @@ def tables(result: Simulation) -> Iterator[Table]:
         engine = f"{engine} solver"
     columns = (Column("measure"), Column("value"), Column("unit", hidden=True))
     yield Table("measures", f"one run ({engine})", columns, rows)
+    if result.energy is not None:
+        terms = (("work of the drive", "drive"), ("work on the rock", "bit"),
+                 ("dissipated by damping", "damping"),
+                 ("change of stored energy", "stored"))  # fmt: skip
+        work: list[list[Any]] = [[name, getattr(result.energy, key)] for name, key in terms]
+        energy = Column("energy", unit="J", digits=6)
+        title = "energy balance of the run"
+        yield Table("energy", title, (Column("term"), energy), work, shown=False)
+
+
+def checks(result: Simulation) -> Iterator[Check]:
+    """Whether the energy balances."""
+    from drillctl.store.tables import number
+
+    if result.energy is not None:
+        residual = result.energy.relative_residual
+        detail = f"relative residual {number(residual, 2)}"
+        yield Check("Does the energy of the run balance?", residual < BALANCED, detail)
 
 
 def pictures(result: Simulation) -> Iterator[Picture]:
@@ -166,6 +185,7 @@ STUDY = Study(
     call="drillctl.simulation:simulate",
     tables=tables,
     pictures=pictures,
+    checks=checks,
     summary=summary,
     recipes=tuple(_recipes()),
 )  # fmt: skip

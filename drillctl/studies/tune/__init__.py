@@ -30,7 +30,7 @@ import itertools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Section, Study
+from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Section, Study
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -209,6 +209,17 @@ def _sized(value: float | None, digits: int) -> str:
     return number(value, digits)
 
 
+def checks(result: Tune) -> Iterator[Check]:
+    """Whether the certificate is passed."""
+    from drillctl.store.tables import chance, number, percent
+
+    certificate, runs = result.certificate, result.certificate.runs
+    required = percent(certificate.required)
+    detail = f"{chance(runs.probability, runs.interval)}, {len(runs.j1)} draws"
+    question = f"Is P(J1 ≤ {number(runs.level)} s) at least {required}, at fresh draws?"
+    yield Check(question, certificate.passed, detail)
+
+
 def notes(result: Tune) -> Iterator[str]:
     """Where the two engines disagree about the level."""
     if result.certificate.audit_verdict == "check":
@@ -264,6 +275,7 @@ STUDY = Study(
     tables=tables,
     pictures=pictures,
     remarks=remarks,
+    checks=checks,
     notes=notes,
     files=files,
     failure=failure,

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from drillctl.errors import InputError
-from drillctl.studies.applies import in_batch
-from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Study
+from drillctl.studies.applies import audited, in_batch
+from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Section, Study
 
 if TYPE_CHECKING:
     from drillctl import units
@@ -219,6 +219,11 @@ def remarks(result: Uncertainty, system: units.System) -> Iterator[str]:
     )
 
 
+def checks(result: Uncertainty) -> Iterator[Check]:
+    """Whether the reference solver agrees."""
+    yield from audited(result.audit, "the draws", "lanes")
+
+
 def notes(result: Uncertainty) -> Iterator[str]:
     """What deserves attention."""
     if result.audit.verdict == "check":
@@ -295,6 +300,23 @@ def setting_summary(result: Uncertainty) -> dict[str, Any]:
     }
 
 
+def setting_remark(summary: dict[str, Any]) -> Iterator[str]:
+    """The probability of keeping the level in a sentence."""
+    from drillctl.store.tables import chance, number
+
+    yield (
+        f"At the current setting, with {summary['realizations']} draws: P(J1 ≤ "
+        f"{number(summary['level'])} s) = {chance(summary['probability'], summary['interval_95'])}."
+    )
+
+
+def no_indices(design: Design) -> str:
+    """Why a report has no Sobol indices."""
+    if design.tables.uncertainty.sensitivity is None:
+        return "the design requests no indices ([uncertainty.sensitivity])"
+    return "indices are computed with --profile standard or full"
+
+
 STUDY = Study(
     name="uncertainty",
     help="Map J1 over draws: regions by probability, best cells",
@@ -323,14 +345,20 @@ STUDY = Study(
     tables=tables,
     pictures=pictures,
     remarks=remarks,
+    checks=checks,
     notes=notes,
     files=files,
     growing=growing,
     check=check,
     recipes=(
         Recipe("setting", "the draws at the current setting", in_batch, at_setting,
-               compute=setting, summary=setting_summary, order=30),
+               compute=setting, summary=setting_summary, says=setting_remark, order=30),
         Recipe("uncertainty", "the map under uncertainty", not_applicable, audited_as_profile,
                order=90),
+    ),
+    sections=(
+        Section("uncertainty", "Uncertainty", ("uncertainty", "setting"), order=70),
+        Section("sensitivity", "Sensitivity", ("uncertainty",), order=80, shows=("sensitivity",),
+                absent=no_indices),
     ),
 )  # fmt: skip
