@@ -6,7 +6,6 @@ Reads results and calls studies; computes nothing itself.
 - `gather.py`: profiles, and the studies of a report, read or run.
 - `cells.py`: values and time responses of the cells of a map.
 - `sections/`: sections that no study makes by itself; `blocks.py`: what they are made of.
-- `words.py`: numbers and units as text.
 - `pages.py` with `templates/`: the document as HTML, PDF or Markdown.
 - `pictures.py`: figures as files.
 """

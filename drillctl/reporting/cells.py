@@ -13,8 +13,7 @@ from drillctl import store, units
 from drillctl.design import Design, parameter
 from drillctl.ensemble.grid import Axis, groups, shape_of
 from drillctl.progress import Progress
-from drillctl.reporting.blocks import Block, Figure, InteractiveMap
-from drillctl.reporting.words import Words, name_of
+from drillctl.reporting.blocks import Block, Figure, InteractiveMap, Words, name_of
 from drillctl.simulation.batch import prepare, trace
 from drillctl.simulation.measures import STATUSES
 from drillctl.store.json_files import strict, write_text

@@ -14,9 +14,8 @@ from drillctl import store
 from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.reporting.blocks import Block, Text, block, figure
+from drillctl.reporting.blocks import Block, Text, Words, block, figure
 from drillctl.reporting.cells import CELLS
-from drillctl.reporting.words import Words
 from drillctl.store.json_files import read_json
 from drillctl.store.result import Result
 from drillctl.studies.base import Check, Recipe, Requested, Run, studies

@@ -14,7 +14,7 @@ from drillctl import store
 from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError, nearest
 from drillctl.progress import SILENT, Progress
-from drillctl.reporting.blocks import Checks, Document, Section, Table
+from drillctl.reporting.blocks import Checks, Document, Section, Table, Words
 from drillctl.reporting.gather import (
     INTERRUPTED,
     PROFILES,
@@ -28,7 +28,6 @@ from drillctl.reporting.pictures import FigureFiles
 from drillctl.reporting.sections import SECTIONS
 from drillctl.reporting.sections.summary import summary as verdict_summary
 from drillctl.reporting.sections.summary import verdict
-from drillctl.reporting.words import Words
 from drillctl.store.json_files import write_json, write_text
 
 if TYPE_CHECKING:
@@ -59,11 +58,6 @@ def write(
         except DrillctlError as error:
             unwritten["pdf"] = str(error)
     return written, unwritten
-
-
-def unfinished(folder: Path, content: dict[str, Any]) -> None:
-    """Write the summary of an incomplete report; its run stays unfinished and can resume."""
-    write_json(folder / "summary.json", content)
 
 
 def _write_tables(document: Document, folder: Path) -> None:
@@ -97,9 +91,7 @@ def chosen_sections(requested: Iterable[str] | None) -> tuple[str, ...]:
     if requested is None:
         return tuple(SECTIONS)
     names = [name.strip() for name in requested if name.strip()]
-    for name in names:
-        if name not in SECTIONS:
-            raise InputError(f"no section {name!r}; {nearest(name, SECTIONS)}", "--sections")
+    _known(names, SECTIONS, "section", "--sections")
     if not names:
         raise InputError(f"must name a section; allowed: {', '.join(SECTIONS)}", "--sections")
     return tuple(name for name in SECTIONS if name in names)
@@ -209,8 +201,12 @@ def report(
     InputError
         Unknown profile, section or format, or the folder holds other files.
     """
-    spent, wanted = _profile(profile), chosen_sections(sections)
-    kinds = _formats(formats)
+    if isinstance(profile, str):
+        _known([profile], PROFILES, "profile", "--profile")
+    spent = PROFILES[profile] if isinstance(profile, str) else profile
+    wanted, named = chosen_sections(sections), set(formats)
+    _known(named, FORMATS, "format", "--format")
+    kinds = tuple(name for name in FORMATS if name in named) or ("html",)
     run = store.claim("report", design, folder, profile=spent.name)
     words = Words(system)
     studies = studies_of(wanted)
@@ -226,26 +222,17 @@ def report(
         raise DrillctlError("; ".join(unwritten.values()))
     content = _content(gathered, document, written, unwritten)
     if problems:
-        unfinished(run.path, content)
+        write_json(run.path / "summary.json", content)  # unfinished: the same call resumes it
     else:
         run.finish(content)
     return Report(run.path, written, problems, interrupted, unwritten, content)
 
 
-def _profile(requested: str | Profile) -> Profile:
-    if isinstance(requested, Profile):
-        return requested
-    if requested not in PROFILES:
-        raise InputError(f"no profile {requested!r}; {nearest(requested, PROFILES)}", "--profile")
-    return PROFILES[requested]
-
-
-def _formats(requested: Iterable[str]) -> tuple[Format, ...]:
-    names = tuple(requested)
+def _known(names: Iterable[str], allowed: Iterable[str], kind: str, option: str) -> None:
+    """Refuse a name that is not allowed, with the nearest that is."""
     for name in names:
-        if name not in FORMATS:
-            raise InputError(f"no format {name!r}; {nearest(name, FORMATS)}", "--format")
-    return tuple(name for name in FORMATS if name in names) or ("html",)
+        if name not in allowed:
+            raise InputError(f"no {kind} {name!r}; {nearest(name, allowed)}", option)
 
 
 def _content(

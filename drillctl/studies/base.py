@@ -106,7 +106,7 @@ class Requested:
     """A study that a report needs."""
 
     design: Design
-    profile: Any  # `reporting.profiles.Profile`
+    profile: Any  # `reporting.gather.Profile`
     done: Mapping[str, Any]  # studies before it, by name
 
     def summary(self, name: str) -> dict[str, Any]:

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from drillctl.reporting.words import Words, between, chance, number, percent
+from drillctl.reporting.blocks import Words
+from drillctl.store.tables import between, chance, number, percent
 
 
 @pytest.mark.parametrize(

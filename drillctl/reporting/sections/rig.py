@@ -16,10 +16,10 @@ from matplotlib.patches import Polygon, Rectangle
 from drillctl.design import Design
 from drillctl.design.tables import SectionTable
 from drillctl.plots import style
-from drillctl.reporting.blocks import Block, Figure, Table, Text
+from drillctl.reporting.blocks import Block, Figure, Table, Text, Words
 from drillctl.reporting.gather import Gathered
-from drillctl.reporting.words import NOTHING, Words, number
 from drillctl.rig.drillstring import PIPES
+from drillctl.store.tables import NOTHING, number
 
 LUMPED = 0.12  # height of a lumped spring as a share of the drawing
 WIDEST = 0.16  # half the width of the widest section, as a share of the drawing's width

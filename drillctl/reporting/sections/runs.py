@@ -7,10 +7,10 @@ from typing import Any
 from drillctl import plots
 from drillctl.design import parameter, to_toml
 from drillctl.provenance import provenance
-from drillctl.reporting.blocks import Block, Checks, Code, Figure, Table
+from drillctl.reporting.blocks import Block, Checks, Code, Figure, Table, Words
 from drillctl.reporting.gather import Gathered, NotThereError, Study
-from drillctl.reporting.words import NOTHING, Words, number, percent
 from drillctl.simulation.measures import MEASURES, Measure
+from drillctl.store.tables import NOTHING, number, percent
 
 NAMES = {"simulate": "current", "best": "best of the map", "bad": "a bad cell"}
 SHOWN = (

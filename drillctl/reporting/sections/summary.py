@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from drillctl.reporting.blocks import Block, Check, Checks, Table, Text
 from drillctl.reporting.gather import Gathered
-from drillctl.reporting.words import NOTHING, between, chance, number, percent
+from drillctl.store.tables import NOTHING, between, chance, number, percent
 
 STATUS = {
     "ok": "settles",

@@ -13,10 +13,9 @@ from drillctl.ensemble.cases import share_interval
 from drillctl.ensemble.draws import drawn_lanes, run_draws
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
-from drillctl.reporting.blocks import Figure, Table, Text
+from drillctl.reporting.blocks import Figure, Table, Text, Words
 from drillctl.reporting.gather import Gathered, NotThereError, Study
 from drillctl.reporting.sections import SECTIONS
-from drillctl.reporting.words import Words
 from drillctl.store.json_files import strict
 from drillctl.studies.tune.certificate import (
     HALVINGS,
