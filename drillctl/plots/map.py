@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -45,8 +44,10 @@ def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = 
     figure, ax, x, y = style.plane(result, ax, 6.0, system, "J1 with its levels")
     top = 2.0 * result.levels[-1]
     i, j = (slice(None, None, -(-len(a) // MOST_COLOURED)) for a in result.axes)
+    # Without the darkest end, on which black contours would be lost.
+    part = style.colours(0.18, 1.0).reversed()
     mesh = ax.pcolormesh(
-        x[i], y[j], result.j1[i, j].T, cmap=_colours(), vmin=0.0, vmax=top, shading="nearest",
+        x[i], y[j], result.j1[i, j].T, cmap=part, vmin=0.0, vmax=top, shading="nearest",
         rasterized=True,
     )  # fmt: skip
     bar = style.colour_bar(figure, mesh, ax, "J1 (s)", "max")
@@ -62,13 +63,6 @@ def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = 
     style.legend_under(ax, 3)
     figure.supxlabel(_caption(result), fontsize=style.SMALL)
     return figure
-
-
-def _colours() -> ListedColormap:
-    """Viridis without its darkest end, on which black contours would be lost."""
-    from matplotlib import colormaps
-
-    return ListedColormap(colormaps["viridis_r"](np.linspace(0.0, 0.82, 256)))
 
 
 def _mark_cells(result: Sweep, ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
