@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -114,26 +115,31 @@ def audit(
 def references(
     designs: list[Design], progress: Progress = SILENT, seconds: float = math.inf
 ) -> Array:
-    """J1 of designs by the reference solver (s), on all cores; NaN for those that fail."""
+    """J1 of designs by the reference solver (s), on all cores; NaN for those that fail.
+
+    The solver does not hold the interpreter's lock, so that threads are enough.
+    """
     if not designs:
         return np.empty(0)
 
-    import joblib
     import numba
 
     progress.begin("auditing cells", len(designs))
-    begin, result = time.perf_counter(), list[float]()
+    end, result = time.perf_counter() + seconds, list[float]()
+
+    def in_time(design: Design) -> float | None:
+        return reference_j1(design) if time.perf_counter() < end else None
+
     # As many as the lanes may use, which is what `--threads` sets.
-    workers = min(len(designs), numba.get_num_threads())
-    at_a_time = len(designs) if math.isinf(seconds) else workers
-    with joblib.Parallel(n_jobs=workers, return_as="generator") as parallel:
-        for first in range(0, len(designs), at_a_time):
-            if time.perf_counter() - begin > seconds:
-                break
-            part = designs[first : first + at_a_time]
-            for value in parallel(joblib.delayed(reference_j1)(d) for d in part):
+    with ThreadPoolExecutor(min(len(designs), numba.get_num_threads())) as pool:
+        try:
+            for value in pool.map(in_time, designs):
+                if value is None:
+                    break
                 result.append(value)
                 progress.advance(1)
+        finally:  # interrupted: the others end what they have begun
+            pool.shutdown(cancel_futures=True)
     return np.array(result)
 
 

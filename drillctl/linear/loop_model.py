@@ -102,13 +102,15 @@ class _Drive:
     def respond(self, memory: Array, speed: float, lead: float, free: float) -> tuple[float, Array]:
         own, waiting = memory[: len(MEMORY)], memory[len(MEMORY) :]
         if self.held is None:
-            return respond(self.law, own, speed, lead, 0.0, (free, self.gain))
+            torque, changes = respond(self.law, own, speed, lead, 0.0, (free, self.gain))
+            return torque, np.array(changes)
         # What is given out has waited; the motor follows that, with its own lag if it has one.
         given = float(self.held.c @ waiting)
         torque = float(own[4]) if self.law.lag > 0.0 else given
         # A controller that acts on a torque known to it: its motor is a state.
         known = self.law._replace(lag=max(self.law.lag, 1.0))
-        _, rates = respond(known, np.array([*own[:4], torque]), speed, lead, 0.0, (free, self.gain))
+        end = (free, self.gain)
+        rates = np.array(respond(known, np.array([*own[:4], torque]), speed, lead, 0.0, end)[1])
         command = rates[4] * known.lag + torque
         rates[4] = (given - torque) / self.law.lag if self.law.lag > 0.0 else 0.0
         return torque, np.concatenate([rates, self.held.a @ waiting + self.held.b * command])

@@ -10,7 +10,6 @@ torque; in stick v_bit = -Omega is held and T_b is the reaction that holds it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -91,20 +90,3 @@ def _phase(string: Drillstring, set_speed: float, inverse: Array) -> Phase:
         top=inverse[:, 0].copy(),
         bit=inverse[:, -1].copy(),
     )
-
-
-def damping_power(string: Drillstring) -> Callable[[Array], float]:
-    """Power that damping takes (W) as a function of the absolute speeds (rad/s)."""
-    if string.undamped:
-        return lambda speed: 0.0
-    if string.nodes < 200:
-        dense = string.damping.toarray()
-        return lambda speed: float(speed @ dense @ speed)
-    return lambda speed: float(speed @ (string.damping @ speed))
-
-
-def stored_energy(string: Drillstring, angle: Array, speed: Array) -> float:
-    """Kinetic plus elastic energy (J) at angles (rad) and absolute speeds (rad/s)."""
-    kinetic = 0.5 * speed @ (string.mass @ speed)
-    elastic = 0.5 * angle @ (string.stiffness @ angle)
-    return float(kinetic + elastic)

@@ -1,31 +1,34 @@
 """Reference solver: slip and stick as separate smooth systems with located events.
 
-Slower than the batch engine by orders of magnitude and independent of it: physical
-coordinates, an adaptive integrator from SciPy, events found on its dense output. No friction
-law is ever smoothed: the bit is either turning, with the torque of its law, or at rest, with
-the torque that holds it, as long as that is within the static one.
+Independent of the batch engine: physical coordinates, adaptive steps, events located on dense
+output. No friction law is ever smoothed: the bit is either turning, with the torque of its law, or
+at rest, with the torque that holds it, as long as that is within the static one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import SimulationError
+from drillctl.linear.observer import observer_of
+from drillctl.progress import SILENT, Progress
 from drillctl.rig.bit_rock import PrintedThreeBranch
-from drillctl.simulation.phases import stored_energy
-from drillctl.simulation.printed import PrintedSystem
-from drillctl.simulation.system import WORKS, Method, System, integrate
+from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.top_drive import RealDrive, SampledDrive
+from drillctl.rig.weight_on_bit import PATHS, AlarmWeight, ObservedWeight
+from drillctl.simulation.lanes import start
 
 Array = NDArray[np.float64]
 
-MOST_PHASES = 100_000
-"""Give up beyond this many phases: the bit chatters and time no longer advances."""
+STEPS = 5_000  # steps from one look at an interruption to the next: some milliseconds
+ROOM = 1 << 13  # steps that a tape has room for at first
 
 
 @dataclass(frozen=True)
@@ -35,22 +38,6 @@ class Event:
     time: float  # when (s)
     kind: Literal["stick", "release"]  # the bit came to rest, or broke loose
     direction: int  # +1 or -1 for a bit that breaks loose forward or backward; 0 for a stick
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A stretch of one phase, up to an event or a stop: its dense solution and what was found."""
-
-    # times (s)
-    begin: float
-    end: float
-    phase: int  # as `System` counts them
-    direction: int  # +1 or -1 in slip; 0 in stick
-    # time (s), shape (n,), to the state of `System`, shape (states, n)
-    solution: Callable[[Any], Array]
-    steps: Array  # times of the integrator's steps (s)
-    crossings: Array  # times at which the bit turns at exactly the set speed (s)
-    extremes: Array  # times at which the bit speed has an extreme (s)
 
 
 @dataclass(frozen=True)
@@ -85,103 +72,357 @@ class EnergyAudit:
         }
 
 
+class Numbers(NamedTuple):
+    """A rig as the compiled solver takes it."""
+
+    rig: Any  # one record of `reference_rates.RIG`
+    arrays: dict[str, Array]  # what it points to, by the name of the address
+    kept: NDArray[np.int64]  # states that are kept of each step
+    sums: Any  # two sums of states, of a bit that is held and of one that is not
+    # accelerations of the top by load (rad/s2) and by bit torque, held and free; reaction by load
+    # (N m) and per top torque
+    ends: Array
+    state: Array  # shape (states,): at time zero, and then at the end
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A whole run as the solver saw it; `trajectory.py` makes signals and measures of it."""
+    """A whole run as the solver saw it; `run.py` makes signals and measures of it."""
 
     design: Design  # what was simulated
-    system: System  # its equations
-    pieces: tuple[Piece, ...]  # the stretches in order
-    events: tuple[Event, ...]  # the changes between them
-    energy: EnergyAudit  # over the whole run
-    tolerance: float  # relative and absolute tolerance of the integrator
-    method: str  # SciPy's name of the integrator
-
-
-def solve(design: Design, tolerance: float = 1e-8, method: Method = "DOP853") -> Motion:
-    """Simulate a design with located events."""
-    system = system_of(design)
-    duration = design.tables.simulation.duration
-    first = system.start(design)
-    state = system.stop(0.0, 1, first)
-    time, phase = 0.0, system.direction_at(0.0, state)
-    events: list[Event] = []
-    changes = 0
-    while True:
-        stop = min(system.next_stop(time), duration)
-        piece, state, by_itself = _run(system, time, stop, phase, state, tolerance, method)
-        system.pieces.append(piece)
-        time = piece.end
-        if time >= duration:
-            break
-        before = phase
-        if by_itself:
-            phase = system.next_direction(time, phase, state)
-        else:
-            state = system.stop(time, phase, state)
-            phase = system.after_stop(time, phase, state)
-        if phase != before or by_itself:
-            changes += 1
-            direction = system.direction_of(phase)
-            if direction or system.direction_of(before):
-                events.append(Event(time, "release" if direction else "stick", direction))
-        if changes >= MOST_PHASES:
-            raise SimulationError(f"{MOST_PHASES} changes of phase by {time:g} s: chattering")
-    energy = _audit(system, first, state)
-    pieces = tuple(system.pieces)
-    return Motion(design, system, pieces, tuple(events), energy, tolerance, method)
-
-
-def system_of(design: Design) -> System:
-    """The equations of a design: those that its bit-rock law needs."""
-    if isinstance(design.bit_rock, PrintedThreeBranch):
-        return PrintedSystem(design)
-    return System(design)
-
-
-def _run(
-    system: System,
-    begin: float,
-    end: float,
-    phase: int,
-    state: Array,
-    tolerance: float,
-    method: Method,
-) -> tuple[Piece, Array, bool]:
-    """Integrate one phase until it ends by itself (then true) or at a time."""
-    equations = system.equations(phase)
-    result = integrate(
-        equations.rates,
-        (begin, end),
-        state,
-        method=method,
-        rtol=tolerance,
-        atol=tolerance,
-        events=equations.events,
-        dense_output=True,
-        longest_step=equations.longest_step,
+    numbers: Numbers  # with every step on its tape
+    # shape (pieces, 4): begin and end (s), phase and first step of each stretch of one phase
+    pieces: Array
+    changes: Array  # shape (changes, 4): time (s), 1 for a release, direction, 1 if it is an event
+    crossings: (
+        Array  # shape (crossings, 2): when the bit turns at the set speed (s), its angle (rad)
     )
-    if result.status < 0:
-        raise SimulationError(f"the integrator failed at {result.t[-1]:g} s: {result.message}")
-    if not np.isfinite(result.y[:, -1]).all():
-        raise SimulationError(f"the motion is no longer finite at {result.t[-1]:g} s")
-    final = result.y[:, -1].copy()
-    if result.status == 1:
-        final = system.at_end(float(result.t[-1]), phase, final)
-    crossings, extremes = (np.asarray(times) for times in result.t_events[1:3])
-    direction = system.direction_of(phase)
-    end = float(result.t[-1])
-    piece = Piece(begin, end, phase, direction, result.sol, result.t, crossings, extremes)
-    return piece, final, result.status == 1
+    extremes: Array  # shape (extremes, 2): when its speed has an extreme (s), and that (rad/s)
+    energy: EnergyAudit  # over the whole run
+    tolerance: float  # relative and absolute tolerance of the steps
+    method: str  # how the steps were taken
+    steps: int  # how many
+    refused: int  # and how many were taken again, shorter
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Sticks and releases."""
+        return tuple(
+            Event(float(time), "release" if loose else "stick", int(direction))
+            for time, loose, direction, shown in self.changes
+            if shown
+        )
+
+    @property
+    def begins(self) -> Array:
+        """When each piece begins (s)."""
+        return self.pieces[:, 0]
+
+    @property
+    def ends(self) -> Array:
+        """When each piece ends (s)."""
+        return self.pieces[:, 1]
+
+    @cached_property
+    def directions(self) -> Array:
+        """Direction of slip in each piece; 0 where the bit counts as stuck."""
+        phase = self.pieces[:, 2]
+        return np.where(np.abs(phase) == 1.0, phase, 0.0)
+
+    def components(self, components: list[int], time: Array) -> Array:
+        """Components of the tape at times (s), shape (components, times)."""
+        from drillctl.simulation.reference_signals import components_at
+
+        out = np.empty((len(components), len(time)))
+        wanted = np.array(components, dtype=np.int64)
+        components_at(self.numbers.rig, wanted, np.ascontiguousarray(time), out)
+        return out
+
+    def torques(self, time: Array) -> Array:
+        """Torque of the drive, weight, torque on the bit (N m, N, N m), phase; shape (4, times)."""
+        from drillctl.simulation.reference_signals import torques_at
+
+        numbers = self.numbers
+        state, unused = numbers.state.copy(), numbers.state.copy()
+        out = np.empty((4, len(time)))
+        torques_at(
+            numbers.rig, numbers.kept, numbers.ends, self.pieces, np.ascontiguousarray(time),
+            state, unused, out,
+        )  # fmt: skip
+        return out
+
+    def bit_angle(self, time: Array) -> Array:
+        """Angle of the bit in the frame (rad) at times (s)."""
+        from drillctl.simulation.reference_rates import BIT_ANGLE
+
+        return self.components([BIT_ANGLE], time)[0]
+
+    def states(self, time: Array) -> Array:
+        """Angles and speeds in the frame at times (s), shape (2 nodes, times), of `solve_whole`."""
+        size = 2 * self.design.string.nodes
+        first = len(self.numbers.kept) - size
+        return self.components(list(range(first, first + size)), time)
 
 
-def _audit(system: System, before: Array, after: Array) -> EnergyAudit:
+def stuck_between(motion: Motion, begin: float, end: float) -> float:
+    """Time at rest between two times (s)."""
+    parts = np.minimum(motion.ends, end) - np.maximum(motion.begins, begin)
+    return float(np.maximum(parts, 0.0)[motion.directions == 0.0].sum())
+
+
+def solve(design: Design, tolerance: float = 1e-8, progress: Progress = SILENT) -> Motion:
+    """Simulate a design with located events."""
+    return _run(design, numbers_of(design), tolerance, progress)
+
+
+def solve_whole(design: Design, tolerance: float = 1e-8) -> Motion:
+    """The same, with the motion of every node kept."""
+    return _run(design, numbers_of(design, np.arange(2 * design.string.nodes)), tolerance, SILENT)
+
+
+def _run(design: Design, numbers: Numbers, tolerance: float, progress: Progress) -> Motion:
+    from drillctl.simulation import reference_run as r
+
+    rig, state = numbers.rig, numbers.state
+    work, method = r.work_for(len(state)), r.explicit_method()
+    clock = _clock(design, numbers, tolerance)
+    r.begin(rig, clock, work, state)
+    progress.begin("simulated seconds", math.ceil(clock.duration))
+    shown, ended = 0, r.MORE
+    while ended == r.MORE:
+        clock = _with_room(numbers, clock)
+        ended = r.advance(rig, method, clock, work, numbers.sums, state, STEPS)
+        progress.advance(int(clock.now[r.TIME]) - shown)
+        shown = int(clock.now[r.TIME])
+    time, count = float(clock.now[r.TIME]), clock.count
+    if ended == r.CHATTERS:
+        raise SimulationError(f"{r.MOST_PHASES} changes of phase by {time:g} s: chattering")
+    if ended == r.TOO_SHORT:
+        raise SimulationError(f"the integrator failed at {time:g} s: no step is short enough")
+    if ended == r.NOT_FINITE:
+        raise SimulationError(f"the motion is no longer finite at {time:g} s")
+    return Motion(
+        design=design,
+        numbers=numbers,
+        pieces=clock.pieces[: count[r.PIECES]],
+        changes=clock.changes[: count[r.CHANGES]],
+        crossings=clock.crossings[: count[r.CROSSINGS]],
+        extremes=clock.extremes[: count[r.EXTREMES]],
+        energy=_audit(design, numbers.arrays["begin"], state),
+        tolerance=tolerance,
+        method="DOP853",
+        steps=int(rig["steps"][0]),
+        refused=int(count[r.REFUSED]),
+    )
+
+
+def _clock(design: Design, numbers: Numbers, tolerance: float) -> Any:
+    from drillctl.simulation import reference_run as r
+
+    return r.Clock(
+        tolerance, design.tables.simulation.duration, 0, numbers.kept,
+        np.array(design.program.breaks()), np.zeros(6), np.zeros(7, dtype=np.int64),
+        np.zeros((64, 4)), np.zeros((64, 4)), np.zeros((256, 2)), np.zeros((1024, 2)),
+    )  # fmt: skip
+
+
+def _with_room(numbers: Numbers, clock: Any) -> Any:
+    """Tables twice as long where they are nearly full."""
+    from drillctl.simulation import reference_run as r
+
+    def longer(table: Array, used: int) -> Array:
+        if used + 2 < len(table):
+            return table
+        more = np.empty((2 * len(table), table.shape[1]))
+        more[: len(table)] = table
+        return more
+
+    count, arrays = clock.count, numbers.arrays
+    arrays["tape"] = longer(arrays["tape"], int(numbers.rig["steps"][0]))
+    numbers.rig["tape"] = arrays["tape"].ctypes.data
+    return clock._replace(
+        room=len(arrays["tape"]),
+        pieces=longer(clock.pieces, count[r.PIECES]),
+        changes=longer(clock.changes, count[r.CHANGES]),
+        crossings=longer(clock.crossings, count[r.CROSSINGS]),
+        extremes=longer(clock.extremes, count[r.EXTREMES]),
+    )
+
+
+def _audit(design: Design, before: Array, after: Array) -> EnergyAudit:
     """Energy balance between the first and the final state."""
-    nodes = system.nodes
+    string, nodes = design.string, design.string.nodes
 
     def stored(state: Array) -> float:
-        speed = state[nodes : 2 * nodes] + system.set_speed
-        return stored_energy(system.string, state[:nodes], speed)
+        angle, speed = state[:nodes], state[nodes : 2 * nodes] + design.speed
+        kinetic = 0.5 * speed @ (string.mass @ speed)
+        return float(kinetic + 0.5 * angle @ (string.stiffness @ angle))
 
-    drive, bit, damping = (float(w) for w in after[2 * nodes : 2 * nodes + WORKS])
+    drive, bit, damping = (float(w) for w in after[2 * nodes : 2 * nodes + 3])
     return EnergyAudit(drive, bit, damping, stored(after) - stored(before))
+
+
+# A design in numbers.
+
+
+def numbers_of(design: Design, also_kept: NDArray[np.integer[Any]] | None = None) -> Numbers:
+    """The rig of a design as the compiled solver takes it."""
+    from drillctl.simulation import reference_rates as f
+    from drillctl.simulation.reference_run import addresses
+
+    n = design.string.nodes
+    plain, arrays = _laws_of(design)
+    drive_states = f.MEMORIES[int(plain["drive_kind"])]
+    weight_states = 0
+    if plain["weight_kind"] != f.AT_ONCE:
+        weight_states = 2 + (int(plain["observer_states"]) or 1)
+    size = 2 * n + f.WORKS + drive_states + weight_states
+    kept = np.concatenate([
+        [0, n, 1, n + 1, n - 1, 2 * n - 1, n - 2], np.arange(2 * n + f.WORKS, size),
+        [] if also_kept is None else also_kept,
+    ]).astype(np.int64)  # fmt: skip
+    arrays |= _string_arrays(design.string, design.speed)
+    arrays |= {"begin": np.zeros(size), "tape": np.empty((ROOM, f.FIRST + 8 * (len(kept) + 2)))}
+    damping = design.string.damping.tocoo()
+    rig = np.zeros(1, dtype=f.RIG)
+    for name, value in {
+        **plain,
+        **{name: array.ctypes.data for name, array in arrays.items()},
+        "nodes": n, "states": size, "drive_states": drive_states, "weight_states": weight_states,
+        "damped": not design.string.undamped,
+        "full": bool(np.any(np.abs(damping.row - damping.col) > 1)),
+        "coupled": bool(np.any(arrays["bands"][f.SIDE_MASS])),
+        **addresses(), "components": len(kept) + 2,
+        "set_speed": design.speed,
+        "drag": float(design.string.ground_damping.sum()) * design.speed,
+    }.items():  # fmt: skip
+        rig[name] = value
+    sums, ends = _sums(design, arrays["bands"], rig)
+    state = _start(design, size, drive_states, weight_states)
+    arrays["begin"][:] = state
+    return Numbers(rig, arrays, kept, sums, ends, state)
+
+
+def _string_arrays(string: Drillstring, set_speed: float) -> dict[str, Array]:
+    from drillctl.simulation import reference_rates as f
+
+    n = string.nodes
+    bands = np.zeros((9, n))
+    mass, side_mass = string.mass.diagonal(), string.mass.diagonal(1)
+    pivot = mass[0]
+    bands[f.PIVOT, 0] = 1.0 / pivot
+    for i in range(n - 1):
+        bands[f.FACTOR, i] = side_mass[i] / pivot
+        pivot = mass[i + 1] - bands[f.FACTOR, i] * side_mass[i]
+        bands[f.PIVOT, i + 1] = 1.0 / pivot
+    bands[f.STIFFNESS, : n - 1] = string.element_stiffness
+    bands[f.DAMPING] = string.damping.diagonal()
+    bands[f.SIDE_DAMPING, : n - 1] = string.damping.diagonal(1)
+    bands[f.LOAD] = string.ground_damping * set_speed
+    bands[f.SIDE_MASS, : n - 1] = side_mass
+    return {"bands": f.factorised(bands), "full_damping": string.damping.toarray()}
+
+
+def _laws_of(design: Design) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Kinds and addresses of the laws, and their numbers."""
+    from drillctl.simulation import reference_rates as f
+    from drillctl.simulation.law_calls import address
+
+    drive, weight, program = design.top_drive, design.weight_on_bit, design.program
+    rocks: list[Any] = [design.bit_rock_before, design.bit_rock]
+    tolerance = 0.0
+    if isinstance(rocks[1], PrintedThreeBranch):
+        tolerance = float(rocks[1].tolerance)
+        rocks = [rock.turning for rock in rocks]
+    drive_kind = f.IDEAL
+    if isinstance(drive, SampledDrive):
+        drive_kind = f.SAMPLED
+    elif isinstance(drive, RealDrive):
+        drive_kind = f.CONTINUOUS
+    weight_kind, method = f.AT_ONCE, "weight"
+    if isinstance(weight, PATHS):
+        weight_kind, method = f.MEASURED, "command"
+        if isinstance(weight, AlarmWeight):
+            weight_kind, method = f.ALARMED, "next_level"
+        elif isinstance(weight, ObservedWeight):
+            weight_kind = f.OBSERVED
+    path = ("delay", "period", "sensor", "hoist", "rate", "window")
+    rows = {
+        f.DRIVE: drive, f.ROCK: rocks[1], f.ROCK_BEFORE: rocks[0], f.WEIGHT: weight,
+        f.PRESENT: weight, f.PATH: [getattr(weight, name, 0.0) for name in path],
+        f.SPEED_PROGRAM: program.speed, f.WEIGHT_PROGRAM: program.weight,
+    }  # fmt: skip
+    laws = np.zeros((len(rows), f.MOST_NUMBERS))
+    for row, numbers in rows.items():
+        laws[row, : len(numbers)] = [float(number) for number in numbers]
+    seen = observer_of(design)
+    observer = np.zeros((3, 0))
+    if seen is not None:
+        observer = np.vstack([seen.by_torque, seen.by_speed, seen.read, seen.free])
+    plain = {
+        "drive_kind": drive_kind,
+        "drive_torque": address(drive, "torque") if drive_kind == f.IDEAL else 0,
+        "rock_torque": address(rocks[1], "torque_and_slope"),
+        "static_torque": address(rocks[1], "static_torque"),
+        "set_valued": bool(design.bit_rock.set_valued),
+        "weight_kind": weight_kind,
+        "weight": address(weight, method),
+        "observer_states": observer.shape[1],
+        "tolerance": tolerance,
+        "rock_until": float(program.rock_until),
+    }
+    return plain, {"laws": laws, "observer": np.ascontiguousarray(observer)}
+
+
+def _start(design: Design, size: int, drive_states: int, weight_states: int) -> Array:
+    """State at time zero; the weight's reading comes with the first look at it."""
+    from drillctl.simulation.lanes import single_lane
+    from drillctl.simulation.reference_rates import WORKS
+
+    table, n = design.tables.start, design.string.nodes
+    turning = design.speed if table.speed is None else table.speed
+    rock: Any = design.bit_rock_before if design.program.rock_until > 0.0 else design.bit_rock
+    static = rock.static_torque(single_lane(design).weight_at_rest[0])
+    begin = start(
+        design.string, table.kind, *(np.array([x]) for x in (design.speed, turning, static))
+    )
+    state = np.zeros(size)
+    state[:n], state[n : 2 * n] = begin.angles[:, 0], begin.speeds[:, 0]
+    drive = state[2 * n + WORKS :][:drive_states]
+    drive[:1] = state[n]  # speed seen
+    drive[7:8] = state[n]  # and last seen
+    memory = state[size - weight_states :]
+    seen = observer_of(design)
+    if seen is not None:
+        memory[: seen.states] = seen.state(state[:n], state[n : 2 * n])
+    elif weight_states:
+        memory[0] = abs(state[2 * n - 1] + design.speed)
+    return state
+
+
+def _sums(design: Design, bands: Array, rig: Any) -> tuple[Any, Array]:
+    """What the torques at both ends follow from, as sums of angles and speeds.
+
+    The acceleration of the top without its torque, in stick and in slip, and the torque that
+    holds the bit.
+    """
+    from drillctl.simulation import reference_rates as f
+
+    n = design.string.nodes
+    stiffness, damping = design.string.stiffness, design.string.damping
+    held, free = bands[f.HELD_TOP], bands[f.FREE_TOP]
+
+    def forces_by(row: Array) -> Array:
+        return -np.concatenate([stiffness @ row, damping @ row])
+
+    above, bit = np.eye(n)[n - 2], np.eye(n)[n - 1]
+    f.accelerate(rig, above, n - 1)
+    coupling, load = bands[f.SIDE_MASS, n - 2], bands[f.LOAD]
+    ends = np.array([
+        [-held @ load, 0.0], [-free @ load, free[n - 1]],
+        [-load[n - 1] + coupling * (above @ load), -coupling * held[n - 2]],
+    ])  # fmt: skip
+    of_held = np.vstack([forces_by(held), forces_by(bit) - coupling * forces_by(above)])
+    # Without a memory a drive needs no acceleration, and a bit that slips no reaction.
+    of_free = np.vstack([forces_by(free)]) if rig["drive_states"][0] else np.zeros((0, 2 * n))
+    return (np.ascontiguousarray(of_held), np.ascontiguousarray(of_free)), ends

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.simulation import measures as m
-from drillctl.simulation.reference import EnergyAudit, Event, Motion, Piece
+from drillctl.simulation.reference import EnergyAudit, Event, Motion, stuck_between
 from drillctl.store.codec import label
 from drillctl.store.result import Result
 
@@ -110,7 +110,7 @@ def sample(motion: Motion, interval: float = 0.01) -> Simulation:
         signals = _signals(motion, time)
     status = m.status_of(
         all(bool(np.isfinite(values).all()) for values in fine_signals.values()),
-        _stuck_between(motion, duration - min(m.WINDOW, duration), duration),
+        stuck_between(motion, duration - min(m.WINDOW, duration), duration),
         min(m.WINDOW, duration),
         measured.settling_time_wide,
     )
@@ -125,60 +125,27 @@ def _grid(duration: float, interval: float) -> Array:
     return np.linspace(0.0, duration, max(1, math.ceil(duration / interval * (1 - 1e-9))) + 1)
 
 
-def _states(pieces: tuple[Piece, ...], time: Array) -> tuple[Array, Array, Array]:
-    """State, shape (states, samples), phase and direction of slip, shape (samples,)."""
-    ends = np.array([piece.end for piece in pieces])
-    which = np.minimum(np.searchsorted(ends, time), len(pieces) - 1)
-    columns, phases, directions = [], [], []
-    for index, piece in enumerate(pieces):
-        chosen = np.minimum(time[which == index], piece.end)
-        if chosen.size:
-            columns.append(piece.solution(chosen))
-            phases.append(np.full(chosen.size, piece.phase))
-            directions.append(np.full(chosen.size, float(piece.direction)))
-    return np.concatenate(columns, axis=1), np.concatenate(phases), np.concatenate(directions)
-
-
 def _signals(motion: Motion, time: Array) -> dict[str, Array]:
-    design, system = motion.design, motion.system
-    state, phase, direction = _states(motion.pieces, time)
-    nodes = design.string.nodes
-    angle, speed = state[:nodes], state[nodes : 2 * nodes]
-    bit_speed = system.bit_speeds(state, direction)
-    if system.simple:
-        turning = direction if design.bit_rock.set_valued else np.sign(bit_speed)
-        top_torque = np.asarray(design.top_drive.torque(angle[0], speed[0])) + 0.0 * angle[0]
-        law: Any = design.weight_on_bit
-        weight = np.broadcast_to(law.weight(np.abs(bit_speed)), bit_speed.shape)
-        friction, _ = design.bit_rock.torque_and_slope(weight, np.abs(bit_speed), np.exp)
-        reaction = system.reaction
-        holding = reaction.motion @ state[: 2 * nodes] + reaction.load + reaction.top * top_torque
-        bit_torque = np.where(direction == 0.0, holding, turning * friction)
-    else:
-        top_torque, weight, bit_torque = _one_by_one(motion, time, state, phase)
+    from drillctl.simulation import reference_rates as f
+
+    design = motion.design
+    top_angle, top_speed, next_angle, next_speed, bit_angle, bit_speed = motion.components(
+        [f.TOP_ANGLE, f.TOP_SPEED, f.NEXT_ANGLE, f.NEXT_SPEED, f.BIT_ANGLE, f.BIT_SPEED], time
+    )
+    top_torque, weight, bit_torque, phase = motion.torques(time)
     stiffness, damping = design.string.element_stiffness[0], design.string.element_damping[0]
     return {
-        "top_speed": speed[0] + design.speed,
-        "bit_speed": bit_speed,
-        "twist": angle[0] - angle[-1],
-        "top_angle": angle[0],
-        "bit_angle": angle[-1],
+        "top_speed": top_speed + design.speed,
+        "bit_speed": np.where(phase == f.STUCK, 0.0, bit_speed + design.speed),
+        "twist": top_angle - bit_angle,
+        "top_angle": top_angle,
+        "bit_angle": bit_angle,
         "top_torque": top_torque,
-        "pipe_torque": stiffness * (angle[0] - angle[1]) + damping * (speed[0] - speed[1]),
+        "pipe_torque": stiffness * (top_angle - next_angle) + damping * (top_speed - next_speed),
         "bit_torque": bit_torque,
-        "weight_on_bit": np.array(weight),
-        "stuck": (direction == 0.0).astype(float),
+        "weight_on_bit": weight,
+        "stuck": (np.abs(phase) != 1.0).astype(float),
     }
-
-
-def _one_by_one(
-    motion: Motion, time: Array, state: Array, phase: Array
-) -> tuple[Array, Array, Array]:
-    """Top torque, weight and bit torque of a rig with memory, program or phases of its own."""
-    result = np.empty((3, len(time)))
-    for i, moment in enumerate(time):
-        result[:, i] = motion.system.told(moment, state[:, i], int(phase[i]))
-    return result[0], result[1], result[2]
 
 
 def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measures:
@@ -197,7 +164,7 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
     return m.Measures(
         j1=j1,
         j1_rate=j1 / (duration - since),
-        stuck_time=_stuck_between(motion, 0.0, duration),
+        stuck_time=stuck_between(motion, 0.0, duration),
         sticks=_sticks(motion),
         stick_slip_index=m.ssi(late_low, late_high, late_mean),
         mean_bit_speed=mean,
@@ -244,15 +211,10 @@ def _settling(design: Design, time: Array, bit: Array, band: float) -> float | N
     return m.settled(moment, float(time[-1]))
 
 
-def _bit_angle(nodes: int, piece: Piece, time: Array | float) -> Array:
-    return np.asarray(piece.solution(time)[nodes - 1])
-
-
 def _bit_angle_change(motion: Motion, begin: float, end: float) -> float:
     """Angle of the bit in the frame between two times (rad)."""
-    first = next(p for p in motion.pieces if p.end >= begin)
-    nodes = motion.system.nodes
-    return float(_bit_angle(nodes, motion.pieces[-1], end) - _bit_angle(nodes, first, begin))
+    first, last = motion.bit_angle(np.array([begin, end]))
+    return float(last - first)
 
 
 def deviation(motion: Motion, begin: float, end: float) -> float:
@@ -261,42 +223,23 @@ def deviation(motion: Motion, begin: float, end: float) -> float:
     Between two crossings of the set speed the deviation keeps its sign, and its integral is
     the change of the bit's angle in the turning frame: exact, with no kink to integrate over.
     """
-    total = 0.0
-    for piece in motion.pieces:
-        low, high = max(piece.begin, begin), min(piece.end, end)
-        if high <= low:
-            continue
-        inside = piece.crossings[(piece.crossings > low) & (piece.crossings < high)]
-        knots = np.concatenate([[low], inside, [high]])
-        angle = _bit_angle(motion.system.nodes, piece, knots)
-        total += float(np.abs(np.diff(angle)).sum())
-    return total
+    turns = np.concatenate([motion.ends, motion.crossings[:, 0]])
+    inside = np.sort(turns[(turns > begin) & (turns < end)])
+    angle = motion.bit_angle(np.concatenate([[begin], inside, [end]]))
+    return float(np.abs(np.diff(angle)).sum())
 
 
 def _sticks(motion: Motion) -> int:
     """Times the bit came to rest; a start at rest counts, even if it breaks loose at once."""
-    at_rest = motion.pieces[0].direction == 0 or motion.design.tables.start.kind != "turning"
+    at_rest = motion.directions[0] == 0 or motion.design.tables.start.kind != "turning"
     return int(at_rest) + sum(event.kind == "stick" for event in motion.events)
-
-
-def _stuck_between(motion: Motion, begin: float, end: float) -> float:
-    return sum(
-        max(0.0, min(piece.end, end) - max(piece.begin, begin))
-        for piece in motion.pieces
-        if piece.direction == 0
-    )
 
 
 def _extremes(motion: Motion, since: float, samples: Array) -> tuple[float, float]:
     """Smallest and largest bit speed from `since` on (rad/s), at located extremes."""
-    values = [float(samples.min()), float(samples.max())]
-    for piece in motion.pieces:
-        moments = piece.extremes[piece.extremes >= since]
-        if piece.direction != 0 and moments.size:
-            state = piece.solution(moments)
-            speed = state[2 * motion.system.nodes - 1] + motion.design.speed
-            values += [float(speed.min()), float(speed.max())]
-    return min(values), max(values)
+    time, speed = motion.extremes.T
+    values = np.concatenate([samples, speed[time >= since] + motion.design.speed])
+    return float(values.min()), float(values.max())
 
 
 def simulate(

@@ -24,7 +24,8 @@ from drillctl.simulation.limit_cycle import (
 from drillctl.simulation.limit_cycle.describing import mean_torque_and_slope
 from drillctl.simulation.limit_cycle.flow import Flow
 from drillctl.simulation.limit_cycle.returns import take_returns
-from drillctl.simulation.reference import solve
+from drillctl.simulation.reference import solve_whole
+from drillctl.simulation.reference_rates import BIT_SPEED
 
 HOLDS = (
     (
@@ -182,7 +183,7 @@ def test_lumped_string_from_rest(from_rest):
 
 def test_lumped_orbit_is_where_the_motion_goes(from_rest):
     design = lumped(**{"start.kind": "rest", "simulation.duration": "220 s"})
-    agrees_with_the_flow(from_rest.orbit, solve(design, 1e-11))
+    agrees_with_the_flow(from_rest.orbit, solve_whole(design, 1e-11))
 
 
 def agrees_with_the_flow(orbit, motion):
@@ -235,7 +236,7 @@ def test_damped_string_repeats():
     assert np.abs(orbit.multipliers).max() < 1.0
     assert orbit.mean_bit_speed == pytest.approx(design.speed, rel=1e-9)
     long = design.replace({"start.kind": "wound_up", "simulation.duration": "1200 s"})
-    agrees_with_the_flow(orbit, solve(long, 1e-11))
+    agrees_with_the_flow(orbit, solve_whole(long, 1e-11))
 
 
 @pytest.mark.slow
@@ -287,13 +288,10 @@ def test_too_little_torque_stalls():
 def test_returns_do_not_count_ripples_or_micro_slips():
     # At 18 rad/s the way up has a ripple; and this string, undamped, has micro-slips.
     design = paper(**{"start.kind": "wound_up", "simulation.duration": "300 s"})
-    motion = solve(design, 1e-6)
+    motion = solve_whole(design, 1e-6)
     run = take_returns(motion, 21.37, level=18.0)
     assert np.all(np.abs(run.periods - 22.3) < 0.3)
-    fine = np.concatenate(
-        [piece.solution(np.arange(piece.begin, piece.end, 0.01))[-4] for piece in motion.pieces
-         if piece.begin > run.times[0]]
-    )  # fmt: skip
+    (fine,) = motion.components([BIT_SPEED], np.arange(run.times[0], 300.0, 0.01))
     above = fine + design.speed > 18.0
     releases = [x for x in motion.events if x.kind == "release" and x.time > run.times[0]]
     assert np.sum(above[1:] & ~above[:-1]) > len(run.times) + 2

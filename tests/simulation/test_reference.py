@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import drillctl
+from benchmarks.peers.reference import solver as peer
 from drillctl.design import Design
 from drillctl.simulation.reference import solve
 from drillctl.simulation.run import sample
@@ -66,10 +67,65 @@ def test_tolerance_converges():
 def test_another_integrator_agrees(figure):
     design = paper(400, 100, 140, **{"simulation.duration": "15 s"})
     by_dop853 = sample(solve(design, 1e-9)).measures
-    by_radau = sample(solve(design, 1e-8, method="Radau")).measures
-    assert by_radau.j1 == pytest.approx(by_dop853.j1, rel=1e-6)
-    figure("J1 by Radau against DOP853, relative", abs(by_radau.j1 / by_dop853.j1 - 1.0))
-    assert by_radau.stuck_time == pytest.approx(by_dop853.stuck_time, abs=1e-5)
+    by_radau = peer.solve(design, 1e-8, "Radau")
+    j1 = peer.j1(by_radau)
+    assert j1 == pytest.approx(by_dop853.j1, rel=1e-6)
+    figure("J1 by Radau against DOP853, relative", abs(j1 / by_dop853.j1 - 1.0))
+    stuck = sum(piece.end - piece.begin for piece in by_radau.pieces if piece.direction == 0)
+    assert stuck == pytest.approx(by_dop853.stuck_time, abs=1e-5)
+
+
+WEIGHT = {"weight_on_bit.law": "navarro-lopez-suarez", "weight_on_bit.gain": "1 kN*s/rad"}
+LAWS = {
+    "from rest": {"start.kind": "rest", "bha.damping": "20 N*m*s/rad"},
+    "modal damping": {"drillstring.modal_damping": 0.02},
+    "smooth rock": {"bit_rock.regularised_over": "0.5 rad/s"},
+    "z-torque": {"controller": {"law": "z-torque", "absorption": 0.9}},
+    "limits": {
+        "controller.drive.lag": "0.05 s", "controller.drive.encoder_lag": "5 ms",
+        "controller.drive.torque_limit": "11 kN*m",
+    },
+    "sampled": {
+        "controller.drive.lag": "0.05 s", "controller.drive.sampling_period": "20 ms",
+        "controller.drive.torque_rate_limit": "40 kN*m/s",
+    },
+    "programs": {
+        "scenario.speed.start": "60 rpm", "scenario.speed.begin": "2 s",
+        "scenario.speed.end": "9 s",
+        "scenario.weight_on_bit.start": "60 kN", "scenario.weight_on_bit.end": "10 s",
+        "scenario.bit_rock.until": "5 s", "scenario.bit_rock.static_factor": 1.1,
+    },
+    "ideal weight": WEIGHT,
+    "late weight": WEIGHT | {
+        "weight_on_bit.path.delay": "0.4 s", "weight_on_bit.path.hoist_lag": "0.5 s",
+    },
+    "read weight": WEIGHT | {
+        "weight_on_bit.path.delay": "0.2 s", "weight_on_bit.path.sampling_period": "0.5 s",
+        "weight_on_bit.path.sensor_lag": "0.1 s", "weight_on_bit.path.hoist_lag": "0.5 s",
+    },
+    "observed weight": WEIGHT | {"weight_on_bit.law": "surface-observer"},
+    "alarm": {"weight_on_bit.law": "stick-slip-alarm", "weight_on_bit.path.hoist_lag": "1 s",
+              "weight_on_bit.window": "5 s"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_peer_in_plain_python_agrees(name):
+    design = paper(400, 100, 140, **{"simulation.duration": "15 s"} | LAWS[name])
+    motion, due = solve(design, 1e-9), peer.solve(design, 1e-9)
+    assert len(motion.events) == len(due.events)
+    for event, other in zip(motion.events, due.events, strict=True):
+        assert (event.kind, event.direction) == (other.kind, other.direction)
+        assert event.time == pytest.approx(other.time, abs=1e-7)
+    assert sample(motion).measures.j1 == pytest.approx(peer.j1(due), rel=1e-8)
+    assert motion.energy.drive == pytest.approx(due.energy.drive, rel=1e-8)
+    times = np.array([piece.begin + 0.4 * (piece.end - piece.begin) for piece in due.pieces])
+    torques = [
+        due.system.told(time, piece.solution(time), piece.phase)
+        for time, piece in zip(times, due.pieces, strict=True)
+    ]
+    for value, other in zip(motion.torques(times)[:3], np.array(torques).T, strict=True):
+        assert value == pytest.approx(other, rel=1e-6, abs=1e-2)
 
 
 @pytest.mark.parametrize("kind", ["rest", "turning", "wound_up"])

@@ -136,16 +136,6 @@ SAMPLED_MEMORY = (*MEMORY, "command", "next command", "speed last seen", "impuls
 """Memory of a `SampledDrive` (... N m, N m, rad/s, N m s)."""
 
 
-def begin(speed: float) -> Array:
-    """Memory of a `RealDrive` at time zero, given the top speed in the frame (rad/s)."""
-    return np.array([speed, 0.0, 0.0, 0.0, 0.0])
-
-
-def begin_sampled(speed: float) -> Array:
-    """Memory of a `SampledDrive` at time zero."""
-    return np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, speed, 0.0])
-
-
 def respond(
     drive: RealDrive,
     memory: Array,
@@ -153,9 +143,9 @@ def respond(
     lead: float,
     absolute: float,
     acceleration: tuple[float, float],
-) -> tuple[float, Array]:
+) -> tuple[float, tuple[float, float, float, float, float]]:
     """Torque of a `RealDrive` and the rates of its memory."""
-    encoder, filtered, slow, integral, motor = memory.tolist()
+    encoder, filtered, slow, integral, motor = memory[0], memory[1], memory[2], memory[3], memory[4]
     seen = encoder if drive.encoder > 0.0 else speed
     # The torque fed back is a T + b: the motor's, less what the sensed inertia takes.
     a, b = _felt(drive, speed, encoder, acceleration)
@@ -175,13 +165,13 @@ def respond(
     felt = a * torque + b
     shown = filtered if drive.torque_filter > 0.0 else felt
     error -= drive.mobility * shown
-    return torque, np.array([
+    return torque, (
         (speed - encoder) / drive.encoder if drive.encoder > 0.0 else 0.0,
         (felt - filtered) / drive.torque_filter if drive.torque_filter > 0.0 else 0.0,
         drive.corner * (shown - slow),
         _integral_rate(drive, error, command, given),
         _motor_rate(drive, given, motor) if drive.lag > 0.0 else 0.0,
-    ])  # fmt: skip
+    )
 
 
 def _felt(
@@ -194,25 +184,26 @@ def _felt(
     return 1.0 - inertia * gain, -inertia * free
 
 
-def respond_held(drive: SampledDrive, memory: Array, speed: float) -> tuple[float, Array]:
-    """Torque of a `SampledDrive` between two samples and the rates of its memory.
+def respond_held(
+    drive: SampledDrive, memory: Array, speed: float
+) -> tuple[float, float, float, float]:
+    """Torque of a `SampledDrive` between two samples, and rates: speed seen, motor, impulse.
 
     `memory`, shape (9,), by `SAMPLED_MEMORY`; `speed` of the top drive in the frame (rad/s).
     """
     encoder, motor, command = memory[0], memory[4], memory[5]
     torque = motor if drive.lag > 0.0 else command
-    rates = np.zeros(len(SAMPLED_MEMORY))
-    if drive.encoder > 0.0:
-        rates[0] = (speed - encoder) / drive.encoder
-    if drive.lag > 0.0:
-        rates[4] = _motor_rate(drive, command, motor)
-    rates[8] = torque
-    return float(torque), rates
+    seen = (speed - encoder) / drive.encoder if drive.encoder > 0.0 else 0.0
+    turned = _motor_rate(drive, command, motor) if drive.lag > 0.0 else 0.0
+    return torque, seen, turned, torque
 
 
-def sample(drive: SampledDrive, memory: Array, speed: float, lead: float, absolute: float) -> Array:
+def sample(
+    drive: SampledDrive, memory: Array, speed: float, lead: float, absolute: float
+) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Memory of a `SampledDrive` after its controller has worked; arguments as in `respond`."""
-    encoder, filtered, slow, integral, motor, _, pending, last, impulse = memory.tolist()
+    encoder, filtered, slow, integral, motor = memory[0], memory[1], memory[2], memory[3], memory[4]
+    pending, last, impulse = memory[6], memory[7], memory[8]
     seen = encoder if drive.encoder > 0.0 else speed
     felt = (impulse - drive.sensed_inertia * (seen - last)) / drive.period
     fade = math.exp(-drive.period / drive.torque_filter) if drive.torque_filter > 0.0 else 0.0
@@ -222,8 +213,8 @@ def sample(drive: SampledDrive, memory: Array, speed: float, lead: float, absolu
     wanted = drive.feedforward + drive.kp * error + drive.ki * integral
     given = clipped(wanted, *limits(drive, absolute))
     integral += drive.period * _integral_rate(drive, error, wanted, given)
-    command = pending if drive.late else given
-    return np.array([encoder, filtered, slow, integral, motor, command, given, seen, 0.0])
+    command = pending if drive.late > 0.0 else given
+    return encoder, filtered, slow, integral, motor, command, given, seen, 0.0
 
 
 def limits(drive: RealDrive, speed: float) -> tuple[float, float]:

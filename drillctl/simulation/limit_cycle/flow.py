@@ -18,20 +18,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import SimulationError
-from drillctl.simulation.system import System, ending, integrate
+from drillctl.rig.bit_rock import contact
+from drillctl.simulation.phases import slip_phase, stick_phase
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10  # relative and absolute tolerance of the integrator (rad, rad/s)
-LATER = math.inf
-"""Time (s) at which cycles are looked at: when no program of the start acts any more."""
+LONGEST_STEP = 0.05  # longest step (s): a touch of zero speed shorter than that could go unseen
 MOST_PHASES = 2000  # give up beyond this many phases within one flight
 SPEED_STEP = 1e-5  # step (rad/s) of the difference that gives the rock's slope, weight law included
 
@@ -60,6 +60,57 @@ class Flight:
     legs: tuple[Leg, ...]  # the phases on the way
 
 
+class Rig:
+    """The laws of a rig once no program acts any more: functions of the motion alone."""
+
+    def __init__(self, design: Design) -> None:
+        self.nodes, self.set_speed = design.string.nodes, design.speed
+        self.drive, self.rock = design.top_drive, design.bit_rock
+        self.weight = cast("Any", design.weight_on_bit)
+        self.shift = design.program.speed.integral(math.inf)  # angle (rad) that a ramp has left
+        self.slip = slip_phase(design.string, design.speed)
+        self.stick, self.reaction = stick_phase(design.string, design.speed)
+        self.static_torque = float(self.rock.static_torque(self.weight.weight(0.0)))
+
+    def bit_speed(self, state: Array) -> float:
+        """Absolute speed of the bit (rad/s)."""
+        return float(state[2 * self.nodes - 1]) + self.set_speed
+
+    def top_torque(self, state: Array) -> float:
+        """Torque of the drive (N m)."""
+        return float(self.drive.torque(state[0] - self.shift, state[self.nodes]))
+
+    def holding_torque(self, state: Array) -> float:
+        """Torque that holds a bit at rest (N m)."""
+        return self.reaction.torque(state[: 2 * self.nodes], self.top_torque(state))
+
+    def slip_torque(self, state: Array, direction: int) -> float:
+        """Torque (N m) on a bit that turns, continued smoothly past zero speed."""
+        speed = self.bit_speed(state)
+        if not self.rock.set_valued:
+            direction = 1 if speed >= 0.0 else -1
+        return direction * float(contact(self.rock, self.weight, direction * speed, _exp)[0])
+
+    def direction_at(self, state: Array) -> int:
+        """Direction at any moment; under a smooth law always +1."""
+        if not self.rock.set_valued:
+            return 1
+        speed = self.bit_speed(state)
+        return int(np.sign(speed)) if speed != 0.0 else self.next_direction(1, state)
+
+    def next_direction(self, direction: int, state: Array) -> int:
+        """What follows a phase: a stuck bit slips, a bit at zero speed sticks if it can."""
+        holding = self.holding_torque(state)
+        if direction != 0 and abs(holding) <= self.static_torque:
+            return 0
+        return 1 if holding > 0.0 else -1
+
+
+def _exp(x: float) -> float:
+    """exp(x), finite: a trial step far past zero speed is to be rejected, not to raise."""
+    return math.exp(min(x, 100.0))
+
+
 class Flow:
     """The motion of one design as a map of its coordinates.
 
@@ -68,16 +119,16 @@ class Flow:
     """
 
     def __init__(self, design: Design, tolerance: float = TOLERANCE) -> None:
-        self.system = System(design)
+        self.rig = Rig(design)
         self.tolerance = tolerance
         self.nodes = design.string.nodes
         kp, ki = (float(gain) for gain in design.top_drive.gains())
         self.told, self.lifted = _coordinates(self.nodes, free=ki == 0.0)
         drive = np.zeros(2 * self.nodes)
         drive[0], drive[self.nodes] = -ki, -kp
-        self.slip_jacobian = _jacobian(self.system.slip.first_order, drive)
-        self.stick_jacobian = _jacobian(self.system.stick.first_order, drive)
-        self.holding = self.system.reaction.motion + self.system.reaction.top * drive
+        self.slip_jacobian = _jacobian(self.rig.slip.first_order, drive)
+        self.stick_jacobian = _jacobian(self.rig.stick.first_order, drive)
+        self.holding = self.rig.reaction.motion + self.rig.reaction.top * drive
 
     def point(self, state: Array) -> Array:
         """Coordinates of angles and speeds; anything behind these is left out."""
@@ -89,11 +140,9 @@ class Flow:
 
     def rates(self, state: Array, direction: int) -> Array:
         """Rates of angles and speeds in a phase."""
-        system = self.system
-        phase = system.slip if direction else system.stick
-        rock = system.slip_torque(LATER, state, direction) if direction else 0.0
-        top_torque, _ = system.respond(LATER, state, phase, rock)
-        inputs = np.concatenate([state, [top_torque, rock, 1.0]])
+        phase = self.rig.slip if direction else self.rig.stick
+        rock = self.rig.slip_torque(state, direction) if direction else 0.0
+        inputs = np.concatenate([state, [self.rig.top_torque(state), rock, 1.0]])
         return np.asarray(phase.first_order @ inputs)
 
     def tangents(self, state: Array, matrix: Array, direction: int) -> Array:
@@ -102,7 +151,7 @@ class Flow:
             return np.asarray(self.stick_jacobian @ matrix)
         grown = self.slip_jacobian @ matrix
         grown[self.nodes :] -= np.outer(
-            self.system.slip.bit * self._rock_slope(state, direction), matrix[-1]
+            self.rig.slip.bit * self._rock_slope(state, direction), matrix[-1]
         )
         return np.asarray(grown)
 
@@ -112,7 +161,7 @@ class Flow:
         """Follow a motion for a given time."""
         state = self.state(point)
         near = self.lifted.copy() if matrix else None
-        direction, time = self.system.direction_at(LATER, state), 0.0
+        direction, time = self.rig.direction_at(state), 0.0
         legs: list[Leg] = []
         while True:
             leg, state, near = self._leg(time, duration, direction, state, near, dense)
@@ -122,7 +171,7 @@ class Flow:
                 break
             if len(legs) >= MOST_PHASES:
                 raise SimulationError(f"{MOST_PHASES} changes of phase by {time:g} s: chattering")
-            after = self.system.next_direction(LATER, direction, state)
+            after = self.rig.next_direction(direction, state)
             if near is not None:
                 near = self._salted(state, near, direction, after)
             direction = after
@@ -149,7 +198,7 @@ class Flow:
             return np.concatenate([own, grown.ravel()])
 
         both = state if near is None else np.concatenate([state, near.ravel()])
-        result = integrate(
+        result = _integrate(
             rates,
             (begin, end),
             both,
@@ -163,26 +212,25 @@ class Flow:
             raise SimulationError(f"the integrator failed at {result.t[-1]:g} s: {result.message}")
         final = result.y[:size, -1].copy()
         if result.status == 1:  # at rest exactly, not to the locator's rounding
-            final[-1] = -self.system.set_speed
+            final[-1] = -self.rig.set_speed
         extremes = np.asarray(result.t_events[1]) if direction else np.zeros(0)
         leg = Leg(begin, float(result.t[-1]), direction, result.sol, extremes)
         return leg, final, None if near is None else result.y[size:, -1].reshape(near.shape)
 
     def _events(self, direction: int) -> list[Any]:
-        system, size = self.system, 2 * self.nodes
-        limit = system.static_torque(LATER, np.zeros(size))
+        rig, size = self.rig, 2 * self.nodes
 
         def comes_to_rest(time: float, both: Array) -> float:
             # Exactly zero is the release itself, in a step too short to move the bit.
-            return direction * system.bit_speed(both[:size]) or 1e-300
+            return direction * rig.bit_speed(both[:size]) or 1e-300
 
         def breaks_loose(time: float, both: Array) -> float:
-            return limit - abs(system.holding_torque(LATER, both[:size]))
+            return rig.static_torque - abs(rig.holding_torque(both[:size]))
 
         def extreme(time: float, both: Array) -> float:
             return float(self.rates(both[:size], direction)[-1])
 
-        return [ending(comes_to_rest), extreme] if direction else [ending(breaks_loose)]
+        return [_ending(comes_to_rest), extreme] if direction else [_ending(breaks_loose)]
 
     def _salted(self, state: Array, near: Array, before: int, after: int) -> Array:
         """Neighbours after a change of phase."""
@@ -201,9 +249,33 @@ class Flow:
         ahead, behind = state.copy(), state.copy()
         ahead[-1] += SPEED_STEP
         behind[-1] -= SPEED_STEP
-        torque = self.system.slip_torque
-        change = torque(LATER, ahead, direction) - torque(LATER, behind, direction)
+        torque = self.rig.slip_torque
+        change = torque(ahead, direction) - torque(behind, direction)
         return change / (2.0 * SPEED_STEP)
+
+
+def _integrate(*arguments: Any, **options: Any) -> Any:
+    """`solve_ivp` with steps that are not too long; a little shorter if an event is missed.
+
+    SciPy finds events on its dense output, which at the ends of a step may differ from the step
+    itself by rounding; an event that lies just there is then not bracketed. Other steps move it
+    inside.
+    """
+    from scipy.integrate import solve_ivp  # a third of a second that maps need not wait for
+
+    for share in (1.0, 0.83, 0.71, 0.59, 0.47):
+        try:
+            return solve_ivp(*arguments, max_step=share * LONGEST_STEP, **options)
+        except ValueError as error:
+            failure = error
+    raise SimulationError(f"an event could not be located: {failure}") from failure
+
+
+def _ending(event: Any) -> Any:
+    """Mark an event as the end of its phase, reached from above."""
+    event.terminal = True
+    event.direction = -1
+    return event
 
 
 def _jacobian(first_order: Array, drive: Array) -> Array:

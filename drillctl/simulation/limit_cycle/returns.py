@@ -8,7 +8,6 @@ neither.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -22,7 +21,8 @@ from drillctl.errors import SimulationError
 from drillctl.simulation.lanes import Kind
 from drillctl.simulation.limit_cycle.flow import Flow
 from drillctl.simulation.limit_cycle.shooting import Orbit, find_orbit
-from drillctl.simulation.reference import Motion, Piece, solve
+from drillctl.simulation.reference import Motion, solve_whole, stuck_between
+from drillctl.simulation.reference_rates import BIT_SPEED, TOP_SPEED
 from drillctl.store.codec import label
 
 Array = NDArray[np.float64]
@@ -145,14 +145,14 @@ def long_run(
     }
     if start is not None:
         values["start.kind"] = start
-    motion = solve(design.replace(values), tolerance)
+    motion = solve_whole(design.replace(values), tolerance)
     return take_returns(motion, period)
 
 
 def take_returns(motion: Motion, period: float, level: float | None = None) -> Returns:
     """The returns in the second half of a run."""
     trace = _Trace(motion)
-    duration = motion.pieces[-1].end
+    duration = float(motion.ends[-1])
     begin = 0.5 * duration
     time = np.linspace(begin, duration, max(2, int(FINE * (duration - begin) / period)))
     speed = trace.bit_speed(time)
@@ -234,32 +234,20 @@ class _Trace:
     """States and speeds of a run at any time."""
 
     def __init__(self, motion: Motion) -> None:
-        self.pieces = motion.pieces
-        self.ends = np.array([piece.end for piece in motion.pieces])
+        self.motion = motion
         self.set_speed = motion.design.speed
-        self.nodes = motion.design.string.nodes
-
-    def piece(self, time: float) -> Piece:
-        return self.pieces[min(int(np.searchsorted(self.ends, time)), len(self.pieces) - 1)]
 
     def state(self, time: float) -> Array:
-        return np.asarray(self.piece(time).solution(time))
+        return self.motion.states(np.array([time]))[:, 0]
 
     def bit_speed(self, time: Array) -> Array:
-        return self._each(time, lambda state: state[2 * self.nodes - 1], stuck=-self.set_speed)
+        """Absolute bit speed (rad/s); exactly zero while stuck."""
+        piece = np.minimum(np.searchsorted(self.motion.ends, time), len(self.motion.ends) - 1)
+        speed = self.motion.components([BIT_SPEED], time)[0] + self.set_speed
+        return np.where(self.motion.directions[piece] == 0.0, 0.0, speed)
 
     def top_speed(self, time: Array) -> Array:
-        return self._each(time, lambda state: state[self.nodes], stuck=None)
-
-    def _each(self, time: Array, row: Callable[[Array], Array], stuck: float | None) -> Array:
-        """Absolute speed (rad/s); `stuck` stands for it in the frame while the bit is at rest."""
-        which = np.minimum(np.searchsorted(self.ends, time), len(self.pieces) - 1)
-        speed = np.zeros(len(time))
-        for index in np.unique(which):
-            mine, piece = which == index, self.pieces[index]
-            held = stuck is not None and piece.direction == 0
-            speed[mine] = stuck if held else row(piece.solution(time[mine]))
-        return speed + self.set_speed
+        return self.motion.components([TOP_SPEED], time)[0] + self.set_speed
 
     def crossing(self, low: float, high: float, level: float) -> float:
         """Time between two at which the bit speed is `level`."""
@@ -271,19 +259,15 @@ class _Trace:
 
     def mean(self, begin: float, end: float) -> float:
         """Mean bit speed between two times (rad/s)."""
-        turned = self.state(end)[self.nodes - 1] - self.state(begin)[self.nodes - 1]
-        return float(turned) / (end - begin) + self.set_speed
+        first, last = self.motion.bit_angle(np.array([begin, end]))
+        return float(last - first) / (end - begin) + self.set_speed
 
     def peak(self, begin: float, end: float) -> float:
         """Highest bit speed between two times, at a located extreme."""
-        moments = np.concatenate([piece.extremes for piece in self.pieces])
+        moments = self.motion.extremes[:, 0]
         inside = moments[(moments > begin) & (moments < end)]
         return float(self.bit_speed(np.append(inside, [begin, end])).max())
 
     def stuck(self, begin: float, end: float) -> float:
         """Time at rest between two times (s)."""
-        return sum(
-            max(0.0, min(piece.end, end) - max(piece.begin, begin))
-            for piece in self.pieces
-            if piece.direction == 0
-        )
+        return stuck_between(self.motion, begin, end)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.simulation.limit_cycle.describing import HarmonicCycle, mean_torque_and_slope
-from drillctl.simulation.limit_cycle.flow import LATER, Flow, Leg
+from drillctl.simulation.limit_cycle.flow import Flow, Leg
 from drillctl.store.codec import label
 
 Array = NDArray[np.float64]
@@ -190,7 +190,7 @@ class _Place:
 
     def start_rates(self) -> Array:
         state = self.flow.state(self.point)
-        direction = self.flow.system.direction_at(LATER, state)
+        direction = self.flow.rig.direction_at(state)
         return np.asarray(self.flow.told @ self.flow.rates(state, direction))
 
 
@@ -230,7 +230,7 @@ def _orbit(place: _Place, steps: int) -> Orbit:
     moments = np.concatenate([leg.extremes for leg in legs])
     _, turning = _speeds(flow, legs, np.sort(moments))
     speeds = np.concatenate([bit, turning])
-    if np.ptp(speeds) <= LEAST_SWING * flow.system.set_speed:
+    if np.ptp(speeds) <= LEAST_SWING * flow.rig.set_speed:
         raise SimulationError("the guess led to steady drilling, not to a periodic motion")
     return Orbit(
         period=period,
@@ -262,9 +262,9 @@ def _speeds(flow: Flow, legs: tuple[Leg, ...], time: Array) -> tuple[Array, Arra
         mine = which == index
         if mine.any() and leg.solution is not None:
             state = leg.solution(time[mine])
-            top[mine] = state[flow.nodes] + flow.system.set_speed
+            top[mine] = state[flow.nodes] + flow.rig.set_speed
             if leg.direction != 0:
-                bit[mine] = state[-1] + flow.system.set_speed
+                bit[mine] = state[-1] + flow.rig.set_speed
     return top, bit
 
 
@@ -277,4 +277,4 @@ def _turned(flow: Flow, legs: tuple[Leg, ...]) -> float:
         first.solution(first.begin)[flow.nodes - 1],
         last.solution(last.end)[flow.nodes - 1],
     )
-    return float(end - begin) + flow.system.set_speed * last.end
+    return float(end - begin) + flow.rig.set_speed * last.end

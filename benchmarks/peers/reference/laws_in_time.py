@@ -26,8 +26,6 @@ from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.top_drive.real_drive import (
     MEMORY,
     SAMPLED_MEMORY,
-    begin,
-    begin_sampled,
     respond,
     respond_held,
     sample,
@@ -108,13 +106,14 @@ class _Continuous:
         self.law, self.set_speed, self.program = law, set_speed, program
 
     def start(self, speed: float) -> Array:
-        return begin(speed)
+        return np.array([speed, 0.0, 0.0, 0.0, 0.0])
 
     def respond(self, memory: Array, top: Top) -> tuple[float, Array]:
-        return respond(
+        torque, rates = respond(
             self.law, memory, top.speed, self.program.at(top.time), top.speed + self.set_speed,
             (top.free, top.gain),
         )  # fmt: skip
+        return torque, np.array(rates)
 
     def sample(self, memory: Array, top: Top) -> Array:
         return memory
@@ -130,14 +129,17 @@ class _Sampled:
         self.period = float(law.period)
 
     def start(self, speed: float) -> Array:
-        return begin_sampled(speed)
+        return np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, speed, 0.0])
 
     def respond(self, memory: Array, top: Top) -> tuple[float, Array]:
-        return respond_held(self.law, memory, top.speed)
+        torque, seen, motor, impulse = respond_held(self.law, memory, top.speed)
+        rates = np.zeros(self.states)
+        rates[0], rates[4], rates[8] = seen, motor, impulse
+        return torque, rates
 
     def sample(self, memory: Array, top: Top) -> Array:
         lead = self.program.at(top.time)
-        return sample(self.law, memory, top.speed, lead, top.speed + self.set_speed)
+        return np.array(sample(self.law, memory, top.speed, lead, top.speed + self.set_speed))
 
 
 Past = Callable[[Any], Array]  # times (s) to the signal that stood for the bit speed then (rad/s)

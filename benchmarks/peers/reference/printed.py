@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.peers.reference.system import Equations, Forces, System, ending, never
 from drillctl.simulation.phases import Phase
-from drillctl.simulation.system import Equations, Forces, System, ending, never
 
 Array = NDArray[np.float64]
 

@@ -9,13 +9,14 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.peers.reference.laws_in_time import Moment, Top, drive_in_time, weight_in_time
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.linear.observer import observer_of
 from drillctl.rig.bit_rock import contact
+from drillctl.rig.drillstring import Drillstring
 from drillctl.simulation.lanes import start
-from drillctl.simulation.laws_in_time import Moment, Top, drive_in_time, weight_in_time
-from drillctl.simulation.phases import Phase, damping_power, slip_phase, stick_phase
+from drillctl.simulation.phases import Phase, slip_phase, stick_phase
 
 Array = NDArray[np.float64]
 Method = Literal["DOP853", "RK45", "Radau", "BDF"]
@@ -359,3 +360,20 @@ def ending(event: Any) -> Any:
     event.terminal = True
     event.direction = -1
     return event
+
+
+def damping_power(string: Drillstring) -> Callable[[Array], float]:
+    """Power that damping takes (W) as a function of the absolute speeds (rad/s)."""
+    if string.undamped:
+        return lambda speed: 0.0
+    if string.nodes < 200:
+        dense = string.damping.toarray()
+        return lambda speed: float(speed @ dense @ speed)
+    return lambda speed: float(speed @ (string.damping @ speed))
+
+
+def stored_energy(string: Drillstring, angle: Array, speed: Array) -> float:
+    """Kinetic plus elastic energy (J) at angles (rad) and absolute speeds (rad/s)."""
+    kinetic = 0.5 * speed @ (string.mass @ speed)
+    elastic = 0.5 * angle @ (string.stiffness @ angle)
+    return float(kinetic + elastic)

@@ -1,0 +1,1 @@
+"""The reference solver in plain Python: SciPy's integrator on dense matrices."""

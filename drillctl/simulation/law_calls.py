@@ -1,0 +1,128 @@
+"""Laws as compiled functions behind an address, so that one compiled solver serves all of them.
+
+A call costs some nanoseconds and a law compiles by itself, once per machine. The Python of
+each law stays the only place of its equation.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import math
+import types as python_types
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+OPTIONS: dict[str, Any] = {"error_model": "numpy"}
+NUMBERS = 4  # numbers that every call passes, used or not
+SIGNATURE = types.float64(types.CPointer(types.float64), *[types.float64] * NUMBERS)
+
+FARTHEST = 100.0
+"""Largest exponent: a trial step far past zero speed is to be rejected, not to overflow."""
+
+
+def on_disk(function: Any) -> Any:
+    """Compile a function of the solver, kept on disk under a name that its sources are part of.
+
+    So that a change in any of them is noticed: numba looks at the date of one file only.
+    """
+    function.__name__ = function.__qualname__ = f"{function.__name__}_{version()}"
+    return numba.njit(cache=True, nogil=True, fastmath={"contract"}, **OPTIONS)(function)
+
+
+@cache
+def version() -> str:
+    """Hash of every source that is compiled into the reference solver."""
+    here = Path(__file__).resolve().parent
+    own = [here / "law_calls.py", *here.glob("reference_*.py")]
+    digest = hashlib.sha256()
+    for path in sorted([*own, *here.parent.glob("rig/**/*.py")]):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@numba.njit(**OPTIONS)
+def _exp(x: float) -> float:
+    return math.exp(min(x, FARTHEST))
+
+
+@intrinsic
+def call(typing_context: Any, address: Any, law: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Call the function at `address` with the numbers of a law, a flat array, and four more."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        double = ir.DoubleType()
+        kind = ir.FunctionType(double, [double.as_pointer(), *[double] * NUMBERS])
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        data = context.make_array(signature.args[1])(context, builder, arguments[1]).data
+        return builder.call(function, [data, *arguments[2:]])
+
+    numbers = [types.float64] * NUMBERS
+    return types.float64(types.int64, law, *numbers), generate
+
+
+# What each call computes, from the law `law` and the numbers a, b, c, d.
+FORMS = {
+    "torque_and_slope": "method(law, a, b, exp)[0]",
+    "static_torque": "method(law, a)",
+    "torque": "method(law, a, b)",
+    "weight": "method(law, a)",
+    "command": "method(law, a, b)",
+    "next_level": "method(law, a, b, c, d)",
+}
+
+
+def address(law: Any, method: str) -> int:
+    """Address of a method of a law, compiled for the type of the law."""
+    kind: Any = type(law)
+    return int(_compiled(kind, method).address)
+
+
+@cache
+def _compiled(kind: Any, method: str) -> Any:
+    name = f"{kind.__name__}_{method}_{version()}"
+    fields = ", ".join(f"p[{k}]" for k in range(len(kind._fields)))
+    text = (
+        f"def {name}(numbers, a, b, c, d):\n"
+        f"    p = carray(numbers, {max(1, len(kind._fields))})\n"
+        f"    law = Law({fields})\n"
+        f"    return {FORMS[method]}\n"
+    )
+    scope: dict[str, Any] = {
+        "__name__": __name__, "carray": numba.carray, "Law": kind, "exp": _exp,
+        "method": jitted(getattr(kind, method)),
+    }  # fmt: skip
+    # Under the name of this file, next to which numba keeps what it compiles.
+    exec(compile(text, __file__, "exec"), scope)
+    ours = kind.__module__.startswith("drillctl.")
+    return numba.cfunc(SIGNATURE, cache=ours, **OPTIONS)(scope[name])
+
+
+def jitted(function: Any) -> Any:
+    """A function of this package compiled, with the functions of its module that it calls."""
+    if not isinstance(function, python_types.FunctionType):
+        return function
+    scope = dict(function.__globals__)
+    for name in function.__code__.co_names:
+        helper = scope.get(name)
+        if inspect.isfunction(helper) and helper.__module__ == function.__module__:
+            scope[name] = jitted(helper)
+    copy = python_types.FunctionType(
+        function.__code__, scope, function.__name__, function.__defaults__, function.__closure__
+    )
+    copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
+    return numba.njit(**OPTIONS)(copy)
+
+
+def from_numbers(kind: Any) -> Any:
+    """A compiled function that makes a law of a flat array of its numbers."""
+    fields = ", ".join(f"p[{k}]" for k in range(len(kind._fields)))
+    scope: dict[str, Any] = {"Law": kind}
+    exec(f"def made(p):\n    return Law({fields})", scope)
+    return numba.njit(**OPTIONS)(scope["made"])

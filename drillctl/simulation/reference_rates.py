@@ -1,0 +1,606 @@
+"""The equations of one rig for the reference solver, compiled: string, drive, weight and rock.
+
+In the frame that turns at the set speed, with u the angles and v the speeds,
+
+    M v' = -K u - C v - g Omega + e_top T_m - e_bit T_b,
+
+where g Omega is what damping to ground takes at the set speed. In slip T_b is the torque of the
+rock; while the bit keeps its speed T_b is the reaction that holds it. M is tridiagonal and
+factorised from the top, so that the same factors serve the string without its last node.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from drillctl.rig.program import Ramp
+from drillctl.rig.top_drive import RealDrive, SampledDrive
+from drillctl.rig.top_drive.real_drive import MEMORY, SAMPLED_MEMORY, respond, respond_held, sample
+from drillctl.simulation.law_calls import call, from_numbers, jitted, on_disk, version
+
+Array = NDArray[np.float64]
+
+compiled = numba.njit(error_model="numpy", fastmath={"contract"}, nogil=True)
+"""Decorator of what is part of the solver: products and sums may be fused, nothing else."""
+
+STUCK, CREEPING, PUSHED, FORWARD_EDGE, BACKWARD_EDGE = 0, 2, 3, 4, 5
+"""Phases beside +1 and -1 of a bit that turns; those from 2 on belong to the printed law.
+
+Its torque jumps where the bit passes the tolerance delta, and has a kink within where the pipe's
+torque passes the static one:
+
+- `CREEPING`: Equation 3, the torque of the pipe, so that next to nothing is left to move the bit;
+- `PUSHED`: Equation 4, the static torque against a larger one of the pipe;
+- `FORWARD_EDGE`, `BACKWARD_EDGE`: at exactly plus or minus delta. There Equation 5 drives the bit
+  into the tolerance and Equation 3 drives it out again, at once. What such chatter tends to is
+  the motion in between, in the sense of Filippov: the bit keeps the speed delta, under the torque
+  that this takes.
+"""
+IDEAL, CONTINUOUS, SAMPLED = 0, 1, 2  # how a drive works
+AT_ONCE, MEASURED, OBSERVED, ALARMED = 0, 1, 2, 3  # how a weight on bit comes about
+WORKS = 3  # integrals of power that every state carries: work of the drive, of the bit, of damping
+READ_EVERY = 0.01  # interval (s) on which the extremes of an alarm's window are read
+LATE = 1e-9  # how much after its time (s) a stop is taken to be at it
+AHEAD = 1e-6
+"""How far ahead (s) the pipe's torque is looked at, to tell on which side of its limit it is."""
+ROUNDING = 1e-10
+"""Share of the static torque under which nothing drives a bit away from an edge.
+
+With lumped masses and no damping exactly nothing does, but for rounding.
+"""
+
+
+WHOLE_NUMBERS = (
+    "nodes", "states", "drive_states", "weight_states", "observer_states",
+    "damped", "coupled", "full",  # damping at all; M more than a diagonal; C no band
+    "drive_kind", "drive_torque", "rock_torque", "static_torque", "set_valued",
+    "weight_kind", "weight",  # addresses of `law_calls` among them
+    "rates", "margin", "decision",  # addresses of functions that are compiled by themselves
+    "bands", "full_damping", "laws", "observer", "begin", "tape",  # addresses of arrays
+    "components", "steps",  # kept of each step; on the tape
+)  # fmt: skip
+NUMBERS = (
+    "tolerance",  # of the printed law (rad/s); 0 of any other
+    "rock_until",  # s
+    "set_speed",  # rad/s
+    "drag",  # torque of all damping to ground at the set speed (N m)
+)
+RIG = np.dtype([(name, np.int64) for name in WHOLE_NUMBERS] + [(name, float) for name in NUMBERS])
+"""A rig as the solver knows it: plain numbers, and where its arrays lie.
+
+One pointer is all that a call passes on; tuples of arrays would be copied at each.
+"""
+
+STIFFNESS, DAMPING, SIDE_DAMPING, LOAD, SIDE_MASS, FACTOR, PIVOT, HELD_TOP, FREE_TOP = range(9)
+"""Rows of `bands`, shape (9, nodes): stiffness of each element (N m/rad), diagonal and side
+diagonal of C (N m s/rad), g Omega (N m), side diagonal of M (kg m2), its factors, one over its
+pivots, accelerations per torque at the top with the bit held and free (1/(kg m2))."""
+DRIVE, ROCK, ROCK_BEFORE, WEIGHT, PRESENT, PATH, SPEED_PROGRAM, WEIGHT_PROGRAM = range(8)
+"""Rows of `laws`: the numbers of each law, of the weight law at the nominal weight of the moment,
+of the path of the weight and of the programs of speed and weight."""
+MOST_NUMBERS = 40  # columns of `laws`
+DELAY, PERIOD, SENSOR, HOIST, RATE, WINDOW = range(6)  # of `PATH` (s; N/s)
+
+BEGIN, LENGTH, FIRST = 0, 1, 2
+"""Columns of the tape: begin (s) and length (s) of a step, then 8 numbers a component."""
+TOP_ANGLE, TOP_SPEED, NEXT_ANGLE, NEXT_SPEED, BIT_ANGLE, BIT_SPEED, LAST_ANGLE = range(7)
+"""Components of a tape; the memories of drive and weight follow, and two sums of states."""
+
+_ramp = from_numbers(Ramp)
+_ramp_at, _ramp_integral = jitted(Ramp.at), jitted(Ramp.integral)
+_real, _sampled = from_numbers(RealDrive), from_numbers(SampledDrive)
+_respond, _respond_held, _sample = jitted(respond), jitted(respond_held), jitted(sample)
+MEMORIES = (0, len(MEMORY), len(SAMPLED_MEMORY))  # numbers of memory of each kind of drive
+
+
+@intrinsic
+def _pointer(typing_context: Any, address: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+
+    return types.CPointer(types.float64)(types.int64), generate
+
+
+@compiled
+def band(rig: Any, row: int) -> Any:
+    """A row of `bands`."""
+    return numba.carray(_pointer(rig.bands + 8 * row * rig.nodes), (rig.nodes,))
+
+
+@compiled
+def law(rig: Any, row: int) -> Any:
+    """A row of `laws`."""
+    return numba.carray(_pointer(rig.laws + 8 * row * MOST_NUMBERS), (MOST_NUMBERS,))
+
+
+@compiled
+def tape_row(rig: Any, step: int) -> Any:
+    """A step on the tape."""
+    width = FIRST + 8 * rig.components
+    return numba.carray(_pointer(rig.tape + 8 * step * width), (width,))
+
+
+@compiled
+def memory_of_weight(rig: Any, state: Any) -> Any:
+    """The last numbers of a state, or of its rates."""
+    return state[rig.states - rig.weight_states :]
+
+
+@compiled
+def bit_speed(rig: Any, state: Any) -> float:
+    """Absolute speed of the bit (rad/s)."""
+    return state[2 * rig.nodes - 1] + rig.set_speed
+
+
+@compiled
+def is_held(phase: int) -> bool:
+    """Whether the bit keeps its speed in a phase."""
+    return phase == STUCK or phase >= FORWARD_EDGE
+
+
+@compiled
+def pipe_torque(rig: Any, state: Any) -> float:
+    """Torque of the element next to the bit (N m), its stiffness times its twist."""
+    n = rig.nodes
+    return band(rig, STIFFNESS)[n - 2] * (state[n - 2] - state[n - 1])
+
+
+# The string.
+
+
+@compiled
+def _full_damping(rig: Any) -> Any:
+    return numba.carray(_pointer(rig.full_damping), (rig.nodes, rig.nodes))
+
+
+@compiled
+def _forces(rig: Any, state: Any, force: Any) -> None:
+    """Torques of springs, dampers and ground on every node."""
+    n = rig.nodes
+    stiffness, load = band(rig, STIFFNESS), band(rig, LOAD)
+    force[0] = -stiffness[0] * (state[0] - state[1]) - load[0]
+    for i in range(1, n - 1):
+        above = stiffness[i - 1] * (state[i - 1] - state[i])
+        force[i] = above - stiffness[i] * (state[i] - state[i + 1]) - load[i]
+    force[n - 1] = stiffness[n - 2] * (state[n - 2] - state[n - 1]) - load[n - 1]
+    if not rig.damped:
+        return
+    speed = state[n : 2 * n]
+    if rig.full:
+        full = _full_damping(rig)
+        for i in range(n):
+            for j in range(n):
+                force[i] -= full[i, j] * speed[j]
+        return
+    own, side = band(rig, DAMPING), band(rig, SIDE_DAMPING)
+    for i in range(n):
+        force[i] -= own[i] * speed[i]
+    for i in range(n - 1):
+        force[i] -= side[i] * speed[i + 1]
+        force[i + 1] -= side[i] * speed[i]
+
+
+@compiled
+def _accelerate(rig: Any, force: Any, count: int) -> None:
+    """Solve M a = f for the first `count` nodes, in place."""
+    pivot, factor = band(rig, PIVOT), band(rig, FACTOR)
+    if not rig.coupled:
+        for i in range(count):
+            force[i] *= pivot[i]
+        return
+    for i in range(1, count):
+        force[i] -= factor[i - 1] * force[i - 1]
+    for i in range(count):
+        force[i] *= pivot[i]
+    for i in range(count - 2, -1, -1):
+        force[i] -= factor[i] * force[i + 1]
+
+
+@compiled
+def _damping_power(rig: Any, state: Any) -> float:
+    """Power that damping takes (W)."""
+    n, frame, power = rig.nodes, rig.set_speed, 0.0
+    if not rig.damped:
+        return 0.0
+    if rig.full:
+        full = _full_damping(rig)
+        for i in range(n):
+            for j in range(n):
+                power += (state[n + i] + frame) * full[i, j] * (state[n + j] + frame)
+        return power
+    own, side = band(rig, DAMPING), band(rig, SIDE_DAMPING)
+    for i in range(n):
+        power += own[i] * (state[n + i] + frame) ** 2
+    for i in range(n - 1):
+        power += 2.0 * side[i] * (state[n + i] + frame) * (state[n + i + 1] + frame)
+    return power
+
+
+# The weight on bit.
+
+
+@compiled
+def on_tape(row: Any, component: int, share: float) -> float:
+    """A component at a share of its step: the nested form of Hairer, Norsett & Wanner."""
+    first, rest = FIRST + 8 * component, 1.0 - share
+    value = row[first + 7] * share
+    value = (value + row[first + 6]) * rest
+    value = (value + row[first + 5]) * share
+    value = (value + row[first + 4]) * rest
+    value = (value + row[first + 3]) * share
+    value = (value + row[first + 2]) * rest
+    value = (value + row[first + 1]) * share
+    return row[first] + value
+
+
+@compiled
+def slope_on_tape(row: Any, component: int, share: float) -> float:
+    """Derivative of `on_tape` with respect to the share."""
+    first = FIRST + 8 * component
+    value, slope = 0.0, 0.0
+    for k in range(7, 0, -1):
+        value += row[first + k]
+        if k % 2:
+            slope = slope * share + value
+            value *= share
+        else:
+            slope = slope * (1.0 - share) - value
+            value *= 1.0 - share
+    return slope
+
+
+@compiled
+def step_at(rig: Any, time: float) -> int:
+    """The first step that ends at a time (s) or after it."""
+    low, high = 0, rig.steps - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if tape_row(rig, middle)[BEGIN] < time:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@compiled
+def _observer(rig: Any) -> Any:
+    """Shape (3 + states, states): by torque, by speed, read, then the free motion."""
+    n = rig.observer_states
+    return numba.carray(_pointer(rig.observer), (3 + n, n))
+
+
+@compiled
+def _signal(rig: Any, memory: Any, absolute: float) -> float:
+    """What stands for the bit speed (rad/s), from the memory of the weight."""
+    if rig.weight_kind == OBSERVED:
+        estimate, read = rig.set_speed, _observer(rig)[2]
+        for i in range(rig.observer_states):
+            estimate += read[i] * memory[i]
+        return abs(estimate)
+    if rig.weight_kind == AT_ONCE or law(rig, PATH)[SENSOR] == 0.0:
+        return abs(absolute)
+    return memory[0]
+
+
+@compiled
+def past(rig: Any, time: float) -> float:
+    """The signal of the weight law at a time (s) before; before the start, that of the start."""
+    if time <= 0.0:
+        begin = numba.carray(_pointer(rig.begin), (rig.states,))
+        return _signal(rig, memory_of_weight(rig, begin), bit_speed(rig, begin))
+    row = tape_row(rig, step_at(rig, time))
+    share = (time - row[BEGIN]) / row[LENGTH]
+    first = LAST_ANGLE + 1 + rig.drive_states
+    if rig.weight_kind == OBSERVED:
+        estimate, read = rig.set_speed, _observer(rig)[2]
+        for i in range(rig.observer_states):
+            estimate += read[i] * on_tape(row, first + i, share)
+        return abs(estimate)
+    if law(rig, PATH)[SENSOR] == 0.0:
+        return abs(on_tape(row, BIT_SPEED, share) + rig.set_speed)
+    return on_tape(row, first, share)
+
+
+@compiled
+def _nominal(rig: Any, time: float) -> float:
+    """Nominal weight (N), the first number of any law, under its program."""
+    program = law(rig, WEIGHT_PROGRAM)
+    if program[0] == 0.0:
+        return law(rig, WEIGHT)[0]
+    return law(rig, WEIGHT)[0] * (1.0 + _ramp_at(_ramp(program), time))
+
+
+@compiled
+def _asked(rig: Any, time: float, state: Any) -> float:
+    """Weight (N) that a law with a memory asks for."""
+    memory, path = memory_of_weight(rig, state), law(rig, PATH)
+    nominal, reading = _nominal(rig, time), memory[rig.weight_states - 2]
+    if rig.weight_kind == ALARMED:
+        return nominal * reading
+    if path[PERIOD] > 0.0:
+        seen = reading
+    elif path[DELAY] > 0.0:
+        seen = past(rig, time - path[DELAY])
+    else:
+        seen = _signal(rig, memory, bit_speed(rig, state))
+    return call(rig.weight, law(rig, WEIGHT), seen, nominal, 0.0, 0.0)
+
+
+@compiled
+def weight(rig: Any, time: float, state: Any, speed: float) -> float:
+    """Weight on bit (N) at a bit speed in its own direction (rad/s)."""
+    if rig.weight_kind == AT_ONCE:
+        present = law(rig, PRESENT)
+        present[0] = _nominal(rig, time)
+        return call(rig.weight, present, speed, 0.0, 0.0, 0.0)
+    if law(rig, PATH)[HOIST] > 0.0:
+        return state[rig.states - 1]
+    return _asked(rig, time, state)
+
+
+@compiled
+def _weight_rates(rig: Any, time: float, state: Any, top_torque: float, rates: Any) -> None:
+    """Rates of the memory of the weight."""
+    memory, out, path = memory_of_weight(rig, state), memory_of_weight(rig, rates), law(rig, PATH)
+    count = rig.weight_states
+    for i in range(count):
+        out[i] = 0.0
+    if rig.weight_kind == OBSERVED:
+        top, torque, observer = state[rig.nodes], top_torque - rig.drag, _observer(rig)
+        for i in range(rig.observer_states):
+            rate = observer[0, i] * torque + observer[1, i] * top
+            for j in range(rig.observer_states):
+                rate += observer[3 + i, j] * memory[j]
+            out[i] = rate
+    elif path[SENSOR] > 0.0:
+        out[0] = (abs(bit_speed(rig, state)) - memory[0]) / path[SENSOR]
+    if path[HOIST] > 0.0:
+        wanted = (_asked(rig, time, state) - memory[count - 1]) / path[HOIST]
+        out[count - 1] = min(max(wanted, -path[RATE]), path[RATE])
+
+
+@compiled
+def begin_weight(rig: Any, state: Any) -> None:
+    """Reading and weight at time zero; the signal's own memory is in the state."""
+    begin = numba.carray(_pointer(rig.begin), (rig.states,))
+    memory, count = memory_of_weight(rig, state), rig.weight_states
+    memory[count - 2] = 1.0
+    if rig.weight_kind != ALARMED:
+        memory[count - 2] = _signal(rig, memory, bit_speed(rig, state))
+    begin[:] = state
+    memory[count - 1] = _asked(rig, 0.0, state)
+    begin[:] = state
+
+
+@compiled
+def read_weight(rig: Any, time: float, state: Any) -> None:
+    """What the weight law reads at a stop."""
+    memory, path = memory_of_weight(rig, state), law(rig, PATH)
+    if rig.weight_kind == ALARMED:
+        _read_window(rig, time, memory)
+    elif path[PERIOD] > 0.0:
+        k = math.floor((time - path[DELAY] + LATE) / path[PERIOD])
+        if k >= 0:
+            memory[rig.weight_states - 2] = past(rig, k * path[PERIOD])
+
+
+@compiled
+def _read_window(rig: Any, time: float, memory: Any) -> None:
+    window = law(rig, PATH)[WINDOW]
+    turns = (time - law(rig, PATH)[DELAY]) / window
+    k = round(turns)
+    if abs(turns - k) * window > LATE or k < 1:
+        return
+    samples = max(2, math.ceil(window / READ_EVERY) + 1)
+    low, high, total = math.inf, -math.inf, 0.0
+    for i in range(samples):
+        speed = past(rig, (k - 1.0 + i / (samples - 1.0)) * window)
+        low, high, total = min(low, speed), max(high, speed), total + speed
+    reading = rig.weight_states - 2
+    memory[reading] = call(
+        rig.weight, law(rig, WEIGHT), memory[reading], low, high, total / samples
+    )
+
+
+# The rock.
+
+
+@compiled
+def _rock(rig: Any, time: float) -> Any:
+    return law(rig, ROCK_BEFORE if time < rig.rock_until else ROCK)
+
+
+@compiled
+def friction(rig: Any, time: float, state: Any, speed: float) -> float:
+    """Torque of the rock (N m) at a bit speed in its own direction (rad/s).
+
+    Continued smoothly past zero speed, so that the event can be located that ends the phase.
+    """
+    load = weight(rig, time, state, speed)
+    return call(rig.rock_torque, _rock(rig, time), load, speed, 0.0, 0.0)
+
+
+@compiled
+def static_torque(rig: Any, time: float, state: Any) -> float:
+    """Largest torque on a bit at rest (N m)."""
+    load = weight(rig, time, state, 0.0)
+    return call(rig.static_torque, _rock(rig, time), load, 0.0, 0.0, 0.0)
+
+
+@compiled
+def slip_torque(rig: Any, time: float, state: Any, phase: int) -> float:
+    """Torque on a bit that does not keep its speed (N m)."""
+    speed = bit_speed(rig, state)
+    if phase == CREEPING:
+        return pipe_torque(rig, state)
+    if phase == PUSHED:
+        return math.copysign(static_torque(rig, time, state), pipe_torque(rig, state))
+    direction = float(phase)
+    if not rig.set_valued and rig.tolerance == 0.0:
+        direction = 1.0 if speed >= 0.0 else -1.0
+    return direction * friction(rig, time, state, direction * speed)
+
+
+# The drive.
+
+
+@compiled
+def drive_torque(rig: Any, time: float, state: Any, free: float, gain: float, rates: Any) -> float:
+    """Torque of the drive (N m); writes the rates of its memory."""
+    n, numbers, program = rig.nodes, law(rig, DRIVE), law(rig, SPEED_PROGRAM)
+    angle, speed, lead = state[0], state[n], 0.0
+    if program[0] != 0.0:
+        lead = _ramp_at(_ramp(program), time)
+    if rig.drive_kind == IDEAL:
+        if program[0] != 0.0:
+            angle -= _ramp_integral(_ramp(program), time)
+        return call(rig.drive_torque, numbers, angle, speed - lead, 0.0, 0.0)
+    first = 2 * n + WORKS
+    memory = state[first : first + rig.drive_states]
+    if rig.drive_kind == CONTINUOUS:
+        torque, changes = _respond(
+            _real(numbers), memory, speed, lead, speed + rig.set_speed, (free, gain)
+        )
+        for i in range(5):
+            rates[first + i] = changes[i]
+        return torque
+    torque, seen, motor, impulse = _respond_held(_sampled(numbers), memory, speed)
+    for i in range(rig.drive_states):
+        rates[first + i] = 0.0
+    rates[first], rates[first + 4], rates[first + 8] = seen, motor, impulse
+    return torque
+
+
+@compiled
+def sample_drive(rig: Any, time: float, state: Any) -> None:
+    """Let a sampled controller work."""
+    n, first = rig.nodes, 2 * rig.nodes + WORKS
+    speed, memory = state[n], state[first : first + rig.drive_states]
+    lead = _ramp_at(_ramp(law(rig, SPEED_PROGRAM)), time)
+    after = _sample(_sampled(law(rig, DRIVE)), memory, speed, lead, speed + rig.set_speed)
+    for i in range(9):
+        memory[i] = after[i]
+
+
+# All together.
+
+
+@compiled
+def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) -> float:
+    """What `rates_of` calls."""
+    n = rig.nodes
+    held = is_held(phase)
+    force = rates[n : 2 * n]
+    for i in range(n):
+        rates[i] = state[n + i]
+    _forces(rig, state, force)
+    at_bit, bit_torque, count = force[n - 1], 0.0, n - 1
+    if not held:
+        bit_torque, count = slip_torque(rig, time, state, phase), n
+        force[n - 1] -= bit_torque
+    _accelerate(rig, force, count)
+    if held:
+        force[n - 1] = 0.0
+    by_top = band(rig, HELD_TOP if held else FREE_TOP)
+    top_torque = drive_torque(rig, time, state, force[0], by_top[0], rates)
+    for i in range(n):
+        force[i] += by_top[i] * top_torque
+    if held:
+        bit_torque = at_bit - band(rig, SIDE_MASS)[n - 2] * force[n - 2]
+    rates[2 * n] = top_torque * (state[n] + rig.set_speed)
+    rates[2 * n + 1] = bit_torque * bit_speed(rig, state)
+    rates[2 * n + 2] = _damping_power(rig, state)
+    if rig.weight_states:
+        _weight_rates(rig, time, state, top_torque, rates)
+    return bit_torque
+
+
+def by_address(field: str, numbers: tuple[Any, ...], arrays: int) -> Any:
+    """A call of the function whose address a rig holds: of numbers, then of states.
+
+    What is called so is compiled once by itself, and not into each place that calls it.
+    """
+    place = dict(RIG.fields or {})[field][1]
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        whole, byte = ir.IntType(64), ir.IntType(8)
+        record = builder.bitcast(arguments[0], byte.as_pointer())
+        spot = builder.gep(record, [ir.Constant(whole, place)])
+        address = builder.load(builder.bitcast(spot, whole.as_pointer()))
+        passed = [record, *arguments[1 : 1 + len(numbers)]]
+        for kind, array in zip(
+            signature.args[1 + len(numbers) :], arguments[1 + len(numbers) :], strict=True
+        ):
+            passed.append(context.make_array(kind)(context, builder, array).data)
+        kind = ir.FunctionType(ir.DoubleType(), [value.type for value in passed])
+        return builder.call(builder.inttoptr(address, kind.as_pointer()), passed)
+
+    names = [f"a{k}" for k in range(1 + len(numbers) + arrays)]
+    scope: dict[str, Any] = {"types": types, "generate": generate, "numbers": numbers}
+    exec(
+        f"def asked(context, {', '.join(names)}):\n"
+        f"    return types.float64({names[0]}, *numbers, "
+        f"{', '.join(names[1 + len(numbers) :])}), generate",
+        scope,
+    )
+    return intrinsic(scope["asked"])
+
+
+def callable_at(function: Any, numbers: tuple[Any, ...], arrays: int) -> int:
+    """Address of a function of a rig, numbers and states, compiled by itself."""
+    record, doubles = types.CPointer(numba.from_dtype(RIG)), types.CPointer(types.float64)
+    given = [f"n{k}" for k in range(len(numbers))]
+    states = [f"s{k}" for k in range(arrays)]
+    name = f"{function.__name__.strip('_')}_{version()}"
+    scope = {"__name__": __name__, "carray": numba.carray, "function": function}
+    views = ", ".join(f"carray({state}, rig.states)" for state in states)
+    text = (
+        f"def {name}(pointer, {', '.join(given + states)}):\n"
+        f"    rig = carray(pointer, 1)[0]\n"
+        f"    return float(function(rig, {', '.join(given)}, {views}))\n"
+    )
+    exec(compile(text, __file__, "exec"), scope)
+    signature = types.float64(record, *numbers, *[doubles] * arrays)
+    made = numba.cfunc(signature, cache=True, error_model="numpy", fastmath={"contract"})
+    return _kept(made(scope[name]))
+
+
+_alive: list[Any] = []
+
+
+def _kept(function: Any) -> int:
+    """Address of a compiled function, which stays while the process lives."""
+    _alive.append(function)
+    return int(function.address)
+
+
+TIME_AND_PHASE = (types.float64, types.int64)
+rates_of = by_address("rates", TIME_AND_PHASE, 2)
+"""Rates of a state at a time (s) in a phase, in place; returns the torque on the bit (N m)."""
+
+
+def factorised(bands: Array) -> Array:
+    """`bands` with the accelerations per torque at the top, the bit held and free."""
+    n = bands.shape[1]
+    rig = np.zeros(1, dtype=RIG)
+    rig["nodes"], rig["bands"] = n, bands.ctypes.data
+    rig["coupled"] = np.any(bands[SIDE_MASS] != 0.0)
+    for row, count in ((HELD_TOP, n - 1), (FREE_TOP, n)):
+        bands[row] = 0.0
+        bands[row, 0] = 1.0
+        accelerate(rig, bands[row], count)
+    return bands
+
+
+@on_disk
+def accelerate(rigs: Any, force: Array, count: int) -> None:
+    """Solve M a = f for the first `count` nodes, in place."""
+    _accelerate(rigs[0], force, count)

@@ -1,0 +1,601 @@
+"""A run of the reference solver, compiled: phases, located events, stops.
+
+A run advances some steps at a time; between calls its whole state lies in arrays, so that the
+caller can make room, show progress and be interrupted.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from drillctl.rig.top_drive import SampledDrive
+from drillctl.simulation.law_calls import on_disk
+from drillctl.simulation.reference_rates import (
+    AHEAD,
+    ALARMED,
+    AT_ONCE,
+    BACKWARD_EDGE,
+    BEGIN,
+    BIT_ANGLE,
+    BIT_SPEED,
+    CREEPING,
+    DELAY,
+    DRIVE,
+    FORWARD_EDGE,
+    LATE,
+    LENGTH,
+    PATH,
+    PERIOD,
+    PUSHED,
+    ROUNDING,
+    SAMPLED,
+    STUCK,
+    TIME_AND_PHASE,
+    WINDOW,
+    begin_weight,
+    bit_speed,
+    by_address,
+    callable_at,
+    compiled,
+    friction,
+    is_held,
+    law,
+    on_tape,
+    pipe_torque,
+    rates_in_place,
+    rates_of,
+    read_weight,
+    sample_drive,
+    slope_on_tape,
+    static_torque,
+    tape_row,
+)
+from drillctl.simulation.reference_steps import (
+    DENSE_STAGES,
+    LARGEST,
+    SAFETY,
+    SMALLEST,
+    STAGES,
+    Tableau,
+    Work,
+    explicit_dense,
+    explicit_error,
+    explicit_record,
+    explicit_step,
+    explicit_whole,
+    first_length,
+    state_at,
+    tableau,
+)
+
+LONGEST_STEP = 0.05  # longest step (s): a touch of zero speed shorter than that could go unseen
+WITHIN_STEP = 2e-3
+"""Longest step (s) within the printed law's tolerance: a bit passes through it in milliseconds."""
+MOST_PHASES = 100_000
+"""Give up beyond this many phases: the bit chatters and time no longer advances."""
+CLOSE = 4.0 * 2.220446049250313e-16  # to which an event is located, as a share of its step
+ORDER = 7.0  # of the lower of the pair, which the length of a step follows
+
+DRIVE_PERIOD = SampledDrive._fields.index("period")
+
+DONE, MORE, TOO_SHORT, CHATTERS, NOT_FINITE = range(5)
+"""How a call ends: at the end of the run, out of room or steps, or for good."""
+
+
+class Clock(NamedTuple):
+    """What a run is asked for, and where it is; one number an array so that calls can change it."""
+
+    tolerance: float
+    duration: float  # s
+    room: int  # steps that the tape has room for
+    kept: Any  # states that are kept of each step
+    breaks: Any  # times at which a program begins, ends or jumps (s)
+    now: Any  # shape (6,): time, length of the next step, end of the piece, its begin; margins
+    count: Any  # shape (7,): phase, in a piece, pieces, changes, crossings, extremes, steps refused
+    # shape (room, 4): begin, end, phase and first step; (room, 3): time, release or stick,
+    # direction; (room, 2): time and angle, time and speed
+    pieces: Any
+    changes: Any
+    crossings: Any
+    extremes: Any
+
+
+TIME, STEP, STOP, PIECE_BEGIN, MARGINS = range(5)
+PHASE, IN_PIECE, PIECES, CHANGES, CROSSINGS, EXTREMES, REFUSED = range(7)
+
+
+@compiled
+def direction_of(rig: Any, phase: int) -> int:
+    """Direction of slip; 0 where the bit counts as stuck."""
+    return phase if abs(phase) == 1 else 0
+
+
+# The edges of the printed law.
+
+
+@compiled
+def _border(rig: Any, side: int) -> float:
+    return side * rig.tolerance - rig.set_speed
+
+
+@compiled
+def _beyond(rig: Any, state: Any, side: int) -> float:
+    """How far the bit turns beyond an edge (rad/s), exactly zero at it."""
+    return side * (state[2 * rig.nodes - 1] - _border(rig, side))
+
+
+@compiled
+def _overload(rig: Any, time: float, state: Any) -> float:
+    """Pipe torque beyond the static one (N m)."""
+    return abs(pipe_torque(rig, state)) - static_torque(rig, time, state)
+
+
+@compiled
+def _side(phase: int) -> int:
+    """Side of the tolerance of a phase at or beyond an edge."""
+    if phase == FORWARD_EDGE:
+        return 1
+    return -1 if phase == BACKWARD_EDGE else phase
+
+
+@compiled
+def _edge_margins(
+    rig: Any, time: float, state: Any, side: int, holding: float
+) -> tuple[float, float]:
+    """What keeps a bit at an edge (N m): against leaving outward, and inward.
+
+    The bit keeps its speed under the holding torque. It turns faster where Equation 5 takes
+    less than that, and falls back where Equation 3 or 4 takes more.
+    """
+    static = static_torque(rig, time, state)
+    within = min(max(pipe_torque(rig, state), -static), static)
+    turning = side * friction(rig, time, state, side * bit_speed(rig, state))
+    return side * (turning - holding), side * (holding - within) + ROUNDING * static
+
+
+@compiled
+def _holding(rig: Any, trial: Any, time: float, state: Any) -> float:
+    """Torque that keeps the bit at its speed (N m)."""
+    return rates_of(rig, time, STUCK, state, trial)
+
+
+@compiled
+def _within(rig: Any, trial: Any, time: float, state: Any) -> int:
+    """Equation 3 or 4: by the pipe's torque in a moment, as now it may be at its limit."""
+    rates_of(rig, time, CREEPING, state, trial)
+    for i in range(len(state)):
+        trial[i] = state[i] + AHEAD * trial[i]
+    return PUSHED if _overload(rig, time + AHEAD, trial) > 0.0 else CREEPING
+
+
+@compiled
+def _at_edge(rig: Any, trial: Any, time: float, state: Any, side: int) -> int:
+    """Phase of a bit at an edge: out of the tolerance, into it, or along the edge."""
+    holding = _holding(rig, trial, time, state)
+    outward, inward = _edge_margins(rig, time, state, side, holding)
+    if outward < 0.0:
+        return side
+    if inward < 0.0:
+        return _within(rig, trial, time, state)
+    return FORWARD_EDGE if side == 1 else BACKWARD_EDGE
+
+
+@compiled
+def _printed_phase(rig: Any, trial: Any, time: float, state: Any) -> int:
+    for side in (1, -1):
+        beyond = _beyond(rig, state, side)
+        if beyond > 0.0:
+            return side
+        if beyond == 0.0:
+            return _at_edge(rig, trial, time, state, side)
+    return _within(rig, trial, time, state)
+
+
+# From phase to phase.
+
+
+@compiled
+def _loose(rig: Any, trial: Any, time: float, state: Any, slack: float) -> int:
+    """The direction in which a bit at rest breaks loose, or 0 while the rock can hold it."""
+    holding = _holding(rig, trial, time, state)
+    if abs(holding) <= static_torque(rig, time, state) * slack:
+        return STUCK
+    return 1 if holding > 0.0 else -1
+
+
+@compiled
+def first_phase(rig: Any, trial: Any, time: float, state: Any) -> int:
+    """Phase at the very start; under a smooth law always +1."""
+    if rig.tolerance > 0.0:
+        return _printed_phase(rig, trial, time, state)
+    speed = bit_speed(rig, state)
+    if not rig.set_valued or speed > 0.0:
+        return 1
+    return -1 if speed < 0.0 else _loose(rig, trial, time, state, 1.0)
+
+
+@compiled
+def _next_phase(rig: Any, trial: Any, time: float, phase: int, state: Any) -> int:
+    """Phase after one that ended by itself."""
+    if phase >= FORWARD_EDGE:
+        side = _side(phase)
+        holding = _holding(rig, trial, time, state)
+        outward, inward = _edge_margins(rig, time, state, side, holding)
+        return side if outward <= inward else _within(rig, trial, time, state)
+    if rig.tolerance > 0.0:
+        return _printed_phase(rig, trial, time, state)
+    if phase == STUCK:
+        return 1 if _holding(rig, trial, time, state) > 0.0 else -1
+    return _loose(rig, trial, time, state, 1.0)
+
+
+@compiled
+def _phase_after_stop(rig: Any, trial: Any, time: float, phase: int, state: Any) -> int:
+    """Phase after a stop: a stuck bit may be loose at once, by a jump of weight or torque."""
+    if abs(phase) == 1:
+        return phase
+    if rig.tolerance > 0.0:
+        return _printed_phase(rig, trial, time, state)
+    return _loose(rig, trial, time, state, 1.0 + 1e-12)
+
+
+@compiled
+def _put_at_end(rig: Any, time: float, phase: int, state: Any) -> None:
+    """A phase ended by itself: put the bit at rest, or at an edge, not to the locator's rounding.
+
+    Between the edges only if it ended at one, and not where Equations 3 and 4 met.
+    """
+    last = 2 * rig.nodes - 1
+    if rig.tolerance == 0.0:
+        state[last] = -rig.set_speed
+        return
+    side = _side(phase)
+    if phase in (CREEPING, PUSHED):
+        side = 1 if bit_speed(rig, state) > 0.0 else -1
+        to_edge = abs(_beyond(rig, state, side)) / rig.tolerance
+        static = static_torque(rig, time, state)
+        if abs(_overload(rig, time, state)) / static < to_edge:
+            return
+    state[last] = _border(rig, side)
+
+
+# Stops.
+
+
+@compiled
+def _next_stop(rig: Any, clock: Any, time: float) -> float:
+    """Next time (s) at which a controller works, a signal is read or a program turns."""
+    stop = clock.duration
+    if rig.drive_kind == SAMPLED:
+        period = law(rig, DRIVE)[DRIVE_PERIOD]
+        stop = min(stop, (math.floor(time / period * (1.0 + 1e-12)) + 1.0) * period)
+    if rig.weight_kind != AT_ONCE:
+        path = law(rig, PATH)
+        delay, every, window = path[DELAY], path[PERIOD], path[WINDOW]
+        if rig.weight_kind == ALARMED:
+            k = max(1.0, math.floor((time - delay + LATE) / window) + 1.0)
+            stop = min(stop, k * window + delay)
+        elif every > 0.0:
+            k = max(0.0, math.floor((time - delay + LATE) / every) + 1.0)
+            stop = min(stop, k * every + delay)
+        elif delay > 0.0:  # the method of steps: what comes late is known before it is asked for
+            stop = min(stop, time + delay)
+    for moment in clock.breaks:
+        if moment > time:
+            return min(stop, moment)
+    return stop
+
+
+@compiled
+def _stop(rig: Any, time: float, state: Any) -> None:
+    """What happens at a stop."""
+    if rig.drive_kind == SAMPLED:
+        turns = time / law(rig, DRIVE)[DRIVE_PERIOD]
+        if abs(turns - round(turns)) < 1e-6:
+            sample_drive(rig, time, state)
+    if rig.weight_kind != AT_ONCE:
+        read_weight(rig, time, state)
+
+
+# Events.
+
+
+@compiled
+def _margin(rig: Any, time: float, phase: int, which: int, torque: float, state: Any) -> float:
+    """What is left until a phase ends, by its first or second way to end; 1 if there is none.
+
+    Exactly zero is where the phase came from, in a step too short to move the bit.
+    """
+    tiny = 1e-300
+    if which == 1 and phase not in (CREEPING, PUSHED):
+        return 1.0
+    if phase == STUCK:
+        return static_torque(rig, time, state) - abs(torque)
+    if phase >= FORWARD_EDGE:
+        outward, inward = _edge_margins(rig, time, state, _side(phase), torque)
+        return min(outward, inward)
+    if phase >= CREEPING:
+        if which == 1:
+            over = _overload(rig, time, state)
+            return over if phase == PUSHED else -over
+        return min(-_beyond(rig, state, 1), -_beyond(rig, state, -1)) or tiny
+    if rig.tolerance > 0.0:
+        return _beyond(rig, state, phase) or tiny
+    if rig.set_valued:
+        return phase * bit_speed(rig, state) or tiny
+    return 1.0
+
+
+@compiled
+def _decide(rig: Any, time: float, phase: int, what: int, state: Any, unused: Any) -> int:
+    """What happens between two pieces; returns the phase that follows."""
+    if what == BEGIN_RUN:
+        if rig.weight_kind != AT_ONCE:
+            begin_weight(rig, state)
+        _stop(rig, time, state)
+        return first_phase(rig, unused, time, state)
+    if what == AT_STOP:
+        _stop(rig, time, state)
+        return _phase_after_stop(rig, unused, time, phase, state)
+    _put_at_end(rig, time, phase, state)
+    return _next_phase(rig, unused, time, phase, state)
+
+
+BEGIN_RUN, AT_STOP, BY_ITSELF = range(3)  # what there is to decide
+_MARGIN = (types.float64, types.int64, types.int64, types.float64)
+_DECISION = (types.float64, types.int64, types.int64)
+_margin_of, _decided = by_address("margin", _MARGIN, 1), by_address("decision", _DECISION, 2)
+
+
+@cache
+def addresses() -> dict[str, int]:
+    """Where the functions lie that a rig is run with, by the fields of `RIG`."""
+    return {
+        "rates": callable_at(rates_in_place, TIME_AND_PHASE, 2),
+        "margin": callable_at(_margin, _MARGIN, 1),
+        "decision": callable_at(_decide, _DECISION, 2),
+    }
+
+
+@compiled
+def _value(
+    which: int, rig: Any, work: Any, row: Any, phase: int, state: Any, share: float
+) -> float:
+    """A function of the share of a step: margins (0, 1), bit speed (2), its slope (3)."""
+    if which == 2:
+        return on_tape(row, BIT_SPEED, share)
+    if which == 3:
+        return slope_on_tape(row, BIT_SPEED, share)
+    time, torque = row[BEGIN] + share * row[LENGTH], 0.0
+    state_at(work, state, share, work.trial)
+    if is_held(phase):
+        torque = rates_of(rig, time, phase, work.trial, work.stages[1])
+    return _margin_of(rig, time, phase, which, torque, work.trial)
+
+
+@compiled
+def _locate(
+    which: int, rig: Any, work: Any, row: Any, phase: int, state: Any,
+    low_value: float, high_value: float,
+) -> float:  # fmt: skip
+    """The share of a step at which a function changes its sign (Chandrupatla 1997)."""
+    a, fa, b, fb = 1.0, high_value, 0.0, low_value
+    c, fc, t = a, fa, 0.5
+    for _ in range(100):
+        x = a + t * (b - a)
+        fx = _value(which, rig, work, row, phase, state, x)
+        if (fx > 0.0) == (fa > 0.0):
+            c, fc = a, fa
+        else:
+            c, b, fc, fb = b, a, fb, fa
+        a, fa = x, fx
+        best, least = (a, fa) if abs(fa) < abs(fb) else (b, fb)
+        limit = CLOSE / abs(b - c) if b != c else 1.0
+        if limit > 0.5 or least == 0.0:
+            return best
+        ratio, third = (a - b) / (c - b), (fa - fb) / (fc - fb)
+        if third * third < ratio and (1.0 - third) ** 2 < 1.0 - ratio:
+            t = fa / (fb - fa) * fc / (fb - fc)
+            t += (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+        else:
+            t = 0.5
+        t = min(max(t, limit), 1.0 - limit)
+    return a
+
+
+# The run.
+
+
+@on_disk
+def begin(rigs: Any, clock: Any, work: Any, state: Any) -> None:
+    """Time zero: the weight's reading, the controller's first sample, the first phase."""
+    clock.count[PHASE] = int(_decided(rigs[0], 0.0, 1, BEGIN_RUN, state, work.trial))
+
+
+@compiled
+def _begin_piece(rig: Any, clock: Any, work: Any, state: Any) -> None:
+    now, phase = clock.now, clock.count[PHASE]
+    time = now[TIME]
+    torque = rates_of(rig, time, phase, state, work.stages[0])
+    now[STOP], now[PIECE_BEGIN] = _next_stop(rig, clock, time), time
+    now[STEP] = first_length(
+        rig, work, time, now[STOP], _longest(phase), clock.tolerance, ORDER + 1.0, phase, state
+    )
+    for which in range(2):
+        now[MARGINS + which] = _margin_of(rig, time, phase, which, torque, state)
+    clock.pieces[clock.count[PIECES], 3] = rig.steps
+    clock.count[IN_PIECE] = 1
+
+
+@compiled
+def _longest(phase: int) -> float:
+    return WITHIN_STEP if phase >= CREEPING else LONGEST_STEP
+
+
+@compiled
+def _end_piece(rig: Any, clock: Any, work: Any, state: Any, by_itself: bool) -> None:
+    """Close a piece, and go over to the next phase."""
+    count, time = clock.count, clock.now[TIME]
+    phase, piece = count[PHASE], clock.pieces[count[PIECES]]
+    piece[0], piece[1], piece[2] = clock.now[PIECE_BEGIN], time, phase
+    count[PIECES] += 1
+    count[IN_PIECE] = 0
+    if time >= clock.duration:
+        return
+    what = BY_ITSELF if by_itself else AT_STOP
+    after = int(_decided(rig, time, phase, what, state, work.trial))
+    if after == phase and not by_itself:
+        return
+    count[PHASE] = after
+    change, direction = clock.changes[count[CHANGES]], direction_of(rig, after)
+    change[0], change[1], change[2] = time, direction != 0, direction
+    # A change between two phases of a bit that counts as stuck is none for the user.
+    change[3] = direction != 0 or direction_of(rig, phase) != 0
+    count[CHANGES] += 1
+
+
+@compiled
+def _has_room(rig: Any, clock: Any) -> bool:
+    count = clock.count
+    return (
+        rig.steps + 1 < clock.room
+        and count[PIECES] + 1 < len(clock.pieces)
+        and count[CHANGES] + 1 < len(clock.changes)
+        and count[CROSSINGS] + 1 < len(clock.crossings)
+        and count[EXTREMES] + 1 < len(clock.extremes)
+    )
+
+
+@compiled
+def _try_step(rig: Any, method: Any, clock: Any, work: Any, state: Any) -> tuple[float, float]:
+    """Take a step within the tolerance; its length, 0 if there is none, and the bit torque."""
+    now, phase, tolerance = clock.now, clock.count[PHASE], clock.tolerance
+    time, end = now[TIME], now[STOP]
+    least = 10.0 * (math.nextafter(time, math.inf) - time)
+    length, refused = min(max(now[STEP], least), _longest(phase)), False
+    while length >= least:
+        step = min(length, end - time)
+        torque = explicit_step(rig, method, work, time, step, phase, state)
+        error = explicit_error(method, work, step, tolerance, state)
+        if error < 1.0:
+            factor = LARGEST if error == 0.0 else min(LARGEST, SAFETY * error ** (-1.0 / 8.0))
+            now[STEP] = step * (min(1.0, factor) if refused else factor)
+            return step, torque
+        refused = True
+        clock.count[REFUSED] += 1
+        factor = SMALLEST
+        if error < math.inf:
+            factor = max(SMALLEST, SAFETY * error ** (-1.0 / 8.0))
+        length = step * factor
+    return 0.0, 0.0
+
+
+@compiled
+def _keep_step(
+    rig: Any, method: Any, clock: Any, work: Any, sums: Any, state: Any, step: float,
+    torque: float,
+) -> bool:  # fmt: skip
+    """Record a step and its events, move on; whether the phase ended by itself."""
+    now, phase, last = clock.now, clock.count[PHASE], 2 * rig.nodes - 1
+    time = now[TIME]
+    explicit_dense(rig, method, work, time, step, phase, state)
+    row = tape_row(rig, rig.steps)
+    explicit_record(
+        method, work, time, step, state, sums[0 if is_held(phase) else 1], clock.kept, row
+    )
+    rig.steps += 1
+    values, until = work.values, 2.0
+    values[:2] = now[MARGINS : MARGINS + 2]
+    values[2], values[3] = state[last], work.stages[0, last]
+    for which in range(2):
+        values[4 + which] = _margin_of(rig, time + step, phase, which, torque, work.after)
+    values[6], values[7] = work.after[last], work.stages[STAGES, last]
+    now[MARGINS : MARGINS + 2] = values[4:6]
+    for which in range(4):
+        before, after = values[which], values[4 + which]
+        if not _happens(which, phase, before, after):
+            continue
+        if which < 2 and until == 2.0:
+            explicit_whole(method, work, step, state)
+        share = _locate(which, rig, work, row, phase, state, before, after)
+        if which < 2:
+            until = min(until, share)
+        elif share <= until:
+            _note(which, clock, row, share)
+    if until <= 1.0:
+        now[TIME] = time + until * step
+        state_at(work, state, until, work.trial)
+        state[:] = work.trial
+        return True
+    now[TIME] = now[STOP] if step == now[STOP] - time else time + step
+    state[:] = work.after
+    work.stages[0] = work.stages[STAGES]
+    return False
+
+
+@compiled
+def _happens(which: int, phase: int, before: float, after: float) -> bool:
+    """Whether an event lies within a step: a margin comes down to zero, a value changes sign."""
+    down = before >= 0.0 and after <= 0.0
+    if which < 2:
+        return down
+    return abs(phase) == 1 and (down or (before <= 0.0 and after >= 0.0))
+
+
+@compiled
+def _note(which: int, clock: Any, row: Any, share: float) -> None:
+    """Keep when the bit turned at the set speed, and its angle; or of an extreme, its speed."""
+    count = clock.count
+    time = row[BEGIN] + share * row[LENGTH]
+    if which == 2:
+        event = clock.crossings[count[CROSSINGS]]
+        event[0], event[1] = time, on_tape(row, BIT_ANGLE, share)
+        count[CROSSINGS] += 1
+    else:
+        event = clock.extremes[count[EXTREMES]]
+        event[0], event[1] = time, on_tape(row, BIT_SPEED, share)
+        count[EXTREMES] += 1
+
+
+@on_disk
+def advance(
+    rigs: Any, method: Any, clock: Any, work: Any, sums: Any, state: Any, steps: int
+) -> int:
+    """Advance a run by at most so many steps."""
+    rig = rigs[0]
+    now, count = clock.now, clock.count
+    for _ in range(steps):
+        if not count[IN_PIECE]:
+            if now[TIME] >= clock.duration:
+                return DONE
+            _begin_piece(rig, clock, work, state)
+        step, torque = _try_step(rig, method, clock, work, state)
+        if step == 0.0:
+            return TOO_SHORT
+        ended = _keep_step(rig, method, clock, work, sums, state, step, torque)
+        if ended or now[TIME] >= now[STOP]:
+            _end_piece(rig, clock, work, state, ended)
+        if not math.isfinite(state[0]) or not math.isfinite(state[2 * rig.nodes - 1]):
+            return NOT_FINITE
+        if count[CHANGES] >= MOST_PHASES:
+            return CHATTERS
+        if not _has_room(rig, clock):
+            return MORE
+    return MORE
+
+
+def work_for(size: int) -> Work:
+    """Memory of the steps of a rig with so many states."""
+    stages, errors, dense = (np.zeros((rows, size)) for rows in (DENSE_STAGES, 3, 7))
+    return Work(stages, np.zeros(size), np.zeros(size), errors, np.zeros(20), np.zeros(8), dense)
+
+
+@cache
+def explicit_method() -> Tableau:
+    """The coefficients of the explicit steps."""
+    return tableau()

@@ -1,0 +1,260 @@
+"""Steps of the reference solver, compiled: adaptive, with dense output.
+
+`explicit`: the pair of order 8(5, 3) of Dormand & Prince with its dense output of order 7
+(Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, 1993).
+
+`stiff`: Rodas5P of order 5(4) with its dense output of order 4 (Steinebach, BIT Numer. Math. 63,
+27, 2023): linearly implicit, so that short pieces and stiff damping do not bound the step.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drillctl.simulation.reference_rates import (
+    BEGIN,
+    FIRST,
+    LENGTH,
+    compiled,
+    rates_of,
+)
+
+Array = NDArray[np.float64]
+
+STAGES, DENSE_STAGES = 12, 16
+TOGETHER = 4  # stages that a sum takes in at once
+SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 10.0  # of a change of the step's length
+
+
+class Tableau(NamedTuple):
+    """Coefficients of DOP853: a row for each stage, its weights that are not zero first."""
+
+    a: Any  # shape (16, 16): weights
+    of: Any  # shape (16, 16): stages that they belong to
+    count: Any  # shape (16,): how many, filled up to a multiple of `TOGETHER`
+    c: Any  # shape (16,): times
+    errors: Any  # shape (2, 16): error estimates of order 5 and 3, then
+    errors_of: Any
+    errors_count: Any
+    dense: Any  # shape (4, 16)
+
+
+def tableau() -> Tableau:
+    """The coefficients as SciPy holds them."""
+    from scipy.integrate import DOP853
+
+    a = np.zeros((DENSE_STAGES, DENSE_STAGES))
+    a[:STAGES, :STAGES] = DOP853.A
+    a[STAGES, :STAGES] = DOP853.B
+    a[STAGES + 1 :] = DOP853.A_EXTRA
+    errors = np.zeros((2, DENSE_STAGES))
+    errors[0, : STAGES + 1], errors[1, : STAGES + 1] = DOP853.E5, DOP853.E3
+    c = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
+    return Tableau(*_without_zeros(a), c, *_without_zeros(errors), DOP853.D.copy())
+
+
+def _without_zeros(weights: Array) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+    """Weights that are not zero, the columns they stand in, how many with zeros to fill up."""
+    first = np.argsort(weights == 0.0, axis=1, kind="stable")
+    count = np.count_nonzero(weights, axis=1)
+    padded = -(-count // TOGETHER) * TOGETHER
+    return np.take_along_axis(weights, first, axis=1), first, padded
+
+
+class Work(NamedTuple):
+    """Memory of the steps, shared by all phases of a run."""
+
+    stages: Any  # shape (16, states)
+    trial: Any  # shape (states,): argument of a stage
+    after: Any  # shape (states,): end of the step
+    errors: Any  # shape (3, states)
+    scratch: Any  # shape (20,)
+    values: Any  # shape (8,): of events, at both ends of a step
+    dense: Any  # shape (7, states): whole dense output, where asked for
+
+
+@compiled
+def _combine(
+    stages: Any, weights: Any, of: Any, count: int, step: float, state: Any, out: Any
+) -> None:
+    """State + step times a sum of stages, four at a time: a sum is loaded and stored less often."""
+    size = len(state)
+    for i in range(size):
+        out[i] = state[i]
+    for j in range(0, count, TOGETHER):
+        a, b = step * weights[j], step * weights[j + 1]
+        c, d = step * weights[j + 2], step * weights[j + 3]
+        one, two, three, four = (
+            stages[of[j]],
+            stages[of[j + 1]],
+            stages[of[j + 2]],
+            stages[of[j + 3]],
+        )
+        for i in range(size):
+            out[i] += (a * one[i] + b * two[i]) + (c * three[i] + d * four[i])
+
+
+@compiled
+def _stages(
+    rig: Any, method: Any, work: Any, time: float, step: float, phase: int, state: Any,
+    first: int, last: int,
+) -> float:  # fmt: skip
+    """Rates of some stages; returns the bit torque of the last of them."""
+    torque = 0.0
+    for k in range(first, last):
+        _combine(work.stages, method.a[k], method.of[k], method.count[k], step, state, work.trial)
+        torque = rates_of(rig, time + method.c[k] * step, phase, work.trial, work.stages[k])
+    return torque
+
+
+@compiled
+def explicit_step(
+    rig: Any, method: Any, work: Any, time: float, step: float, phase: int, state: Any
+) -> float:
+    """One trial step from a state whose rates are in the first stage; returns the bit torque."""
+    torque = _stages(rig, method, work, time, step, phase, state, 1, STAGES + 1)
+    for i in range(len(state)):
+        work.after[i] = work.trial[i]
+    return torque
+
+
+@compiled
+def explicit_dense(
+    rig: Any, method: Any, work: Any, time: float, step: float, phase: int, state: Any
+) -> None:
+    """The stages that only the dense output needs."""
+    _stages(rig, method, work, time, step, phase, state, STAGES + 1, DENSE_STAGES)
+
+
+@compiled
+def explicit_error(method: Any, work: Any, step: float, tolerance: float, state: Any) -> float:
+    """Estimated error of a step over the tolerance, as Hairer weighs the two estimates."""
+    size, total, after = len(state), work.errors, work.after
+    for k in range(2):
+        for i in range(size):
+            total[2, i] = 0.0
+        _combine(
+            work.stages, method.errors[k], method.errors_of[k], method.errors_count[k], 1.0,
+            total[2], total[k],
+        )  # fmt: skip
+    fifth, third = 0.0, 0.0
+    for i in range(size):
+        scale = 1.0 / (tolerance + tolerance * max(abs(state[i]), abs(after[i])))
+        fifth += (total[0, i] * scale) ** 2
+        third += (total[1, i] * scale) ** 2
+    if fifth == 0.0 and third == 0.0:
+        return 0.0
+    return step * fifth / math.sqrt((fifth + 0.01 * third) * size)
+
+
+@compiled
+def _write(row: Any, component: int, begin: float, change: float, first: float, last: float,
+           high: Any) -> None:  # fmt: skip
+    """Eight numbers of a component; `first`, `last`: its rates at both ends times the step."""
+    place = FIRST + 8 * component
+    row[place] = begin
+    row[place + 1] = change
+    row[place + 2] = first - change
+    row[place + 3] = 2.0 * change - (first + last)
+    for k in range(4):
+        row[place + 4 + k] = high[k]
+
+
+@compiled
+def explicit_record(
+    method: Any, work: Any, time: float, step: float, state: Any, sums: Any, kept: Any, row: Any
+) -> None:
+    """Keep the dense output of some states and of sums of states."""
+    row[BEGIN], row[LENGTH] = time, step
+    high, summed = work.scratch[:4], work.scratch[4:]
+    for c in range(len(kept)):
+        i = kept[c]
+        for k in range(4):
+            total = 0.0
+            for j in range(DENSE_STAGES):
+                total += method.dense[k, j] * work.stages[j, i]
+            high[k] = step * total
+        _write(row, c, state[i], work.after[i] - state[i], step * work.stages[0, i],
+               step * work.stages[STAGES, i], high)  # fmt: skip
+    for c in range(len(sums)):
+        weights, length = sums[c], sums.shape[1]
+        begin, end = 0.0, 0.0
+        for i in range(length):
+            begin += weights[i] * state[i]
+            end += weights[i] * work.after[i]
+        for j in range(DENSE_STAGES):
+            summed[j] = 0.0
+            for i in range(length):
+                summed[j] += weights[i] * work.stages[j, i]
+        for k in range(4):
+            high[k] = 0.0
+            for j in range(DENSE_STAGES):
+                high[k] += step * method.dense[k, j] * summed[j]
+        _write(row, len(kept) + c, begin, end - begin, step * summed[0],
+               step * summed[STAGES], high)  # fmt: skip
+
+
+@compiled
+def explicit_whole(method: Any, work: Any, step: float, state: Any) -> None:
+    """The dense output of every state."""
+    dense, stages = work.dense, work.stages
+    for i in range(len(state)):
+        change = work.after[i] - state[i]
+        dense[0, i] = change
+        dense[1, i] = step * stages[0, i] - change
+        dense[2, i] = 2.0 * change - step * (stages[STAGES, i] + stages[0, i])
+        for k in range(4):
+            total = 0.0
+            for j in range(DENSE_STAGES):
+                total += method.dense[k, j] * stages[j, i]
+            dense[3 + k, i] = step * total
+
+
+@compiled
+def state_at(work: Any, state: Any, share: float, out: Any) -> None:
+    """Every state at a share of the step, from its whole dense output."""
+    dense, rest = work.dense, 1.0 - share
+    for i in range(len(state)):
+        value = dense[6, i] * share
+        value = (value + dense[5, i]) * rest
+        value = (value + dense[4, i]) * share
+        value = (value + dense[3, i]) * rest
+        value = (value + dense[2, i]) * share
+        value = (value + dense[1, i]) * rest
+        value = (value + dense[0, i]) * share
+        out[i] = state[i] + value
+
+
+@compiled
+def first_length(
+    rig: Any, work: Any, time: float, end: float, longest: float, tolerance: float,
+    order: float, phase: int, state: Any,
+) -> float:  # fmt: skip
+    """Length of a first step, from the rates and how fast they change (Hairer et al., II.4)."""
+    size = len(state)
+    rates, second = work.stages[0], work.stages[1]
+    at_rest, moving = 0.0, 0.0
+    for i in range(size):
+        scale = tolerance + tolerance * abs(state[i])
+        at_rest += (state[i] / scale) ** 2
+        moving += (rates[i] / scale) ** 2
+    at_rest, moving = math.sqrt(at_rest / size), math.sqrt(moving / size)
+    guess = 1e-6 if at_rest < 1e-5 or moving < 1e-5 else 0.01 * at_rest / moving
+    guess = min(guess, end - time)
+    for i in range(size):
+        work.trial[i] = state[i] + guess * rates[i]
+    rates_of(rig, time + guess, phase, work.trial, second)
+    change = 0.0
+    for i in range(size):
+        scale = tolerance + tolerance * abs(state[i])
+        change += ((second[i] - rates[i]) / scale) ** 2
+    change = math.sqrt(change / size) / guess
+    if moving <= 1e-15 and change <= 1e-15:
+        length = max(1e-6, guess * 1e-3)
+    else:
+        length = (0.01 / max(moving, change)) ** (1.0 / order)
+    return min(min(100.0 * guess, length), min(end - time, longest))
