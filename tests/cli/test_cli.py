@@ -233,7 +233,7 @@ def test_map_json(call):
     held = {path.name for path in Path("m").iterdir()}
     assert held == {
         "design.toml", "run.json", "summary.json", "data.zarr", "result.json", "map.csv",
-        "regions.csv", "map.png", "responses.png",
+        "regions.csv", "statuses.csv", "map.png", "responses.png",
     }  # fmt: skip
     assert parsed(Path("m/summary.json").read_text()) == found
 

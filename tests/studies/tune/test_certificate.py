@@ -13,7 +13,7 @@ from drillctl.ensemble.cases import share_interval
 from drillctl.ensemble.draws import drawn_lanes, run_draws
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
-from drillctl.reporting.blocks import Figure, Table, Text, Words
+from drillctl.reporting.blocks import Checks, Figure, Table, Text, Words
 from drillctl.reporting.gather import Gathered, NotThereError, Study
 from drillctl.reporting.sections import SECTIONS
 from drillctl.store.json_files import strict
@@ -294,6 +294,9 @@ def test_its_section_of_a_report_holds_its_message_tables_and_pictures(found, tm
     ]
     drawn = [block.name for block in blocks if isinstance(block, Figure)]
     assert drawn == ["baselines", "neighbourhood"]
+    ((check,),) = (block.checks for block in blocks if isinstance(block, Checks))
+    assert check.answer == found.certificate.passed
+    assert "at fresh draws" in check.question
 
 
 def test_runs_without_an_answer_are_null_and_come_back(found, tmp_path):
