@@ -58,14 +58,19 @@ def resolve(place: str) -> Any:
     return getattr(import_module(module), name)
 
 
-def at_first_use(package: str, modules: Mapping[str, tuple[str, ...]]) -> Callable[[str], Any]:
-    """The `__getattr__` of a package: each of its names is imported when it is first used."""
+def at_first_use(
+    package: str, modules: Mapping[str, tuple[str, ...]], place: str = ""
+) -> Callable[[str], Any]:
+    """The `__getattr__` of a package: each of its names is imported when it is first used.
+
+    `place`: package that the modules are in, by default this one.
+    """
     home = {name: module for module, names in modules.items() for name in names}
 
     def look_up(name: str) -> Any:
         if name not in home:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return resolve(f"{package}.{home[name]}:{name}")
+        return resolve(f"{place or package}.{home[name]}:{name}")
 
     return look_up
 

@@ -49,7 +49,7 @@ def perform(study: Study, design: Design, options: dict[str, Any], common: Commo
     else:
         with guarded(folder, study), console.progress() as bar, console.library_output_on_stderr():
             run = Run(options, bar, folder.path, common.units, common.verbose)
-            result = study.compute(design, run)
+            result = study.computed(design, run)
         _write(study, result, folder, common)
         for note in study.notes(result):
             console.note(note)

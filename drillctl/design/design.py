@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -68,6 +70,20 @@ class Design:
         except InputError as error:
             raise (error.within(self.origin) if self.origin else error) from None
         return Design(self.name, validated(tree, self.origin), tree, self.origin)
+
+    def where(self, key: str) -> str:
+        """A key after the file that it is in, for messages."""
+        return f"{self.origin}: {key}" if self.origin else key
+
+    @contextmanager
+    def within(self, place: str) -> Iterator[None]:
+        """Name a place of the file in front of the key of an `InputError`."""
+        try:
+            yield
+        except InputError as error:
+            key = error.where.removeprefix(self.origin).removeprefix(": ")
+            where = self.where(f"{place}: {key}".removesuffix(": "))
+            raise InputError(error.problem, where) from None
 
     @property
     def speed(self) -> float:

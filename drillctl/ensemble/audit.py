@@ -10,18 +10,15 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.ensemble.grid import Axis, cell_design, shape_of
 from drillctl.errors import SimulationError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.codec import label
-
-Array = NDArray[np.float64]
+from drillctl.store.codec import Array, Index, label
 
 SEED = 20121  # seed of the choice of cells: the same map is audited at the same cells
-WORST_ALLOWED = 1e-2  # relative difference in J1 above which a map says `audit: check`
+WORST_ALLOWED = 1e-2  # relative difference in J1 above which the verdict is `check`
 TOLERANCE = 1e-7  # tolerance of the reference solver in an audit: J1 to some 1e-7
 
 
@@ -29,9 +26,7 @@ TOLERANCE = 1e-7  # tolerance of the reference solver in an audit: J1 to some 1e
 class Audit:
     """Batch engine against reference solver at some cells."""
 
-    cells: NDArray[np.int64] = label(
-        "audited", name="audited_{of}", means="index in the flattened map"
-    )
+    cells: Index = label("audited", name="audited_{of}", means="index in the flattened map")
     batch: Array = label("audited", unit="s", name="audited_{of}_by_batch", means="J1 of the map")
     reference: Array = label(
         "audited", unit="s", name="audited_j1",
@@ -80,7 +75,7 @@ def unaudited(of: str = "cell") -> Audit:
     return Audit(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0), of)
 
 
-def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> NDArray[np.int64]:
+def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> Index:
     """Cells to audit: a seeded random sample, spread over the levels."""
     flat = np.nan_to_num(values.ravel(), nan=np.inf)
     random = np.random.default_rng(SEED)
@@ -150,7 +145,7 @@ def reference_j1(design: Design) -> float:
 
     table = design.tables.simulation
     try:
-        with np.errstate(all="ignore"):  # a run that grows without bound is told as failed
+        with np.errstate(all="ignore"):  # a run that grows without bound counts as failed
             motion = solve(design, tolerance=TOLERANCE)
     except (SimulationError, ArithmeticError, np.linalg.LinAlgError):
         return float("nan")

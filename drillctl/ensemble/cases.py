@@ -13,11 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.store.codec import label
+from drillctl.simulation.measures import MEASURES, STATUSES, status_counts
+from drillctl.store.codec import Array, Index, Mask, label
 from drillctl.store.tables import Estimate, open_estimate
 
-Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 CONFIDENCE = 0.95  # of every interval
@@ -143,7 +142,7 @@ class Runs:
             "defined": int(values.size),
         }
 
-    def under(self, level: float) -> NDArray[np.bool_]:
+    def under(self, level: float) -> Mask:
         """Draws with J1 at or under a level (s); one that failed is not."""
         return np.asarray(np.nan_to_num(self.measures["j1"], nan=np.inf) <= level)
 
@@ -156,15 +155,14 @@ class Runs:
         return mean_estimate(self.under(level).astype(float) - baseline.under(level), seed)
 
     @property
-    def ended(self) -> NDArray[np.bool_]:
+    def ended(self) -> Mask:
         """Draws in which stick-slip has ended; one that failed is not."""
         still = [STATUSES.index(name) for name in ("sticking", "stalled", "failed")]
         return ~np.isin(self.status, still)
 
     def counts(self) -> dict[str, int]:
         """Number of draws by status, those that occur."""
-        results = {name: int((self.status == code).sum()) for code, name in enumerate(STATUSES)}
-        return {name: count for name, count in results.items() if count}
+        return status_counts(self.status)
 
 
 def joined(runs: Sequence[Runs], join: Callable[[list[NDArray[Any]]], NDArray[Any]]) -> Runs:
@@ -179,7 +177,7 @@ def scheme_of(runs: Iterable[Runs]) -> tuple[float | None, int | None]:
     return schemes.pop() if len(schemes) == 1 else (None, None)
 
 
-def share_of(hits: NDArray[np.bool_]) -> Share:
+def share_of(hits: Mask) -> Share:
     """Share of the draws in which something holds."""
     return Share(int(hits.sum()), len(hits))
 
@@ -190,9 +188,7 @@ def share_interval(hits: int, total: int) -> Interval:
     return float(low[0]), float(high[0])
 
 
-def share_intervals(
-    hits: NDArray[np.int64], total: int, confidence: float = CONFIDENCE
-) -> tuple[Array, Array]:
+def share_intervals(hits: Index, total: int, confidence: float = CONFIDENCE) -> tuple[Array, Array]:
     """Clopper-Pearson intervals of many probabilities.
 
     Clopper & Pearson, Biometrika 26 (1934) 404-413: each holds the probability with at least
@@ -251,7 +247,7 @@ def _resampled_means(values: Array, seed: int) -> Array:
     return np.concatenate(means)
 
 
-def resampled_draws(count: int, seed: int) -> NDArray[np.int64]:
+def resampled_draws(count: int, seed: int) -> Index:
     """Draws of each resample of an objective, shape (resamples, draws).
 
     The same for all cases: the difference of two objectives is then resampled by pairs.

@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
@@ -29,6 +28,7 @@ from drillctl.rig.weight_on_bit import AlarmWeight, ConstantWeight
 from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
+from drillctl.store.codec import Array, Index
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class DrawnGroup:
 
     design: Design  # of the first of them
     lanes: Lanes  # one a draw
-    numbers: NDArray[np.int64]  # shape (lanes,): Position of each among all draws
+    numbers: Index  # shape (lanes,): Position of each among all draws
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Failures:
 
     reason: str  # key or cause
     count: int  # how many draws
-    example: str  # what was said of the first of them
+    example: str  # problem of the first of them
 
     def sentence(self, draws: int) -> str:
         """For people, of so many draws."""
@@ -86,7 +86,7 @@ def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
     parts = [[one] for one in possible]
     if not apart:
         parts = [[one for one in possible if one.design is kept] for kept in like.values()]
-    return DrawnLanes(tuple(_group(part) for part in parts), told(errors))
+    return DrawnLanes(tuple(_group(part) for part in parts), by_reason(errors))
 
 
 class _Drawn(NamedTuple):
@@ -111,15 +111,13 @@ def _group(part: list[_Drawn]) -> DrawnGroup:
     return DrawnGroup(design, lanes_of(design, columns), np.array([one.number for one in part]))
 
 
-def told(errors: list[InputError]) -> tuple[Failures, ...]:
+def by_reason(errors: list[InputError]) -> tuple[Failures, ...]:
     """Errors counted by the key that they name: their numbers differ from draw to draw."""
     by_key: dict[str, list[InputError]] = {}
     for error in errors:
         by_key.setdefault(error.where, []).append(error)
     return tuple(Failures(key, len(some), some[0].problem) for key, some in by_key.items())
 
-
-Array = NDArray[np.float64]
 
 START_UP = 20.0  # time (s) that `mean_weight_after_start` leaves out, of runs of 100 s and more
 START_UP_SHARE = 0.2  # and its largest share of shorter runs
@@ -167,8 +165,7 @@ def _after_start(lanes: Lanes, prepared: Prepared, whole: Array) -> Array:
     time = steps * scheme.step
     beginning = Prepared(prepared.stepper, replace(scheme, steps=steps), time, 0.0)
     before = measured(lanes, beginning, ("mean_weight_on_bit",)).measures["mean_weight_on_bit"]
-    late: Array = (whole * prepared.duration - before * time) / (prepared.duration - time)
-    return late
+    return np.asarray((whole * prepared.duration - before * time) / (prepared.duration - time))
 
 
 def shifted(lanes: Lanes, shift: float) -> Lanes:
@@ -229,7 +226,7 @@ def _allowed(drawn: DrawnLanes) -> tuple[float, float]:
 def _zero(
     excess: Callable[[float], float], low: float, high: float, scale: float
 ) -> tuple[float, float]:
-    """Where the excess vanishes, and what is left of it; the nearest found if it does not."""
+    """Where the excess vanishes, and what is left of it; the nearest if it does not."""
     known = {0.0: excess(0.0)}
     stride = 1.0
     while len(known) < MOST_SHIFTS:
@@ -273,6 +270,6 @@ class CommonDraws:
         return run_draws(self.lanes(design), self.count, shift)
 
     @cached_property
-    def resamples(self) -> NDArray[np.int64]:
+    def resamples(self) -> Index:
         """Draws of each resample of an objective, the same for all designs."""
         return resampled_draws(self.count, self.seed)

@@ -1,11 +1,9 @@
 """A grid over parameters of a design, and the lanes that it stands for.
 
-Lane numbers over a grid, each held along the axes that it varies over and no others.
-
-A grid of ten million cells over two parameters is two columns of some thousand numbers: the lanes
-of a block are made from them when the block is run.
-
-Grids that would not fit the memory, refused before anything is computed.
+Lane numbers are held along the axes that they vary over and no others: a grid of ten million cells
+over two parameters is two columns of some thousand numbers, and the lanes of a block are made from
+them when the block is run. Grids that would not fit the memory are refused before anything is
+computed.
 """
 
 from __future__ import annotations
@@ -20,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design, parameter
@@ -29,10 +26,8 @@ from drillctl.errors import InputError
 from drillctl.rig.top_drive.law import tracking
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.simulation.measures import BATCH_MEASURES
-from drillctl.store.codec import label
+from drillctl.store.codec import Array, Index, documented, label
 from drillctl.store.tables import texts
-
-Array = NDArray[np.float64]
 
 SHARED = (
     "drillstring.", "top_drive.", "bha.", "simulation.", "controller.drive.sampling_period",
@@ -42,22 +37,13 @@ SHARED = (
 
 
 @dataclass(frozen=True, eq=False)
+@documented
 class Axis:
-    """One axis of a grid.
+    """One axis of a grid."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted path of the parameter.
-    unit : str
-        Unit of `values`, empty for factors and counts.
-    values : ndarray, shape (points,)
-        In SI.
-    """
-
-    path: str
-    unit: str
-    values: Array = label("{path}", unit="{unit}", name="{path}")
+    path: str = label(means="dotted path of the parameter")
+    unit: str = label(means="unit of the values, empty for factors and counts")
+    values: Array = label("{path}", unit="{unit}", name="{path}", means="SI")
 
     @property
     def shared(self) -> bool:
@@ -157,7 +143,7 @@ class Group:
     def telling(self) -> Lanes:
         """Lanes that ask for the same scheme as all: the steepest rock, each turn of a program.
 
-        Found a part at a time, over those axes alone that matter.
+        Searched a part at a time, over those axes alone that matter.
         """
         numbers = self.numbers
         rock, program = numbers.varies(OF_THE_ROCK), numbers.varies(OF_THE_PROGRAM)
@@ -244,14 +230,19 @@ def _by_kind(design: Design, axes: tuple[Axis, ...], a: Axis) -> list[slice]:
     return [slice(i, j) for i, j in itertools.pairwise([*starts, len(a)])]
 
 
+def place_of(axes: tuple[Axis, ...], cell: int) -> dict[str, float]:
+    """Values (SI) of the axes by path at a cell of the flattened grid."""
+    where = np.unravel_index(cell, shape_of(axes)) if axes else ()
+    return {a.path: float(a.values[k]) for a, k in zip(axes, where, strict=True)}
+
+
 def cell_design(design: Design, axes: tuple[Axis, ...], cell: int) -> Design:
     """The design of one cell of the flattened grid."""
-    where = np.unravel_index(cell, shape_of(axes))
-    return replaced(design, {a.path: a.values[k] for a, k in zip(axes, where, strict=True)})
+    return replaced(design, place_of(axes, cell)) if axes else design
 
 
 def replaced(design: Design, values: dict[str, float]) -> Design:
-    """The design with SI values put in; an impossible one is told with its path and value."""
+    """The design with SI values put in; an impossible one is refused with its path and value."""
     try:
         return design.replace({path: units.SI(value) for path, value in values.items()})
     except InputError as error:
@@ -278,7 +269,7 @@ def _cell_by_cell(design: Design, axes: tuple[Axis, ...]) -> NumberGrid:
     for cell in range(int(np.prod(shape, dtype=int))):
         for key, value in lane_numbers(cell_design(design, axes, cell)).items():
             results.setdefault(key, np.empty(shape)).ravel()[cell] = value
-    return NumberGrid(shape, compact(results))
+    return NumberGrid(shape, {key: _compact(array) for key, array in results.items()})
 
 
 def _outer_product(design: Design, axes: tuple[Axis, ...]) -> NumberGrid | None:
@@ -309,19 +300,16 @@ def _outer_product(design: Design, axes: tuple[Axis, ...]) -> NumberGrid | None:
 
 
 def _right_at_corners(design: Design, axes: tuple[Axis, ...], grid: NumberGrid) -> bool:
-    """Whether every corner, resolved as a whole, is possible and what the grid says it is."""
+    """Whether every corner, resolved as a whole, is possible and what the grid gives."""
     for corner in itertools.product((0, -1), repeat=len(axes)):
         values = {a.path: a.values[k] for a, k in zip(axes, corner, strict=True)}
         numbers = lane_numbers(replaced(design, values) if axes else design)
         at = tuple(k % len(a) for a, k in zip(axes, corner, strict=True))
         cell = int(np.ravel_multi_index(at, grid.shape)) if axes else 0
-        said = grid.of(np.array([cell]))
-        if any(said[key][0] != value for key, value in numbers.items()):
+        given = grid.of(np.array([cell]))
+        if any(given[key][0] != value for key, value in numbers.items()):
             return False
     return True
-
-
-Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -368,12 +356,8 @@ class NumberGrid:
         return np.ravel_multi_index(np.unravel_index(inside, part), self.shape)
 
 
-def compact(values: dict[str, Array]) -> dict[str, Array]:
-    """Numbers over a whole grid, with the dimensions taken out along which they do not vary."""
-    return {key: _compact(array) for key, array in values.items()}
-
-
 def _compact(array: Array) -> Array:
+    """A number over a whole grid without the dimensions along which it does not vary."""
     for dimension in range(array.ndim):
         first = array.take([0], axis=dimension)
         if np.array_equal(np.broadcast_to(first, array.shape), array):
@@ -411,7 +395,7 @@ def refuse_more_bytes(needed: float, what: str, where: str, instead: str = "fewe
 
 
 def _free_memory() -> float:
-    """Memory that can be had (bytes); infinite where the system does not tell."""
+    """Memory that can be had (bytes); infinite where the system does not say."""
     info = Path("/proc/meminfo")
     if info.is_file():
         for line in info.read_text().splitlines():
@@ -429,7 +413,7 @@ def other_axes(
     """Axes of a result where they are not those that its design gives (`own`)."""
     axes = [[axis.path, axis.values.tolist()] for axis in result.axes]
     try:
-        found = own(result.design) if own else axes_of(result.design, result.design.tables.map.axes)
+        given = own(result.design) if own else axes_of(result.design, result.design.tables.map.axes)
     except InputError:  # the default ones do not fit every law
         return {"axes": axes}
-    return {} if axes == [[axis.path, axis.values.tolist()] for axis in found] else {"axes": axes}
+    return {} if axes == [[axis.path, axis.values.tolist()] for axis in given] else {"axes": axes}

@@ -28,8 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.ensemble.cases import CONFIDENCE, Interval, share_intervals
-
-Array = NDArray[np.float64]
+from drillctl.store.codec import Array, Index, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +37,14 @@ class Scatter:
 
     replicates: int  # independent sets that take turns; 1 where every realization is independent
     # of the realizations that are looked at, where those are not all from the first on
-    numbers: NDArray[np.int64] | None = None
+    numbers: Index | None = None
 
     @property
     def independent(self) -> bool:
         """Whether every realization is independent of the others."""
         return self.replicates == 1
 
-    def of(self, chosen: NDArray[np.bool_]) -> Scatter:
+    def of(self, chosen: Mask) -> Scatter:
         """The same of some of the realizations."""
         return self if chosen.all() else Scatter(self.replicates, np.flatnonzero(chosen))
 
@@ -59,11 +58,9 @@ class Scatter:
     def standard_error(self, influence: Array) -> Array:
         """Standard error of the mean of an influence function."""
         if self.independent:
-            error: Array = influence.std(axis=0, ddof=1) / np.sqrt(len(influence))
-            return error
+            return np.asarray(influence.std(axis=0, ddof=1) / np.sqrt(len(influence)))
         means = np.stack([influence[rows].mean(axis=0) for rows in self.rows(len(influence))])
-        spread: Array = means.std(axis=0, ddof=1) / np.sqrt(self.replicates)
-        return spread
+        return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(self.replicates))
 
     def quantile(self, confidence: float) -> float:
         """Half-width of a two-sided interval over the standard error."""
@@ -72,8 +69,6 @@ class Scatter:
         at = 0.5 * (1.0 + confidence)
         return float(norm.ppf(at) if self.independent else t.ppf(at, self.replicates - 1))
 
-
-Mask = NDArray[np.bool_]
 
 INNER, MEDIAN, OUTER = 0.95, 0.5, 0.05
 """Probabilities that bound the inner, the median and the outer region."""
@@ -90,21 +85,19 @@ class ProbabilityMap:
 
     level: float  # level of J1 (s)
     # shape of the map: Realizations at or under it; one that failed is not
-    counts: NDArray[np.int64]
+    counts: Index
     # shape (replicates, ...): The same of every replicate; of Monte Carlo there is one
-    by_replicate: NDArray[np.int64]
+    by_replicate: Index
     total: int  # realizations
 
     @property
     def probability(self) -> Array:
         """Share of the realizations."""
-        share: Array = self.counts / self.total
-        return share
+        return np.asarray(self.counts / self.total)
 
     def region(self, probability: float) -> Mask:
         """Cells where the level is kept with at least this probability."""
-        mask: Mask = self.counts >= needed(probability, self.total)
-        return mask
+        return np.asarray(self.counts >= needed(probability, self.total))
 
     @property
     def always(self) -> Mask:
@@ -137,7 +130,7 @@ class ProbabilityMap:
         each = self.by_replicate / (self.total // replicates)
         error = each.std(axis=0, ddof=1) / np.sqrt(replicates)
         half = t.ppf(0.5 * (1.0 + confidence), replicates - 1) * error
-        # Replicates that agree to the last realization tell no error; nor is it none.
+        # Replicates that agree to the last realization give no error; nor is it zero.
         alike = error == 0.0
         low = np.where(alike, exact[0], np.maximum(self.probability - half, 0.0))
         high = np.where(alike, exact[1], np.minimum(self.probability + half, 1.0))
@@ -227,7 +220,7 @@ def _bootstrap(
     return [(float(low), float(high)) for low, high in ends.T]
 
 
-def _may_change(counts: NDArray[np.int64], total: int, least: int) -> Mask:
+def _may_change(counts: Index, total: int, least: int) -> Mask:
     """Cells that a resample may move into a region or out of it."""
     from scipy.stats import binom
 

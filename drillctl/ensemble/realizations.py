@@ -17,10 +17,9 @@ import math
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
@@ -33,46 +32,12 @@ from drillctl.ensemble.running import Block, Pieces, Run, Strings, collect, load
 from drillctl.errors import InputError
 from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
-
-Array = NDArray[np.float64]
+from drillctl.store.codec import Array, Index, Mask
 
 LANES = 2**17  # lanes of a block: some seconds' work at most
 MOST = 4096  # realizations of a block at most
 
 Drawing = Callable[[int, int], dict[str, Array]]
-
-
-class Source(Protocol):
-    """Where the values of realizations come from."""
-
-    def drawing(self, design: Design) -> Drawing:
-        """A function of count and first: values of what is uncertain (SI), (count,), by path."""
-        ...
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """Realizations drawn as the design says."""
-
-    seed: int  # what they follow from
-
-    def drawing(self, design: Design) -> Drawing:
-        """Draws by their numbers."""
-        drawn = drawing(design, self.seed)
-        return lambda count, first: drawn(count, first).values
-
-
-@dataclass(frozen=True, eq=False)
-class Listed:
-    """Realizations given one by one."""
-
-    columns: dict[str, Array]  # shape (realizations,): Values (SI) by path
-
-    def drawing(self, design: Design) -> Drawing:
-        """Rows by their numbers."""
-        return lambda count, first: {
-            path: column[first : first + count] for path, column in self.columns.items()
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +46,7 @@ class Realizations:
 
     design: Design  # with what is uncertain, named or by default
     axes: tuple[Axis, ...]  # of the map; none for the design's own setting alone
-    source: Source  # of the realizations
+    source: int | dict[str, Array]  # seed of the draws; or values (SI) by path, one by one
     measures: tuple[str, ...]  # what is kept of a lane, J1 first
     # level (s) from which on a lane need not be known; None for all to their end
     censor: float | None
@@ -105,7 +70,7 @@ class Realizations:
         """Realizations of a block."""
         return min(max(1, LANES // self.width), MOST)
 
-    def pieces(self, done: NDArray[np.bool_]) -> Pieces:
+    def pieces(self, done: Mask) -> Pieces:
         """Blocks of the realizations that are not done."""
         return pieces(done, self.block)
 
@@ -119,7 +84,12 @@ class Realizations:
 
     @cached_property
     def _drawn(self) -> Drawing:
-        return self.source.drawing(self.design)
+        """A function of count and first: values of what is uncertain (SI), (count,), by path."""
+        source = self.source
+        if isinstance(source, dict):
+            return lambda count, first: {k: v[first : first + count] for k, v in source.items()}
+        drawn = drawing(self.design, source)
+        return lambda count, first: drawn(count, first).values
 
     @cached_property
     def _parts(self) -> list[_Part]:
@@ -181,7 +151,7 @@ class _CellByCell(NamedTuple):
     row: int
     design: Design
     numbers: dict[str, Array]
-    places: NDArray[np.int64]
+    places: Index
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,7 +217,7 @@ class _Part:
             yield self._run(some, lanes_of(like, self._columns(some, slice(None))), ready)
 
     def _resolved(self, row: int, drawn: dict[str, Any]) -> _Resolved | list[_CellByCell]:
-        """A realization's own numbers, or its cells by themselves where those do not tell all."""
+        """A realization's own numbers, or its cells by themselves where those do not suffice."""
         try:
             design = self.group.design.replace(drawn)
             numbers = lane_numbers(design)
@@ -327,7 +297,7 @@ class _Part:
         return slice(0, 1) if gains else slice(None)
 
     def _string_key(self, design: Design, numbers: dict[str, float]) -> Hashable:
-        """What tells the strings of realizations apart, beside the friction."""
+        """What the strings of realizations depend on, beside the friction."""
         return (kinds(design), tuple(numbers.get(key, 0.0) for key in TIMED))
 
     def _run(self, group: list[_Resolved], lanes: Lanes, ready: Prepared) -> Run:

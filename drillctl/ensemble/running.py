@@ -4,33 +4,45 @@
   measured of each in its place. It is the one caller of the batch engine.
 - A `Job` is more of that than one wants to lose: rows of lanes, any block of which can be
   computed by anyone. `run` has the lacking blocks computed by `Workers` (threads of this
-  process here, a cluster in `cluster.py`) and stored as `Blocks` (`storing.py`), from which a
+  process, or a dask cluster) and stored as `Blocks` (`storing.py`), from which a
   killed run resumes.
 
 Jobs are the cells of a map (`sweeps.py`) and realizations of a map (`realizations.py`). Draws at
 one setting (`draws.py`) and the search of gains call `collect` themselves: their lanes share the
 step that the steepest of all draws asks for, where each realization of a job has its own.
+
+On a cluster workers come, go and die. The job, with the strings that were prepared once, goes out
+with every block, some tens of kB; what comes back is J1 and status. Nothing that only a worker
+holds is needed by another. The scheduler gives the blocks of a worker that died to others. What a
+block holds follows from its rows alone, so that it does not matter who computed it, as long as all
+processors are of one type.
 """
 
 from __future__ import annotations
 
 import math
+import pickle
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol, Self
+from functools import lru_cache
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.errors import InputError, SimulationError
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.batch import Prepared, run_batch, warm_up
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
+from drillctl.store.codec import Array, Index, Mask
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+if TYPE_CHECKING:
+    from distributed import Client
+
 Scheme = tuple[float, int]
 
 FAILED = STATUSES.index("failed")
@@ -112,11 +124,11 @@ class Block:
     provenance: dict[str, str] = field(default_factory=provenance)  # where it was computed
 
     @classmethod
-    def of(cls, first: int, width: int, found: Measured) -> Block:
+    def of(cls, first: int, width: int, ran: Measured) -> Block:
         """A block from rows that were run."""
-        measures = {name: values.reshape(-1, width) for name, values in found.measures.items()}
-        status = found.status.reshape(-1, width)
-        return cls(first, measures, status, found.schemes, found.seconds)
+        measures = {name: values.reshape(-1, width) for name, values in ran.measures.items()}
+        status = ran.status.reshape(-1, width)
+        return cls(first, measures, status, ran.schemes, ran.seconds)
 
 
 Make = Callable[[], Prepared]
@@ -131,27 +143,22 @@ class Job(Protocol):
     @property
     def width(self) -> int:
         """Lanes of a row."""
-        ...
 
     @property
     def measures(self) -> tuple[str, ...]:
         """What is kept of a lane, J1 first."""
-        ...
 
-    def pieces(self, done: NDArray[np.bool_]) -> Pieces:
+    def pieces(self, done: Mask) -> Pieces:
         """Blocks of the rows that are not done."""
-        ...
 
     def prepared(self, strings: Strings) -> Self:
         """The job with strings that were prepared once, and its first kernels loaded."""
-        ...
 
     def run(self, first: int, count: int) -> Block:
         """Run some rows."""
-        ...
 
 
-def pieces(done: NDArray[np.bool_], size: int) -> Pieces:
+def pieces(done: Mask, size: int) -> Pieces:
     """Rows that are not done, cut at multiples of the size of a block."""
     results = []
     for begin in range(0, len(done), size):
@@ -166,41 +173,29 @@ class Blocks(Protocol):
 
     def prepared(self, number: int, make: Make) -> Prepared:
         """The string of a number as it was first prepared."""
-        ...
 
     def missing(self, rows: int) -> Pieces:
         """Blocks that the first `rows` rows still lack."""
-        ...
 
     def keep(self, block: Block) -> None:
         """Keep a finished block."""
-        ...
 
     def read(self, rows: int) -> tuple[dict[str, Array], NDArray[np.int8]]:
         """Measures and status of the first `rows` rows, shape (rows, width)."""
-        ...
 
     @property
     def schemes(self) -> frozenset[Scheme]:
         """Steps (s) and numbers of modes of the blocks that are held in memory."""
-        ...
 
 
-class Workers(Protocol):
-    """Who computes blocks."""
-
-    def blocks(self, job: Job, pieces: Pieces) -> Iterator[Block]:
-        """The blocks of a job, in whatever order they are finished."""
-        ...
+Workers = Callable[[Job, Pieces], Iterator[Block]]
+"""Computes the blocks of a job, in whatever order they are finished."""
 
 
-class ThisProcess:
+def this_process(job: Job, pieces: Pieces) -> Iterator[Block]:
     """Blocks one after the other, the lanes of each in threads."""
-
-    def blocks(self, job: Job, pieces: Pieces) -> Iterator[Block]:
-        """The blocks in order."""
-        for first, count in pieces:
-            yield job.run(first, count)
+    for first, count in pieces:
+        yield job.run(first, count)
 
 
 class Times(NamedTuple):
@@ -223,9 +218,108 @@ def run(
     pieces = blocks.missing(rows)
     progress.begin("simulating lanes", rows * job.width)
     progress.advance((rows - sum(count for _, count in pieces)) * job.width)
-    for block in (workers or ThisProcess()).blocks(job, pieces):
+    for block in (workers or this_process)(job, pieces):
         blocks.keep(block)
         lanes += block.seconds
         progress.advance(block.status.size)
         after()
     return Times(lanes, time.perf_counter() - begin)
+
+
+WAITING = 4  # blocks that each thread of the cluster has before it: none idles, and few are lost
+DEATHS = 20  # workers that may die over one block before it is taken to be the block's doing
+
+
+class Cluster:
+    """Blocks on the workers of a dask.distributed cluster."""
+
+    def __init__(self, client: Client, allow_mixed: bool = False) -> None:
+        self._client, self._allow_mixed = client, allow_mixed
+
+    def __call__(self, job: Job, pieces: Pieces) -> Iterator[Block]:
+        """The blocks, in the order in which they are finished."""
+        from distributed import as_completed
+
+        if not pieces:
+            return
+        for theirs in self._client.run(provenance).values():
+            self._refuse_other(theirs)
+        sent = pickle.dumps(job)
+        left = iter(pieces)
+        running: dict[str, tuple[int, int]] = {}
+        deaths: dict[tuple[int, int], int] = {}
+
+        def submit(piece: tuple[int, int]) -> Any:
+            future = self._client.submit(_run, sent, *piece, pure=False, retries=DEATHS)
+            running[future.key] = piece
+            return future
+
+        threads = sum(self._client.nthreads().values())
+        started = [submit(piece) for piece in islice(left, WAITING * threads)]
+        waiting = as_completed(started, loop=self._client.loop)
+        for future in waiting:
+            piece = running.pop(future.key)
+            error = future.exception()
+            if error is None:
+                block: Block = future.result()
+                self._refuse_other(block.provenance)
+                future.release()
+                yield block
+                more = next(left, None)
+            else:
+                deaths[piece] = deaths.get(piece, 0) + 1
+                _refuse_more(error, deaths[piece])
+                more = piece
+            if more is not None:
+                waiting.add(submit(more))
+
+    def _refuse_other(self, result: dict[str, str]) -> None:
+        here = provenance()
+        for key, value in here.items():
+            if result.get(key) == value or (key == "processor" and self._allow_mixed):
+                continue
+            hint = " (--allow-mixed lets it)" if key == "processor" else ""
+            raise InputError(
+                f"a worker has {key} {result.get(key)}, this process {value}: results would differ "
+                f"in the last bits{hint}",
+                "--scheduler",
+            )
+
+
+@lru_cache(maxsize=4)
+def _job(sent: bytes) -> Job:
+    """The job, with what a worker derived from it for earlier blocks."""
+    result: Job = pickle.loads(sent)
+    return result
+
+
+def _run(sent: bytes, first: int, count: int) -> Block:
+    return _job(sent).run(first, count)
+
+
+def _refuse_more(error: BaseException, times: int) -> None:
+    """Let a block be tried again whose workers died; anything else is raised."""
+    from distributed import KilledWorker
+
+    if isinstance(error, KilledWorker) and times <= DEATHS:
+        return
+    if isinstance(error, KilledWorker):
+        raise SimulationError(f"workers died {times} times over one block: {error}") from None
+    raise error
+
+
+ANSWER = 10.0  # how long a scheduler may take to answer (s)
+
+
+def connect(address: str) -> Client:
+    """A client of a scheduler."""
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError(
+            'needs dask.distributed: pip install "drillctl[distributed]"', "--scheduler"
+        ) from None
+    try:
+        return Client(address, timeout=ANSWER, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"{address} does not answer: {error}", "--scheduler") from None

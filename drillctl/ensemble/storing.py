@@ -9,11 +9,11 @@ block at most.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,41 +25,33 @@ from drillctl.simulation.batch import Prepared
 from drillctl.simulation.measures import MEASURES, STATUSES
 from drillctl.simulation.propagator import StringStep
 from drillctl.simulation.scheme import Scheme as StringScheme
-from drillctl.store.codec import stored_name
+from drillctl.store.codec import Array, stored_name
+from drillctl.store.json_files import picked
 
 if TYPE_CHECKING:
     from drillctl.ensemble.realizations import Realizations
-
-Array = NDArray[np.float64]
 
 NOT_RUN = -1  # status of a lane that was not run yet
 FILES = {"realizations": "data.zarr", "sensitivity": "sensitivity.zarr"}
 """Where the realizations of a study are, in the folder of its run."""
 
 
-class Store(Protocol):
-    """Where the blocks of a study are, by the name of what they belong to."""
-
-    def blocks(self, name: str, job: Any) -> Blocks:
-        """Those of a job: `map`, `realizations` or `sensitivity`."""
-        ...
+Store = Callable[[str, Any], Blocks]
+"""Gives the blocks of a job by what they belong to: `map`, `realizations` or `sensitivity`."""
 
 
-class Memory:
-    """For studies that live in memory only."""
-
-    def blocks(self, name: str, job: Job) -> Blocks:
-        """In memory."""
-        return MemoryBlocks(job)
+def in_memory(name: str, job: Job) -> Blocks:
+    """Blocks of studies that live in memory only."""
+    return MemoryBlocks(job)
 
 
 @dataclass(frozen=True)
 class Folder:
-    """For studies in the folder of a run."""
+    """Blocks in the folder of a run."""
 
     path: Path
 
-    def blocks(self, name: str, job: Any) -> Blocks:
+    def __call__(self, name: str, job: Any) -> Blocks:
         """Files of their own for a map, the result's own data for realizations."""
         if name in FILES:
             return ZarrBlocks(self.path, name, job)
@@ -249,15 +241,9 @@ def _string_arrays(prepared: Prepared) -> dict[str, Any]:
     fields = {f"kernel.{k}": v for k, v in stepper.string._asdict().items()}
     return fields | {
         "kind": type(stepper.string).__name__,
-        "angle_to_state": stepper.angle_to_state,
-        "speed_to_state": stepper.speed_to_state,
-        "rest": stepper.rest,
-        "step": prepared.scheme.step,
-        "steps": prepared.scheme.steps,
-        "modes": prepared.scheme.modes,
-        "sampling": prepared.scheme.sampling,
-        "duration": prepared.duration,
-        "j1_from": prepared.j1_from,
+        **picked(stepper, "angle_to_state", "speed_to_state", "rest"),
+        **picked(prepared.scheme, "step", "steps", "modes", "sampling"),
+        **picked(prepared, "duration", "j1_from"),
     }
 
 
@@ -270,14 +256,8 @@ def _string_from(held: dict[str, Any]) -> Prepared:
     scheme = StringScheme(
         float(held["step"]), int(held["steps"]), int(held["modes"]), int(held["sampling"])
     )
-    stepper = StringStep(
-        string,
-        held["angle_to_state"],
-        held["speed_to_state"],
-        held["rest"],
-        scheme.modes,
-        scheme.step,
-    )
+    to_state = held["angle_to_state"], held["speed_to_state"]
+    stepper = StringStep(string, *to_state, held["rest"], scheme.modes, scheme.step)
     return Prepared(stepper, scheme, float(held["duration"]), float(held["j1_from"]))
 
 

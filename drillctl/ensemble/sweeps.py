@@ -1,4 +1,4 @@
-"""Sweeps over any parameters of a design; the J1 map over the gains is one of them."""
+"""Sweeps over any parameters of a design, the J1 map among them, and their regions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, ClassVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +20,16 @@ from drillctl.ensemble.grid import (
     Axis,
     Group,
     axes_of,
+    cell_design,
     divisions,
     group_of,
     other_axes,
+    over_axes,
+    place_of,
     refuse_too_large,
     shape_of,
     span,
 )
-from drillctl.ensemble.regions import Region, region
 from drillctl.ensemble.running import (
     Block,
     Pieces,
@@ -37,16 +40,98 @@ from drillctl.ensemble.running import (
     pieces,
     run,
 )
-from drillctl.ensemble.storing import Memory, Store
+from drillctl.ensemble.storing import Store, in_memory
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.batch import CHUNK, Prepared, prepare
-from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES
-from drillctl.store.codec import label
+from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES, status_counts
+from drillctl.store.codec import Array, Index, Mask, documented, label
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
+from drillctl.store.tables import texts, write_columns
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    import shapely
+
+    from drillctl.simulation import Simulation
+
+
+@dataclass(frozen=True, eq=False)
+@documented
+class Region:
+    """The part of a map at or under one level."""
+
+    level: float = label(unit="s", means="level of J1")
+    mask: Mask = label(means="cells in the region, shape of the map; a cell that failed is not")
+    cells: int = label(means="number of them")
+    area_fraction: float = label(means="their share of all cells")
+    bounds: dict[str, tuple[float, float]] = label(
+        means="path to (lowest, highest) cell centre in the region (SI); empty without any cell"
+    )
+    polygons: shapely.MultiPolygon | None = label(
+        means="outline by linear interpolation, in SI; only for maps over two parameters"
+    )
+
+    def summary(self) -> dict[str, Any]:
+        """Cells, share and bounds."""
+        return {
+            "cells": self.cells,
+            "area_fraction": self.area_fraction,
+            "bounds": {path: list(pair) for path, pair in self.bounds.items()},
+        }
+
+
+def region(values: Array, axes: tuple[Axis, ...], level: float) -> Region:
+    """The region of a map at or under a level.
+
+    Parameters
+    ----------
+    values : ndarray, shape of the map
+        J1 (s); NaN where a cell failed.
+    axes : tuple of Axis
+        Of the map.
+    level : float
+        Level (s).
+    """
+    mask = np.nan_to_num(values, nan=np.inf) <= level
+    bounds = {}
+    for dimension, axis in enumerate(axes):
+        others = tuple(d for d in range(mask.ndim) if d != dimension)
+        inside = axis.values[mask.any(axis=others)]
+        if inside.size:
+            bounds[axis.path] = (float(inside[0]), float(inside[-1]))
+    cells = int(mask.sum())
+    polygons = outline(values, axes, level) if len(axes) == 2 else None
+    return Region(level, mask, cells, cells / mask.size, bounds, polygons)
+
+
+def outline(values: Array, axes: tuple[Axis, ...], level: float) -> shapely.MultiPolygon:
+    """Outline of {J1 <= level} of a two-parameter map, interpolated linearly between cells."""
+    import contourpy
+    import shapely
+
+    first, second = axes
+    # contourpy masks NaN: a failed cell is left out of the region, and so are its neighbours'
+    # shares of the quads around it.
+    generator = contourpy.contour_generator(
+        first.values, second.values, np.ma.masked_invalid(values.T),
+        fill_type=contourpy.FillType.OuterOffset,
+    )  # fmt: skip
+    points, offsets = generator.filled(-np.inf, level)
+    polygons = [
+        shapely.Polygon(p[o[0] : o[1]], [p[a:b] for a, b in itertools.pairwise(o[1:])])
+        for p, o in zip(points, offsets, strict=True)
+    ]
+    valid = [part for polygon in polygons for part in _parts(shapely.make_valid(polygon))]
+    return shapely.MultiPolygon(valid)
+
+
+def _parts(geometry: Any) -> list[Any]:
+    """The polygons in a geometry; a cell that touches the level in a point alone has none."""
+    if geometry.geom_type == "Polygon":
+        return [geometry] if geometry.area > 0.0 else []
+    return [p for g in getattr(geometry, "geoms", []) for p in _parts(g)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,27 +172,19 @@ class Sweep(Result):
         """Smallest J1 (s) and where it is (SI); None if every cell failed."""
         if np.isnan(self.j1).all():
             return None
-        where = np.unravel_index(int(np.nanargmin(self.j1)), self.j1.shape)
-        at = {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)}
-        return float(self.j1[where]), at
+        cell = int(np.nanargmin(self.j1))
+        return float(self.j1.flat[cell]), place_of(self.axes, cell)
 
     def summary(self) -> dict[str, Any]:
         """Axes, minimum, regions, audit, failures, times; SI units, parameters by path."""
         minimum = self.minimum
         return {
             "axes": span(self.axes),
-            "minimum": None if minimum is None else {"j1": minimum[0], "at": minimum[1]},
+            "minimum": minimum and {"j1": minimum[0], "at": minimum[1]},
             "regions": {f"{level:g}": r.summary() for level, r in self.regions.items()},
             "audit": self.audit.summary(),
-            "statuses": {
-                name: int((self.status == code).sum())
-                for code, name in enumerate(STATUSES)
-                if (self.status == code).any()
-            },
-            "step": self.step,
-            "modes": self.modes,
-            "seconds": self.seconds,
-            "total_seconds": self.total_seconds,
+            "statuses": status_counts(self.status),
+            **picked(self, "step", "modes", "seconds", "total_seconds"),
         }
 
     def requested(self) -> tuple[Design, dict[str, Any]]:
@@ -143,7 +220,7 @@ def sweep(
     audit_cells : int, optional
         Instead of the design's own; 0 for no audit.
     progress : Progress
-        Told of blocks and audited cells.
+        Receives finished blocks and audited cells.
     store : Store, optional
         Where finished blocks are stored, for a run that resumes; in memory by default.
     measures : sequence of str, optional
@@ -168,7 +245,7 @@ def sweep(
     axes = axes_of(design, table.axes, len(kept)) if axes is None else axes
     refuse_too_large(shape_of(axes), kept=len(kept))
     job = Cells(design, axes, kept)
-    blocks = (store or Memory()).blocks("map", job)
+    blocks = (store or in_memory)("map", job)
     progress.begin("loading kernels", 1)
     cells = math.prod(shape_of(axes))
     times = run(job.prepared(blocks.prepared), cells, blocks, workers, progress)
@@ -190,13 +267,13 @@ def sweep(
     )
 
 
-def kept_measures(asked: Sequence[str] | None) -> tuple[str, ...]:
+def kept_measures(asked: Sequence[str] | None, where: str = "measures") -> tuple[str, ...]:
     """Names of the measures to keep, in the order of the table; all if none are requested."""
     if asked is None:
         return BATCH_MEASURES
     for name in asked:
         if name not in BATCH_MEASURES:
-            raise InputError(f"no measure {name!r}; {nearest(name, BATCH_MEASURES)}", "measures")
+            raise InputError(f"no measure {name!r}; {nearest(name, BATCH_MEASURES)}", where)
     return tuple(name for name in BATCH_MEASURES if name == "j1" or name in asked)
 
 
@@ -240,7 +317,7 @@ class Cells:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, strings=None)
 
-    def pieces(self, done: NDArray[np.bool_]) -> Pieces:
+    def pieces(self, done: Mask) -> Pieces:
         """Blocks of the cells that are not done; none reaches over two groups."""
         results = []
         for begin, end in itertools.pairwise([*self._begins.tolist(), len(done)]):
@@ -279,7 +356,7 @@ class Cells:
         return divisions(self.design, self.axes)
 
     @cached_property
-    def _begins(self) -> NDArray[np.int64]:
+    def _begins(self) -> Index:
         """First row of each group."""
         sizes = [math.prod(p.stop - p.start for p in where) for where in self._divisions]
         return np.concatenate([[0], np.cumsum(sizes[:-1])]).astype(np.int64)
@@ -293,3 +370,39 @@ class Cells:
             ready = make() if self.strings is None else self.strings(number, make)
             held = self.__dict__["_held"] = (number, group, ready)
         return held[1], held[2]
+
+
+def responses(result: Sweep, count: int = 4) -> list[Simulation]:
+    """Simulate some cells of growing J1, by the batch engine.
+
+    Parameters
+    ----------
+    result : Sweep
+        The map.
+    count : int
+        How many cells, at most: the minimum, then the cells nearest to values of J1 spread
+        evenly in logarithm up to twice the highest level.
+
+    Returns
+    -------
+    list of Simulation
+        By growing J1; without repeats.
+    """
+    from drillctl.simulation import simulate  # a map waits for no integrator
+
+    if result.minimum is None:
+        return []
+    flat = result.j1.ravel()
+    high = 2.0 * result.levels[-1]
+    low = max(result.minimum[0], 1e-6 * high)  # a rig that never leaves its set speed has J1 = 0
+    targets = np.geomspace(low, max(low, high), count)
+    cells = dict.fromkeys(int(np.nanargmin(np.abs(flat - target))) for target in targets)
+    designs = [cell_design(result.design, result.axes, cell) for cell in cells]
+    return [simulate(design, engine="batch", interval=0.05) for design in designs]
+
+
+def write_cells(result: Sweep, path: Path) -> None:
+    """Write a row a cell: parameters, measures (SI) and status."""
+    columns = over_axes(result.axes) | {name: texts(v) for name, v in result.measures.items()}
+    columns["status"] = np.array(STATUSES, dtype=object)[result.status.ravel()].tolist()
+    write_columns(path, columns)

@@ -17,8 +17,7 @@ from drillctl.reporting.blocks import Block, Figure, InteractiveMap, Words, name
 from drillctl.simulation.batch import prepare, trace
 from drillctl.simulation.measures import STATUSES
 from drillctl.store.json_files import strict, write_text
-from drillctl.studies.applies import fitting_map
-from drillctl.studies.base import Recipe, Run, Study
+from drillctl.studies.base import Recipe, Run, Study, fitting_map
 
 if TYPE_CHECKING:
     from drillctl.reporting.gather import Gathered

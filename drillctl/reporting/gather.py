@@ -287,7 +287,7 @@ def _study(
     if run.finished:
         return ended("done")
     try:
-        compute = recipe.compute or study.compute
+        compute = recipe.compute or study.computed
         result = compute(design, Run(options, progress, run.path))
         if isinstance(result, Result):
             result.write(run.path)

@@ -21,6 +21,12 @@ for the last 5 s; `censored`: stopped early on request; `failed`: no finite answ
 """
 
 
+def status_counts(status: Any) -> dict[str, int]:
+    """How many runs ended in each way, those that occur; an array of indices into `STATUSES`."""
+    counts = {name: int((status == code).sum()) for code, name in enumerate(STATUSES)}
+    return {name: count for name, count in counts.items() if count}
+
+
 class Measure(NamedTuple):
     """What is known of a measure beside its values."""
 

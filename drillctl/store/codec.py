@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,11 @@ from drillctl.store.json_files import read_json, write_json
 
 if TYPE_CHECKING:
     import xarray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.int64]
+Dataclass = TypeVar("Dataclass", bound=type)
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,33 @@ def label(
 ) -> Any:
     """Declare a field of a result with its label; other options are those of a dataclass field."""
     return field(metadata={"label": Label(dims, unit, means, name, flat, over, flags)}, **options)
+
+
+def documented(cls: Dataclass) -> Dataclass:
+    """Document the fields of a class from their labels, for `help` and the reference."""
+    if cls.__doc__ and "Attributes\n" not in cls.__doc__:
+        cls.__doc__ = f"{cls.__doc__.rstrip()}\n\n{_section(cls)}"
+    return cls
+
+
+def _section(cls: type) -> str:
+    """The numpydoc section of a class whose fields are labelled."""
+    lines = ["    Attributes", "    ----------"]
+    for name, kind in cls.__annotations__.items():
+        if kind.startswith("ClassVar"):
+            continue
+        one = getattr(vars(cls).get(name), "metadata", {}).get("label")
+        lines.append(f"    {name} : {kind}")
+        if one is not None:
+            lines.append(f"        {_described(one)}")
+    return "\n".join(lines) + "\n    "
+
+
+def _described(one: Label) -> str:
+    parts = [one.means if isinstance(one.means, str) else ""]
+    parts += [f"shape ({', '.join(one.dims)})"] if one.dims else []
+    parts += [f"in {one.unit}"] if isinstance(one.unit, str) and one.unit != "1" else []
+    return "; ".join(part for part in parts if part) or "See the class."
 
 
 def stored_name(name: str) -> str:

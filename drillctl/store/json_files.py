@@ -23,6 +23,11 @@ def strict(content: Any) -> Any:
     return content
 
 
+def picked(value: Any, *names: str) -> dict[str, Any]:
+    """Attributes of an object by their names, for a summary."""
+    return {name: getattr(value, name) for name in names}
+
+
 def write_json(path: Path, content: Any) -> None:
     """Write strict JSON (null, never NaN), atomically."""
     write_text(path, json.dumps(strict(content), indent=2, allow_nan=False) + "\n")

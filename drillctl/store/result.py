@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from drillctl.design import Design
 from drillctl.errors import InputError, StoreError
-from drillctl.store.codec import TREE, Label, dataset, read, write
+from drillctl.store.codec import TREE, dataset, documented, read, write
 from drillctl.store.folder import Growing, about_run, claim
 
 if TYPE_CHECKING:
@@ -21,10 +21,9 @@ class Result:
     kind: ClassVar[str]  # name of the study that computes it, which is its command
 
     def __init_subclass__(cls) -> None:
-        """Document the fields of a result from their labels, for `help` and the reference."""
+        """Document its fields."""
         super().__init_subclass__()
-        if cls.__doc__ and "Attributes\n" not in cls.__doc__:
-            cls.__doc__ = f"{cls.__doc__.rstrip()}\n\n{_attributes(cls)}"
+        documented(cls)
 
     if TYPE_CHECKING:
 
@@ -121,23 +120,3 @@ def open(folder: str | Path) -> Any:
         "the command again in a new folder",
         str(path),
     )
-
-
-def _attributes(cls: type) -> str:
-    """The numpydoc section of a class whose fields are labelled."""
-    lines = ["    Attributes", "    ----------"]
-    for name, kind in cls.__annotations__.items():
-        if kind.startswith("ClassVar"):
-            continue
-        one = getattr(vars(cls).get(name), "metadata", {}).get("label")
-        lines.append(f"    {name} : {kind}")
-        if one is not None:
-            lines.append(f"        {_described(one)}")
-    return "\n".join(lines) + "\n    "
-
-
-def _described(one: Label) -> str:
-    parts = [one.means if isinstance(one.means, str) else ""]
-    parts += [f"shape ({', '.join(one.dims)})"] if one.dims else []
-    parts += [f"in {one.unit}"] if isinstance(one.unit, str) and one.unit != "1" else []
-    return "; ".join(part for part in parts if part) or "See the class."

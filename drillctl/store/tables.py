@@ -12,13 +12,14 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drillctl import units
 from drillctl.store.json_files import write_text
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 NOTHING = "–"  # shown in place of a missing number
 GAIN_OF_WEIGHT = "N*s/rad"  # of a weight on bit per bit speed: read in the unit of the weight
@@ -172,6 +173,8 @@ def texts(values: NDArray[np.float64]) -> list[str]:
 
     Most of the time of a large table goes into these texts: each different number has one.
     """
+    import numpy as np  # commands that list the studies do without
+
     ordered = np.sort(values, axis=None)
     if np.count_nonzero(np.diff(ordered)) < 0.7 * ordered.size:  # NaN differ from each other
         different, at = np.unique(values, return_inverse=True)

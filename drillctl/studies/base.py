@@ -6,19 +6,19 @@ imported inside the functions that it names. From this object follow the command
 and help, the folder of a run and its resumption, tables on the terminal and as CSV, pictures,
 the JSON summary, `drillctl.open`, `drillctl.NAME` and the section of the report.
 
-Usual files of a package: `__init__.py` with `STUDY` and the functions that it names (the one for
-`compute` is called `computed`, since `compute.py` lies beside it), `compute.py` with the result
-class and the computation, `settings.py` with the keys of the design file. Orders of recipes and
-sections in a report come in tens, see `reporting`: recipes modes 0, loop 10, simulate 20, setting
-30, map 40, cells 50, best 60, bad 70, slope-margin 80, regions 85, uncertainty 90, compare 100,
-tune 110, advantage 120, doctor 130, meshes and steps from 140 on; sections summary 0, rig 10,
-operating point 20, modes 30, loop 40, map 50, responses 60, regions 65, uncertainty 70,
-sensitivity 80, tuning 90, comparison 100, advantage 110, audit 120, glossary 130.
+Usual files of a package: `__init__.py` with `STUDY` and the functions that it names, `compute.py`
+with the result class and the computation, `settings.py` with the keys of the design file. Orders
+of recipes and sections in a report come in tens, see `reporting`: recipes modes 0, loop 10,
+simulate 20, setting 30, map 40, cells 50, best 60, bad 70, slope-margin 80, regions 85,
+uncertainty 90, compare 100, tune 110, advantage 120, doctor 130, meshes and steps from 140 on;
+sections summary 0, rig 10, operating point 20, modes 30, loop 40, map 50, responses 60, regions
+65, uncertainty 70, sensitivity 80, tuning 90, comparison 100, advantage 110, audit 120, glossary
+130.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from drillctl import registry
 from drillctl.progress import SILENT, Progress
+from drillctl.store.tables import Table, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from drillctl import units
     from drillctl.design import Design
     from drillctl.store.folder import Growing
-    from drillctl.store.tables import Table
 
 Group = Literal["Describe a rig", "Analyse the loop", "Simulate", "Decide", "Hand over"]
 """What a person wants to do; commands are listed under it."""
@@ -49,7 +49,7 @@ class Option(NamedTuple):
 
     name: str  # in Python: `allow_mixed` is --allow-mixed
     type: Any
-    help: str  # verb or noun first, at most 60 characters
+    help: str  # verb first, at most 60 characters
     default: Any = None
     sets: str = ""  # dotted path of the design
     how: bool = False  # whether it only says how to compute: the result is the same
@@ -63,8 +63,8 @@ class Option(NamedTuple):
         return f"--{self.name.replace('_', '-')}"
 
 
-DRAWS = Option("realizations", int, "Draws of what is uncertain", sets="uncertainty.realizations")
-SEED = Option("seed", int, "Seed of the draws", sets="uncertainty.seed")
+DRAWS = Option("realizations", int, "Use this many draws", sets="uncertainty.realizations")
+SEED = Option("seed", int, "Draw with this seed", sets="uncertainty.seed")
 
 
 @dataclass(frozen=True)
@@ -115,14 +115,6 @@ class Requested:
         return result
 
 
-def _applies(request: Requested) -> str:
-    return ""
-
-
-def _as_it_is(request: Requested) -> Design:
-    return request.design
-
-
 def _nothing_computed(design: Design) -> str:
     return "nothing of it was computed"
 
@@ -137,8 +129,9 @@ class Recipe:
 
     name: str  # of its folder
     title: str  # what messages call it
-    missing: Callable[[Requested], str] = _applies  # why it does not apply; empty where it does
-    variant: Callable[[Requested], Design] = _as_it_is  # the design that is studied
+    # why it does not apply, empty where it does; and the design that is studied
+    missing: Callable[[Requested], str] = lambda request: ""
+    variant: Callable[[Requested], Design] = lambda request: request.design
     needs: tuple[str, ...] = ()  # recipes that must be done before
     options: Mapping[str, Any] = field(default_factory=dict)
     compute: Callable[[Design, Run], Any] | None = None  # if not that of the study
@@ -165,7 +158,7 @@ class Section:
     build: Callable[[Any], tuple[Any, ...]] | None = None
 
 
-def _none(result: Any, *others: Any) -> Iterable[Any]:
+def _none(*values: Any) -> tuple[()]:
     return ()
 
 
@@ -178,14 +171,15 @@ class Study:
     """One study.
 
     `compute` takes a design and a `Run` and returns a `store.result.Result`, whose class names
-    the study in `kind`. The other functions take that result; `tables`, `pictures` and
+    the study in `kind`; by default it is `call`, with the options of the command by their names
+    and `progress`. The other functions take that result; `tables`, `pictures` and
     `remarks` give what people see, `notes` what deserves attention on stderr.
     """
 
     name: str
     help: str
     group: Group
-    compute: Callable[[Design, Run], Any]
+    compute: Callable[[Design, Run], Any] | None = None
     options: tuple[Option, ...] = ()
     axes: bool = False  # whether `--axis` sets the axes of the map
     command: bool = True  # whether it is a command of its own
@@ -226,10 +220,17 @@ class Study:
         """Every option at its default."""
         return {one.name: one.default for one in self.options}
 
+    def computed(self, design: Design, run: Run) -> Any:
+        """The result of a run."""
+        if self.compute is not None:
+            return self.compute(design, run)
+        own = {one.name: run.options[one.name] for one in self.options if not one.sets}
+        return registry.resolve(self.call)(design, progress=run.progress, **own)
+
     def run(self, design: Design, **options: Any) -> Any:
         """Compute without a folder, as Python does; `progress` goes to the `Run`."""
         progress = options.pop("progress", SILENT)
-        return self.compute(design, Run(self.defaults() | options, progress))
+        return self.computed(design, Run(self.defaults() | options, progress))
 
 
 @cache
@@ -237,3 +238,44 @@ def studies() -> dict[str, Study]:
     """Every registered study by name, in the order of the registry."""
     results = [import_module(module).STUDY for module in registry.STUDIES]
     return {study.name: study for study in results}
+
+
+def fitting_map(request: Requested) -> str:
+    """Why the default map does not fit a design that names no axes of its own."""
+    from drillctl.ensemble.grid import axes_of
+    from drillctl.errors import InputError
+
+    try:
+        axes_of(request.design, request.design.tables.map.axes)
+    except InputError as error:
+        return f"its map does not fit this design ({error.problem}); name other axes in [map]"
+    return ""
+
+
+def mapped_in_batch(request: Requested) -> str:
+    """Why no map by the batch engine applies."""
+    return in_batch(request) or fitting_map(request)
+
+
+def over_two_axes(request: Requested) -> str:
+    """Why no map over two parameters applies."""
+    reason = fitting_map(request)
+    count = len(request.design.tables.map.axes)
+    if not reason and count != 2:
+        return f"it is shown over two parameters, the map of this design has {count}"
+    return reason
+
+
+def in_batch(request: Requested) -> str:
+    """Why the batch engine does not apply."""
+    if request.design.tables.bit_rock.law == "printed-three-branch":
+        return "the batch engine does not take the friction law printed-three-branch"
+    return ""
+
+
+def audited(audit: Any, what: str, cells: str) -> Iterator[Check]:
+    """Whether the reference solver agrees, if anything was audited."""
+    if len(audit.cells):
+        detail = f"{len(audit.cells)} {cells}, worst relative difference in J1 "
+        question = f"Does the reference solver agree with {what}?"
+        yield Check(question, audit.verdict == "ok", detail + number(audit.worst, 2))

@@ -101,7 +101,7 @@ def test_a_level_that_no_gains_reach_exits_1_with_all_results(quick):
     assert len(told) == 2
     assert told[1].startswith(
         "drillctl: no gains between these bounds have J1 <= 12 s with probability 0.95: at the "
-        "best found, controller.kp = "
+        "best gains, controller.kp = "
     )
     assert Path("r/tuned.toml").is_file()
     assert found["certificate"]["tolerance"]["controller.kp"]["low_at_bound"] is False
@@ -115,7 +115,7 @@ def test_a_certificate_that_shows_nothing_says_that_more_would(quick):
                          "--set", "tune.starts=1", "--set", "tune.certificate.audit=0")  # fmt: skip
     assert code == 1
     assert "certificate not shown" in err
-    assert "more realizations would decide; the closest found is controller.kp" in err
+    assert "more realizations would decide; the closest is controller.kp" in err
 
 
 def test_requirements_that_cannot_be_met_exit_1_with_the_closest_point(quick):

@@ -21,8 +21,8 @@ from strict_json import strict
 
 import drillctl
 from drillctl.design.reading import parse_axis, parse_setting
-from drillctl.ensemble import cluster as cluster_module
 from drillctl.ensemble import realizations as realizations_module
+from drillctl.ensemble import running as cluster_module
 from drillctl.errors import InputError
 from drillctl.studies.uncertainty import indices
 

@@ -13,8 +13,7 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.plots import j1_against_weight, j1_distributions, paired_differences
 from drillctl.plots.comparison import UNBEATEN, _unbeaten
-from drillctl.studies.compare.cases import Nominal
-from drillctl.studies.compare.compute import COMPARED, ComparedCase, Comparison
+from drillctl.studies.compare.compute import COMPARED, ComparedCase, Comparison, Nominal
 
 COUNT = 30
 

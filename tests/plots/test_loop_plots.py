@@ -29,7 +29,7 @@ from drillctl.linear.loop_margins import pole_grid
 from drillctl.plots.loop_gains import mirrored
 from drillctl.plots.loop_shape import turns_about_critical
 from drillctl.studies import Axis
-from drillctl.studies.loop.pictures import loop_pictures
+from drillctl.studies.loop.compute import loop_pictures
 from drillctl.studies.loop_mapping.compute import QUANTITIES, loop_map
 
 NAME = "monteiro-trindade-140kn"

@@ -21,31 +21,28 @@ from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed, ObservedW
 from drillctl.store.tables import NOTHING, write_csv
 from drillctl.store.tables import number as tables_number
 from drillctl.studies.advantage import STUDY
-from drillctl.studies.advantage import delays as delays_module
+from drillctl.studies.advantage import sweeps as delays_module
 from drillctl.studies.advantage.cases import (
-    MEAN,
-    NOMINAL,
-    ROP,
-    fresh_draws,
-    fresh_shift,
-    measured,
-    optimum_beside,
-)
-from drillctl.studies.advantage.compute import advantage
-from drillctl.studies.advantage.delays import delay_curve
-from drillctl.studies.advantage.policies import (
     CONSTANT,
     DELAY,
     GAIN,
     IDEAL,
     KI,
     KP,
+    MEAN,
+    NOMINAL,
     REAL,
+    ROP,
     Optimum,
+    fresh_draws,
+    fresh_shift,
+    measured,
     optimum,
+    optimum_beside,
     policies,
 )
-from drillctl.studies.advantage.sweeps import chart
+from drillctl.studies.advantage.compute import advantage
+from drillctl.studies.advantage.sweeps import chart, delay_curve
 from drillctl.studies.compare.compute import compare
 from drillctl.studies.tune.search import search
 
@@ -185,7 +182,7 @@ def test_known_gains_are_never_lost(design):
 def test_gains_that_are_known_do_not_hide_better_ones_elsewhere():
     # 3 s late: a valley at some 2.7 kN s/rad, far from the constant weight's gains.
     compared = policies(drillctl.load(SHIPPED))
-    constant = Optimum(np.array([632.3, 146.7]), 18.43, 0.98, (), 0)
+    constant = Optimum(np.array([632.3, 146.7]), 18.43, ())
     found = optimum_beside(compared.real.at(DELAY, 3.0), 1000, constant)
     assert found.value < 17.0
     assert found.values[2] > 2e3
@@ -311,8 +308,8 @@ def test_kept_gains_turn_to_harm_and_gains_tuned_anew_do_not(result):
 
 def test_what_small_steps_carry_over_the_end_of_a_step_is_followed(design, monkeypatch):
     """A valley that is found from nearby gains alone: left at 0.5 s, it really ends at 1.3 s."""
-    constant = Optimum(np.array([600.0, 100.0, 0.0]), 10.0, 1.0, (), 0)
-    near = Optimum(np.array([500.0, 200.0, 0.0]), 1.0, 1.0, (), 0)
+    constant = Optimum(np.array([600.0, 100.0, 0.0]), 10.0, ())
+    near = Optimum(np.array([500.0, 200.0, 0.0]), 1.0, ())
 
     def objective(policy, gains):
         delay = policy.design.tables.weight_on_bit.path.delay
@@ -323,7 +320,7 @@ def test_what_small_steps_carry_over_the_end_of_a_step_is_followed(design, monke
         gains = np.array([500.0, 200.0, delay])
         close = any(abs(start[2] - delay) < 0.15 and start[0] == 500.0 for start in starts)
         value = objective(policy, gains)
-        return Optimum(gains, value, 1.0, (), 0) if close and value < 10.0 else fallback
+        return Optimum(gains, value, ()) if close and value < 10.0 else fallback
 
     monkeypatch.setattr(delays_module, "optimum_beside", beside)
     monkeypatch.setattr(

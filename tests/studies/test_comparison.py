@@ -15,8 +15,7 @@ from drillctl.ensemble.draws import EQUAL_TO, drawn_lanes, equalising_shift, run
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, trace
-from drillctl.studies.compare.cases import ALONE, case_designs
-from drillctl.studies.compare.compute import COMPARED, compare
+from drillctl.studies.compare.compute import ALONE, COMPARED, case_designs, compare
 
 HOLDS = (
     (
@@ -337,7 +336,7 @@ STARTED = {"start.kind": "rest"}
         ([{"name": "a", "set": {"controller.kp": "soft"}}], "compare.cases 'a': controller.kp"),
         ([{"name": "a"}, {"name": "a"}], "two cases are called 'a'"),
         ([{"set": {}}], "compare.cases.1.name: is missing"),
-        ([{"name": " "}], "a case needs a name"),
+        ([{"name": " "}], "every case needs a name"),
         ([{"name": "a", "values": {}}], "unknown key"),
         ("a", "compare.cases: got 'a'; it must be a list"),
         ([{"name": "a", "set": 3}], "it must be a table"),

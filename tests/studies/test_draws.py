@@ -9,8 +9,7 @@ from scipy import stats
 import drillctl
 from drillctl.design import to_toml
 from drillctl.ensemble.draws import drawn_lanes
-from drillctl.ensemble.parameters import DEFAULT_COV, draw, uncertain_parameters
-from drillctl.ensemble.sampling import probabilities
+from drillctl.ensemble.parameters import DEFAULT_COV, draw, probabilities, uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock.law import friction_laws
 

@@ -12,8 +12,7 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.progress import Within
 from drillctl.simulation.run import SIGNALS
-from drillctl.studies.compare.cases import NO_MAPS, case_designs
-from drillctl.studies.compare.compute import compare
+from drillctl.studies.compare.compute import NO_MAPS, case_designs, compare
 
 HOLDS = (
     (

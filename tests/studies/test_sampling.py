@@ -8,8 +8,7 @@ from scipy import stats
 
 import drillctl
 from drillctl.design import to_toml
-from drillctl.ensemble.parameters import draw, uncertain_parameters
-from drillctl.ensemble.sampling import Sampling, correlation_root
+from drillctl.ensemble.parameters import Sampling, correlation_root, draw, uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.studies import weight_delay
 from drillctl.studies.compare.compute import compare

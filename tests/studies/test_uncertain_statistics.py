@@ -27,7 +27,7 @@ from drillctl.studies.uncertainty.best import (
     quantile_interval,
 )
 from drillctl.studies.uncertainty.best import values_of as values_of_all
-from drillctl.studies.uncertainty.convergence import convergence, level_of, look, schedule
+from drillctl.studies.uncertainty.result import convergence, level_of, look, schedule
 
 HOLDS = (
     (

@@ -12,7 +12,7 @@ from drillctl.ensemble import grid as grid_module
 from drillctl.ensemble import realizations as realizations_module
 from drillctl.ensemble import running as running_module
 from drillctl.ensemble.grid import axes_of, cell_design
-from drillctl.ensemble.realizations import Drawn, Realizations
+from drillctl.ensemble.realizations import Realizations
 from drillctl.ensemble.running import pieces
 from drillctl.ensemble.storing import MemoryBlocks
 from drillctl.errors import InputError
@@ -200,7 +200,7 @@ def test_a_job_goes_by_post():
 
     design = small()
     axes = axes_of(design, design.tables.map.axes)
-    job = Realizations(design, axes, Drawn(2012), ("j1", "stuck_time"), None)
+    job = Realizations(design, axes, 2012, ("j1", "stuck_time"), None)
     prepared = job.prepared(lambda number, make: make())
     here = prepared.run(3, 2)
     sent = pickle.loads(pickle.dumps(prepared))
@@ -222,7 +222,7 @@ def test_pieces_are_cut_at_blocks():
 def test_kept_in_memory_grows():
     design = small()
     axes = axes_of(design, design.tables.map.axes)
-    job = Realizations(design, axes, Drawn(1), ("j1",), None)
+    job = Realizations(design, axes, 1, ("j1",), None)
     kept = MemoryBlocks(job)
     for first, count in kept.missing(3):
         kept.keep(job.run(first, count))
@@ -348,7 +348,7 @@ def test_slices_of_a_third_axis():
 
 
 def test_contours_of_each_realization(whole):
-    from drillctl.ensemble.regions import region
+    from drillctl.ensemble.sweeps import region
 
     expected = region(whole.j1[2], whole.axes, 15.0).polygons
     assert whole.contours(15.0, 2).equals(expected)

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import pytest
 
 import drillctl
-from drillctl.ensemble import cluster as cluster_module
 from drillctl.ensemble import realizations as realizations_module
-from drillctl.ensemble.cluster import Cluster, connect
+from drillctl.ensemble import running as cluster_module
 from drillctl.ensemble.grid import axes_of
-from drillctl.ensemble.realizations import Drawn, Realizations
+from drillctl.ensemble.realizations import Realizations
+from drillctl.ensemble.running import Cluster, connect
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError, SimulationError
 from drillctl.studies.uncertainty.compute import uncertainty
@@ -76,8 +76,8 @@ def test_a_worker_may_be_killed_half_way(client):
     blocks = []
 
     class Killing(Cluster):
-        def blocks(self, job, pieces):
-            for block in super().blocks(job, pieces):
+        def __call__(self, job, pieces):
+            for block in super().__call__(job, pieces):
                 blocks.append(block.first)
                 if len(blocks) == 40:
                     os.kill(victim, signal.SIGKILL)
@@ -176,7 +176,7 @@ class Completed(list):
 def job(monkeypatch):
     monkeypatch.setattr(distributed, "as_completed", Completed)
     one = design()
-    return Realizations(one, axes_of(one, one.tables.map.axes), Drawn(1), ("j1",), None)
+    return Realizations(one, axes_of(one, one.tables.map.axes), 1, ("j1",), None)
 
 
 def here():
@@ -187,10 +187,10 @@ def here():
 
 def test_every_block_comes_once_in_whatever_order(job):
     pieces = [(4 * k, 4) for k in range(9)]
-    blocks = list(Cluster(Pretended(here())).blocks(job, pieces))
+    blocks = list(Cluster(Pretended(here()))(job, pieces))
     assert [block.first for block in blocks] != [first for first, _ in pieces]
     assert sorted(block.first for block in blocks) == [first for first, _ in pieces]
-    assert list(Cluster(Pretended(here())).blocks(job, [])) == []
+    assert list(Cluster(Pretended(here()))(job, [])) == []
 
 
 def test_the_cells_of_a_map_go_to_workers_too(job):
@@ -206,20 +206,20 @@ def test_the_cells_of_a_map_go_to_workers_too(job):
 
 def test_blocks_of_dead_workers_are_given_out_again(job):
     dead = distributed.KilledWorker("block", Worker("tcp://there:1"), 3)
-    blocks = list(Cluster(Pretended(here(), [dead, dead])).blocks(job, [(0, 2), (2, 2)]))
+    blocks = list(Cluster(Pretended(here(), [dead, dead]))(job, [(0, 2), (2, 2)]))
     assert sorted(block.first for block in blocks) == [0, 2]
     deadly = [dead] * (cluster_module.DEATHS + 1)
     with pytest.raises(SimulationError, match="workers died 21 times over one block"):
-        list(Cluster(Pretended(here(), deadly)).blocks(job, [(0, 2)]))
+        list(Cluster(Pretended(here(), deadly))(job, [(0, 2)]))
     with pytest.raises(ZeroDivisionError):
-        list(Cluster(Pretended(here(), [ZeroDivisionError()])).blocks(job, [(0, 2)]))
+        list(Cluster(Pretended(here(), [ZeroDivisionError()]))(job, [(0, 2)]))
 
 
 def test_workers_of_another_kind_are_refused(job):
     other = here() | {"processor": "Abacus"}
     with pytest.raises(InputError, match=r"processor Abacus, .*--allow-mixed lets it"):
-        list(Cluster(Pretended(other)).blocks(job, [(0, 2)]))
-    assert len(list(Cluster(Pretended(other), allow_mixed=True).blocks(job, [(0, 2)]))) == 1
+        list(Cluster(Pretended(other))(job, [(0, 2)]))
+    assert len(list(Cluster(Pretended(other), allow_mixed=True)(job, [(0, 2)]))) == 1
     older = here() | {"numba": "0.1"}
     with pytest.raises(InputError, match=r"a worker has numba 0\.1, this process"):
-        list(Cluster(Pretended(older), allow_mixed=True).blocks(job, [(0, 2)]))
+        list(Cluster(Pretended(older), allow_mixed=True)(job, [(0, 2)]))

@@ -17,8 +17,7 @@ from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeigh
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies import weight_delay
 from drillctl.studies.compare.compute import compare
-from drillctl.studies.delay.compute import lasting
-from drillctl.studies.delay.lanes import following_design
+from drillctl.studies.delay.compute import following_design, lasting
 
 HOLDS = (
     (

@@ -1,9 +1,8 @@
 """PI against PI with a weight on bit that follows the bit speed, each at its robust optimum.
 
-- `policies.py`: what is compared, what of it is tuned, and its robust gains.
-- `cases.py`: policies at their optima on equal terms, at fresh draws.
-- `sweeps.py`: areas over the gains of the drive, front and map over weights and speeds.
-- `delays.py`: against the delay of the path; `compute.py`: all of it.
+- `cases.py`: policies, what of them is tuned, and their optima on equal terms, at fresh draws.
+- `sweeps.py`: areas over the gains of the drive, front and map over weights and speeds, delays of
+  the path; `compute.py`: all of it.
 """
 
 from __future__ import annotations
@@ -11,21 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from drillctl.studies.base import Picture, Recipe, Requested, Run, Section, Study
+from drillctl import plots, units
+from drillctl.simulation.measures import MEASURES
+from drillctl.store.tables import Column, Estimate, Table
+from drillctl.studies.base import Picture, Recipe, Requested, Section, Study, in_batch
 
 if TYPE_CHECKING:
-    from drillctl import units
     from drillctl.design import Design
-    from drillctl.store.tables import Column, Table
     from drillctl.studies.advantage.compute import Advantage
     from drillctl.studies.advantage.sweeps import Chart
-
-
-def computed(design: Design, run: Run) -> Advantage:
-    """What the `[advantage]` table says."""
-    from drillctl.studies.advantage.compute import advantage
-
-    return advantage(design, progress=run.progress)
 
 
 def tables(result: Advantage) -> Iterator[Table]:
@@ -39,8 +32,6 @@ def tables(result: Advantage) -> Iterator[Table]:
 
 
 def _gains(hidden: bool = False) -> list[Column]:
-    from drillctl.store.tables import Column
-
     return [
         Column("kp", "Kp", "N*m*s/rad", hidden=hidden),
         Column("ki", "Ki", "N*m/rad", hidden=hidden),
@@ -49,9 +40,6 @@ def _gains(hidden: bool = False) -> list[Column]:
 
 
 def _cases(result: Advantage) -> Table:
-    from drillctl.simulation.measures import MEASURES
-    from drillctl.store.tables import Column, Table
-
     columns = [
         Column("case"), *_gains(), Column("shift", "nominal weight shifted by", "N", 3),
         Column("objective", result.objective, "s", interval=True),
@@ -79,8 +67,6 @@ def _cases(result: Advantage) -> Table:
 
 
 def _shares(result: Advantage) -> Table:
-    from drillctl.store.tables import Column, Table
-
     columns = (
         Column("case"), Column("level", "J1 at or under", "s"),
         Column("share", "share of the draws", percent=True, digits=3, interval=True),
@@ -97,8 +83,6 @@ def _shares(result: Advantage) -> Table:
 
 
 def _areas(result: Advantage) -> Table:
-    from drillctl.store.tables import Column, Estimate, Table
-
     columns = (
         Column("policy"), Column("gain", "K_w", "N*s/rad"), Column("level", "J1 at or under", "s"),
         Column("nominal", "without draws", percent=True, digits=3),
@@ -116,8 +100,6 @@ def _areas(result: Advantage) -> Table:
 
 
 def _chart(name: str, title: str, chart: Chart, shown: bool = True) -> Table:
-    from drillctl.store.tables import Column, Estimate, Table
-
     columns = (
         Column("policy"), Column("weight", "nominal WOB", "N"), Column("speed", "speed", "rad/s"),
         *_gains(hidden=True), Column("mean_weight", "mean WOB", "N"),
@@ -140,8 +122,6 @@ def _chart(name: str, title: str, chart: Chart, shown: bool = True) -> Table:
 
 
 def _delays(result: Advantage) -> Table:
-    from drillctl.store.tables import Column, Estimate, Table
-
     columns = (
         Column("gains"), Column("delay", "delay", "s"), *_gains(),
         Column("objective", "robust J1", "s"),
@@ -152,16 +132,14 @@ def _delays(result: Advantage) -> Table:
         figures = zip(line.delays, line.gains, line.objective, line.advantage, line.low, line.high,
                       strict=True)  # fmt: skip
         for delay, gains, objective, advantage, *ends in figures:
-            found = Estimate(float(advantage), (float(ends[0]), float(ends[1])))
-            rows.append([name, *map(float, (delay, *gains, objective)), found])
+            saved = Estimate(float(advantage), (float(ends[0]), float(ends[1])))
+            rows.append([name, *map(float, (delay, *gains, objective)), saved])
     title = "advantage of the real path against its delay (95 % intervals)"
     return Table("delays", title, columns, rows)
 
 
 def pictures(result: Advantage) -> Iterator[Picture]:
     """Cases, front, map and delays."""
-    from drillctl import plots
-
     yield Picture(
         "cases", "J1 of each policy at its robust optimum, over the fresh draws.",
         "Spread of J1 of each policy on each of the terms.",
@@ -223,16 +201,14 @@ def remarks(result: Advantage, system: units.System) -> Iterator[str]:
 def check(design: Design) -> None:
     """Refuse what the study would refuse in the midst of its work."""
     if "advantage" in design.tree:
+        from drillctl.studies.advantage.cases import policies
         from drillctl.studies.advantage.compute import checked
-        from drillctl.studies.advantage.policies import policies
 
         checked(policies(design))
 
 
 def not_applicable(request: Requested) -> str:
     """Why a report has no such comparison."""
-    from drillctl.studies.applies import in_batch
-
     if not request.profile.compared:
         return "dynamic weight on bit is compared with --profile full"
     if "advantage" not in request.design.tree:
@@ -244,7 +220,6 @@ STUDY = Study(
     name="advantage",
     help="Tune PI with constant and with following weight; compare",
     group="Decide",
-    compute=computed,
     python="advantage",
     call="drillctl.studies.advantage.compute:advantage",
     tables=tables,

@@ -15,18 +15,29 @@ from drillctl.ensemble.grid import refuse_too_large
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.store.codec import label
+from drillctl.store.json_files import picked, strict
 from drillctl.store.result import Result
 from drillctl.studies.advantage.cases import (
     ALL_TERMS,
+    IDEAL,
     MEAN,
+    SPEED,
+    WEIGHT,
     Case,
+    Policies,
     cases,
     fresh_draws,
     own_optima,
+    policies,
 )
-from drillctl.studies.advantage.delays import DelayCurve, delay_curve
-from drillctl.studies.advantage.policies import IDEAL, SPEED, WEIGHT, Policies, policies
-from drillctl.studies.advantage.sweeps import Chart, Regions, chart, regions
+from drillctl.studies.advantage.sweeps import (
+    Chart,
+    DelayCurve,
+    Regions,
+    chart,
+    delay_curve,
+    regions,
+)
 
 Array = NDArray[np.float64]
 
@@ -100,8 +111,7 @@ class Advantage(Result):
         """Cases with paired differences, areas, front, map, crossing delays; SI units."""
         table, tune = self.design.tables.advantage, self.design.tables.tune
         return {
-            "objective": tune.objective
-            + (f" {tune.quantile:g}" if tune.objective in ("quantile", "cvar") else ""),
+            "objective": tune.objective_name,
             "cases": {
                 case.name: case.summary(self.baseline, self.levels, self.seed)
                 for case in self.cases
@@ -110,30 +120,21 @@ class Advantage(Result):
             "front": _chart_summary(self.front),
             "map": _chart_summary(self.chart),
             "delay": self.delay.summary(),
-            "realizations": table.realizations,
-            "seed": table.seed,
-            "material": table.material,
+            **picked(table, "realizations", "seed", "material"),
             "total_seconds": self.total_seconds,
         }
 
 
-def _chart_summary(result: Chart) -> dict[str, Any]:
+def _chart_summary(result: Chart) -> Any:
     shown = ("objective", "mean_weight", "advantage", "advantage_low", "advantage_high")
-    return {
-        "weights": result.weights.tolist(),
-        "speeds": result.speeds.tolist(),
-        "policies": {
-            name: {
-                **{one: _plain(result.figures[one][k]) for one in shown},
-                "significant": result.significant(k).tolist(),
-            }
-            for k, name in enumerate(result.policies)
-        },
+    policies = {
+        name: {
+            **{one: result.figures[one][k] for one in shown},
+            "significant": result.significant(k),
+        }
+        for k, name in enumerate(result.policies)
     }
-
-
-def _plain(values: Array) -> list[list[float | None]]:
-    return [[float(v) if np.isfinite(v) else None for v in row] for row in values]
+    return strict({"weights": result.weights, "speeds": result.speeds, "policies": policies})
 
 
 def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
@@ -149,7 +150,7 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
         With a PI controller. Its `[advantage]` table gives law and path of the weight, what is
         run over and how many draws.
     progress : Progress
-        Told of gains found.
+        Receives finished searches.
 
     Returns
     -------
@@ -196,7 +197,7 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
 def checked(compared: Policies) -> None:
     """Refuse (`InputError`) what would be refused in the midst of the work."""
     design = compared.constant.design
-    table, where = design.tables.advantage, f"{design.origin}: " if design.origin else ""
+    table = design.tables.advantage
     for key, path, values in (
         ("weights", WEIGHT, table.weights), ("speeds", SPEED, table.speeds),
     ):  # fmt: skip
@@ -206,7 +207,7 @@ def checked(compared: Policies) -> None:
                     policy.design.bit_rock  # noqa: B018  its friction, and the limits of the law
                     policy.design.weight_on_bit  # noqa: B018
             except InputError as error:
-                raise InputError(error.problem, f"{where}advantage.{key}") from None
+                raise InputError(error.problem, design.where(f"advantage.{key}")) from None
     points = [table.region_points, table.region_points, table.region_realizations]
     refuse_too_large(points, "advantage.region_points", 1)
     refuse_too_large([table.realizations], "advantage.realizations")

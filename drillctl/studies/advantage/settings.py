@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from drillctl.errors import InputError
 from drillctl.rig import table as q
-from drillctl.rig.table import Table
-from drillctl.studies.delay.settings import LAW, paths_of_weight
+from drillctl.studies.delay.settings import LAW, FollowingTable
 from drillctl.units import RPM
 
 KEY = "advantage"
 GAIN = LAW + "gain"
 REAL_PATH = {f"{LAW}path.delay": "0.2 s", f"{LAW}path.hoist_lag": "0.5 s"}
-"""Way of the weight where a design says nothing of one: wired pipe, and a hoist."""
+"""Way of the weight where a design gives none: wired pipe, and a hoist."""
 
 
-class Settings(Table):
+class Settings(FollowingTable):
     """PI against PI with a weight on bit that follows the bit speed, for `drillctl advantage`.
 
     Both are tuned to the objective of `[tune]`, the gains of the drive within the bounds that
@@ -31,6 +30,8 @@ class Settings(Table):
     gains of the drive, at `region_realizations`. `material`: share of the constant weight's
     objective under which an advantage counts as none.
     """
+
+    varied = (GAIN,)
 
     largest_gain: q.WeightGain = 10e3
     values: dict[str, Any] = Field(default_factory=dict, alias="set")
@@ -45,18 +46,6 @@ class Settings(Table):
     region_points: q.Count = 21
     region_realizations: q.Count = 200
     material: q.PositiveNumber = 0.01
-
-    @field_validator("weights", "speeds", "delays")
-    @classmethod
-    def _sorted(cls, result: tuple[float, ...]) -> tuple[float, ...]:
-        if not result:
-            raise InputError("is empty: at least one value is needed")
-        return tuple(sorted(set(result)))
-
-    @field_validator("values", mode="before")
-    @classmethod
-    def _by_path(cls, value: object) -> object:
-        return paths_of_weight(value, (GAIN,))
 
     @model_validator(mode="after")
     def _enough(self) -> Settings:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from drillctl import plots, units
+from drillctl.simulation.measures import MEASURES, STATUSES
+from drillctl.store.tables import Column, Quantity, Table, quantity
 from drillctl.studies.base import (
     DRAWS,
     SEED,
@@ -12,23 +15,14 @@ from drillctl.studies.base import (
     Picture,
     Recipe,
     Requested,
-    Run,
     Section,
     Study,
+    in_batch,
 )
 
 if TYPE_CHECKING:
-    from drillctl import units
     from drillctl.design import Design
-    from drillctl.store.tables import Table
     from drillctl.studies.compare.compute import Comparison
-
-
-def computed(design: Design, run: Run) -> Comparison:
-    """The cases of the `[compare]` table."""
-    from drillctl.studies.compare.compute import compare
-
-    return compare(design, progress=run.progress)
 
 
 def tables(result: Comparison) -> Iterator[Table]:
@@ -40,8 +34,6 @@ def tables(result: Comparison) -> Iterator[Table]:
 
 def _measures(result: Comparison) -> Table:
     from drillctl.ensemble.cases import QUANTILES
-    from drillctl.simulation.measures import MEASURES
-    from drillctl.store.tables import Column, Quantity, Table
 
     columns = (
         Column("measure", hidden=True), Column("label", "measure"), Column("case"),
@@ -68,8 +60,6 @@ def _measures(result: Comparison) -> Table:
 
 
 def _shares(result: Comparison) -> Table:
-    from drillctl.store.tables import Column, Table
-
     maps = any(case.nominal.map is not None for case in result.cases)
     columns = (
         Column("level", "J1 at or under", "s"), Column("case"), Column("draws", hidden=True),
@@ -89,9 +79,6 @@ def _shares(result: Comparison) -> Table:
 
 
 def _draws(result: Comparison) -> Table:
-    from drillctl.simulation.measures import STATUSES
-    from drillctl.store.tables import Column, Table
-
     heads = ("case", "realization", *result.baseline.drawn, *result.baseline.measures, "status")
     rows = [
         [case.name, number, *map(float, values), STATUSES[status]]
@@ -105,8 +92,6 @@ def _draws(result: Comparison) -> Table:
 
 def pictures(result: Comparison) -> Iterator[Picture]:
     """Distributions, differences, weight, regions and responses."""
-    from drillctl import plots
-
     names, first = ", ".join(case.name for case in result.cases), result.baseline.name
     yield Picture(
         "distributions", "Distribution of J1 of each case over the draws.",
@@ -138,8 +123,6 @@ def pictures(result: Comparison) -> Iterator[Picture]:
 
 def remarks(result: Comparison, system: units.System) -> Iterator[str]:
     """Draws, shifted weights, failures and missing maps."""
-    from drillctl.store.tables import quantity
-
     yield (
         f"{result.realizations} draws of {', '.join(result.baseline.drawn)}, the same for every "
         f"case; seed {result.seed}."
@@ -163,15 +146,13 @@ def notes(result: Comparison) -> Iterator[str]:
 def check(design: Design) -> None:
     """Refuse cases that are not on equal terms."""
     if design.tables.compare.cases:
-        from drillctl.studies.compare.cases import case_designs, refuse_unequal
+        from drillctl.studies.compare.compute import case_designs, refuse_unequal
 
         refuse_unequal(case_designs(design))
 
 
 def not_applicable(request: Requested) -> str:
     """Why a report compares no cases."""
-    from drillctl.studies.applies import in_batch
-
     if not request.design.tables.compare.cases:
         return "the design has no cases to compare ([compare])"
     if not request.profile.compared:
@@ -183,7 +164,6 @@ STUDY = Study(
     name="compare",
     help="Compare cases at the same draws",
     group="Decide",
-    compute=computed,
     options=(
         DRAWS,
         SEED,

@@ -1,10 +1,12 @@
 """Cases compared at equal terms: the same starts, the same draws, optionally the same mean weight.
 
-What differs between two cases is their paired difference, see `ensemble.cases`.
+Each case is a design; its map and one motion are computed without draws. What differs between two
+cases is their paired difference, see `ensemble.cases`.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -13,32 +15,144 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from drillctl.design import Design, to_toml
+from drillctl import units
+from drillctl.design import Design, parameter, to_toml
 from drillctl.ensemble.cases import Estimate, Runs
 from drillctl.ensemble.draws import CommonDraws, Failures, equalising_shift, run_draws, start_up
-from drillctl.ensemble.grid import refuse_too_large
-from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
-from drillctl.ensemble.regions import Region, region
+from drillctl.ensemble.grid import axes_of, refuse_too_large
+from drillctl.ensemble.parameters import Uncertain, refuse_dependent, uncertain_parameters
+from drillctl.ensemble.sweeps import Region, Sweep, region, sweep
 from drillctl.errors import InputError
-from drillctl.progress import SILENT, Progress
-from drillctl.store.codec import label
+from drillctl.progress import SILENT, Progress, Within
+from drillctl.simulation import Simulation, simulate
+from drillctl.store.codec import Array, label
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
-from drillctl.studies.compare.cases import (
-    Nominal,
-    case_designs,
-    cells_of,
-    in_case,
-    nominal_runs,
-    refuse_unequal,
-    shifted_design,
-)
 
 if TYPE_CHECKING:
     from drillctl.design.tables import AxisTable
 
-Array = NDArray[np.float64]
+ALONE = "as designed"  # name of the only case of a design without cases
+INTERVAL = 0.1  # sampling interval of the responses (s), rounded to a whole number of steps
+NO_MAPS = "compare.maps is false"  # reason where no maps are requested
+WEIGHT = "operating_point.weight_on_bit"  # what is shifted for the sake of equal mean weights
+
+
+def case_designs(design: Design) -> dict[str, Design]:
+    """The cases of a design's `[compare]` table, the baseline first."""
+    cases = design.tables.compare.cases
+    if not cases:
+        return {ALONE: design}
+    results = {}
+    for case in cases:
+        with design.within(_of_case(case.name)):
+            results[case.name] = design.replace(case.values)
+    return results
+
+
+def _of_case(name: str) -> str:
+    return f"compare.cases {name!r}"
+
+
+def refuse_unequal(cases: Mapping[str, Design]) -> tuple[Uncertain, ...]:
+    """Refuse cases that are not on equal terms: other starts, other runs, other draws."""
+    if not cases:
+        raise InputError("at least one case is needed", "compare.cases")
+    baseline = next(iter(cases.values()))
+    expected = uncertain_parameters(baseline)
+    for name, design in cases.items():
+        with design.within(_of_case(name)):
+            _refuse_other_runs(design, baseline)
+            _refuse_other_draws(design, baseline, expected)
+    return expected
+
+
+def _refuse_other_runs(design: Design, baseline: Design) -> None:
+    one, other = design.tables, baseline.tables
+    if one.start != other.start:
+        raise InputError("cases are compared from the same start as the first", "start")
+    for key in ("duration", "j1_from"):
+        if getattr(one.simulation, key) != getattr(other.simulation, key):
+            raise InputError("cases are compared over the same run as the first",
+                             f"simulation.{key}")  # fmt: skip
+
+
+def _refuse_other_draws(design: Design, baseline: Design, expected: tuple[Uncertain, ...]) -> None:
+    result = uncertain_parameters(design)
+    if design.tables.uncertain != baseline.tables.uncertain or (
+        [p.path for p in result] != [p.path for p in expected]
+    ):
+        raise InputError(
+            f"the first case draws {', '.join(p.path for p in expected)}; every case must draw "
+            "the same: name them in [uncertain] of the design",
+            "uncertain",
+        )
+    for drawn in (p for p in result if not p.own_mean):
+        if parameter(design, drawn.path).value != parameter(baseline, drawn.path).value:
+            raise InputError(
+                "is drawn, from one distribution in all cases, so that a value of its own has no "
+                "effect; a distribution without mean is drawn about the value of each case",
+                drawn.path,
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Nominal:
+    """A case at its own values, nothing drawn."""
+
+    map: Sweep | None  # J1 and the other measures over the two axes of the comparison, not audited
+    no_map: str | None  # why there is none; None where there is one
+    response: Simulation  # by the batch engine, sampled about every `INTERVAL`
+
+    def summary(self) -> dict[str, Any]:
+        """Measures and scheme of the response, map or why there is none; SI."""
+        result = None
+        if self.map is not None:
+            # Regions stand with the case, at the levels of the comparison; no cell was audited.
+            whole = self.map.summary()
+            result = {key: whole[key] for key in whole if key not in ("regions", "audit")}
+        return {**self.response.summary(), "map": result, "no_map": self.no_map}
+
+
+def shifted_design(design: Design, shift: float) -> Design:
+    """The design with its nominal weight on bit shifted (N)."""
+    if shift == 0.0:
+        return design
+    weight = design.tables.operating_point.weight_on_bit + shift
+    values: dict[str, Any] = {WEIGHT: units.SI(weight)}
+    low, high = design.table_range
+    if not low <= weight <= high:
+        # A weight that moves leaves the table in its draws too; only a design is asked first.
+        values["bit_rock.outside_table"] = "extrapolate"
+    return design.replace(values)
+
+
+def cells_of(tables: tuple[AxisTable, ...] | None) -> int:
+    """Cells of the map of each case."""
+    return math.prod(table.points for table in tables) if tables else 0
+
+
+def nominal_runs(
+    design: Design, tables: tuple[AxisTable, ...] | None, progress: Progress
+) -> Nominal:
+    """Map and response of a case; without tables of axes no map."""
+    result, reason = None, None
+    try:
+        result = _map(design, tables, progress)
+    except InputError as error:  # the axes do not fit this case, or a value on them is impossible
+        reason = str(error)
+        progress.advance(cells_of(tables))
+    return Nominal(result, reason, simulate(design, engine="batch", interval=INTERVAL))
+
+
+def _map(design: Design, tables: tuple[AxisTable, ...] | None, progress: Progress) -> Sweep:
+    if tables is None:
+        raise InputError(NO_MAPS)
+    if len(tables) != 2:
+        raise InputError(f"a map runs over 2 parameters, [map] has {len(tables)}")
+    return sweep(design, axes_of(design, tables), audit_cells=0, progress=Within(progress))
+
 
 COMPARED = (
     "j1", "stuck_time", "stick_slip_index", "peak_bit_speed", "peak_pipe_torque",
@@ -83,9 +197,7 @@ class ComparedCase(Runs):
             "regions": regions,
             "statuses": self.counts(),
             "failures": [asdict(failure) for failure in self.failures],
-            "weight_shift": self.weight_shift,
-            "step": self.step,
-            "modes": self.modes,
+            **picked(self, "weight_shift", "step", "modes"),
             "nominal": self.nominal.summary(),
         }
 
@@ -144,12 +256,10 @@ class Comparison(Result):
                 for name, differences in self.paired.items()
             },
             "baseline": self.baseline.name,
-            "realizations": self.realizations,
-            "seed": self.seed,
             "uncertain": list(self.baseline.drawn),
-            "equal_mean_weight": self.equal_mean_weight,
-            "weight_from": self.weight_from,
-            "total_seconds": self.total_seconds,
+            **picked(
+                self, "realizations", "seed", "equal_mean_weight", "weight_from", "total_seconds"
+            ),
         }
 
     def requested(self) -> tuple[Design, dict[str, Any]]:
@@ -181,16 +291,16 @@ def compare(
         What they follow from; by default from there too.
     equal_mean_weight : bool, optional
         Shift the nominal weight of a case with a moving weight on bit until its mean after the
-        start, over the draws, is the nominal one; by default as `[compare]` says.
+        start, over the draws, is the nominal one; by default as in `[compare]`.
     progress : Progress
-        Told of runs and of cells of the maps.
+        Receives finished runs and cells of the maps.
 
     Returns
     -------
     Comparison
         A draw that is impossible or breaks down is a status and counted, not an exception. Maps
         of the cases over the axes of the first design's `[map]` table, unless its `compare.maps`
-        says no.
+        is false.
 
     Raises
     ------
@@ -224,10 +334,8 @@ def compare(
     draws = CommonDraws(table.realizations, table.seed)
     results = []
     for name, variant in named.items():
-        try:
+        with variant.within(_of_case(name)):
             results.append(_compared(name, variant, draws, equal, axes, progress))
-        except InputError as error:
-            raise in_case(error, variant, name) from None
     return Comparison(
         design=design,
         cases=tuple(results),

@@ -22,7 +22,7 @@ class CaseTable(Table):
     @classmethod
     def _not_empty(cls, name: str) -> str:
         if not name.strip() or not name.isprintable():
-            raise InputError(f"{name!r} is not allowed: a case needs a name to be told apart by")
+            raise InputError(f"{name!r} is not allowed: every case needs a name")
         return name
 
 

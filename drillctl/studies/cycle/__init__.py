@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from drillctl import plots, units
+from drillctl.store.tables import Column, Table, number, quantity
 from drillctl.studies.base import Picture, Run, Study
 
 if TYPE_CHECKING:
-    from drillctl import units
     from drillctl.design import Design
     from drillctl.simulation.limit_cycle import LimitCycle
-    from drillctl.store.tables import Table
 
 
 def computed(design: Design, run: Run) -> LimitCycle:
@@ -23,9 +23,7 @@ def computed(design: Design, run: Run) -> LimitCycle:
 
 
 def tables(result: LimitCycle) -> Iterator[Table]:
-    """What each method says of the cycle."""
-    from drillctl.store.tables import Column, Table
-
+    """Period, peak speed and stuck time of the cycle by each method."""
     orbit, predicted, run = result.orbit, result.predicted, result.simulated.summary()
     columns = (
         Column("method"),
@@ -49,8 +47,6 @@ def tables(result: LimitCycle) -> Iterator[Table]:
 
 def pictures(result: LimitCycle) -> Iterator[Picture]:
     """One period by each method."""
-    from drillctl import plots
-
     yield Picture(
         "limit-cycle", "Bit speed over one cycle: exact, simulated, and as one harmonic.",
         f"Bit speed over one cycle by three methods; the motion is {result.status}.",
@@ -60,8 +56,6 @@ def pictures(result: LimitCycle) -> Iterator[Picture]:
 
 def remarks(result: LimitCycle, system: units.System) -> Iterator[str]:
     """Unstable cycles, and the run that decides the status."""
-    from drillctl.store.tables import number, quantity
-
     for one in (x for x in result.harmonic if not x.stable):
         yield (
             f"Unstable cycle by one harmonic: {number(one.period)} s, "

@@ -5,26 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from drillctl.studies.base import DRAWS, SEED, Picture, Run, Study
+from drillctl import plots, units
+from drillctl.store.tables import Column, Table, chance, quantity
+from drillctl.studies.base import DRAWS, SEED, Picture, Study
 
 if TYPE_CHECKING:
-    from drillctl import units
     from drillctl.design import Design
-    from drillctl.store.tables import Table
     from drillctl.studies.delay.compute import WeightDelay
-
-
-def computed(design: Design, run: Run) -> WeightDelay:
-    """Every gain and delay of the `[weight_delay]` table at the same draws."""
-    from drillctl.studies.delay.compute import weight_delay
-
-    return weight_delay(design, progress=run.progress)
 
 
 def tables(result: WeightDelay) -> Iterator[Table]:
     """J1 and the end of stick-slip by gain and delay, and how much delay each gain bears."""
-    from drillctl.store.tables import Column, Table
-
     columns = (
         Column("gain", "K_w", "N*s/rad"), Column("delay", "delay", "s"),
         Column("j1", "mean J1", "s", interval=True),
@@ -62,8 +53,6 @@ def tables(result: WeightDelay) -> Iterator[Table]:
 
 def pictures(result: WeightDelay) -> Iterator[Picture]:
     """J1 and the end of stick-slip against the delay."""
-    from drillctl import plots
-
     yield Picture(
         "weight-delay", "Weight on bit that follows the bit speed, against its delay.",
         "Mean J1 and share of draws in which stick-slip ends against the delay, a line a gain.",
@@ -73,8 +62,6 @@ def pictures(result: WeightDelay) -> Iterator[Picture]:
 
 def remarks(result: WeightDelay, system: units.System) -> Iterator[str]:
     """The constant weight, failures and draws."""
-    from drillctl.store.tables import chance, quantity
-
     constant, longest = result.baseline, result.delays[-1]
     ended = constant.ended
     yield (
@@ -94,7 +81,7 @@ def remarks(result: WeightDelay, system: units.System) -> Iterator[str]:
 def check(design: Design) -> None:
     """Refuse a law that does not follow the bit speed, before anything is run."""
     if "weight_delay" in design.tree:
-        from drillctl.studies.delay.lanes import following_design
+        from drillctl.studies.delay.compute import following_design
 
         following_design(design)
 
@@ -103,7 +90,6 @@ STUDY = Study(
     name="delay",
     help="Show what delay does to a weight that follows bit speed",
     group="Decide",
-    compute=computed,
     options=(DRAWS, SEED),
     python="weight_delay",
     call="drillctl.studies.delay.compute:weight_delay",

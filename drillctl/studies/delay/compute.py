@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -28,18 +28,24 @@ from drillctl.ensemble.cases import (
     scheme_of,
     share_of,
 )
-from drillctl.ensemble.draws import Failures
+from drillctl.ensemble.draws import DrawnGroup, DrawnLanes, Failures, drawn_lanes, run_draws
 from drillctl.ensemble.grid import refuse_too_large
-from drillctl.ensemble.parameters import draw, refuse_dependent
+from drillctl.ensemble.parameters import Draws, draw, refuse_dependent, uncertain_parameters
+from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
+from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.store.codec import label
+from drillctl.store.codec import Array, label
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
-from drillctl.studies.delay.lanes import KEPT, delayed_lanes, following_design
+from drillctl.studies.delay.settings import LAW, VARIED
 
-Array = NDArray[np.float64]
-
-
+LAWS = ("navarro-lopez-suarez", "surface-observer")  # laws of a weight that follows the bit speed
+GAIN, DELAY = VARIED
+KEPT = (
+    "j1", "peak_bit_speed", "peak_pipe_torque", "mean_weight_on_bit", "mean_weight_after_start",
+)  # fmt: skip
+"""Measures that are kept of a run."""
 ENOUGH = 0.95  # share of the draws in which stick-slip must have ended
 
 
@@ -66,9 +72,7 @@ class DelayedBenefit:
             "ended": self.ended.hits,
             "ended_share": self.ended.value,
             "ended_interval_95": list(self.ended.interval),
-            "peak_bit_speed": self.peak_bit_speed,
-            "peak_pipe_torque": self.peak_pipe_torque,
-            "mean_weight": self.mean_weight,
+            **picked(self, "peak_bit_speed", "peak_pipe_torque", "mean_weight"),
         }
 
     def share_summary(self) -> dict[str, Any]:
@@ -228,13 +232,11 @@ class WeightDelay(Result, Runs):
             ],
             "constant": constant,
             "delays": self.delays.tolist(),
-            "realizations": self.realizations,
-            "seed": self.seed,
             "uncertain": list(self.drawn),
             "failures": [asdict(failure) for failure in self.failures],
             "step": step,
             "modes": modes,
-            "total_seconds": self.total_seconds,
+            **picked(self, "realizations", "seed", "total_seconds"),
         }
 
 
@@ -260,7 +262,7 @@ def weight_delay(
     realizations : int, optional
         Number of draws instead of the design's own.
     progress : Progress
-        Told of runs.
+        Receives finished runs.
 
     Returns
     -------
@@ -279,7 +281,7 @@ def weight_delay(
     `drillctl.rig.weight_on_bit.RealWeight`.
     """
     begin = time.perf_counter()
-    design = _asked(design, gains, delays, realizations)
+    design = _given(design, gains, delays, realizations)
     refuse_dependent(design)
     table, count = design.tables.weight_delay, design.tables.uncertainty.realizations
     refuse_too_large([len(table.gains), len(table.delays), count], "weight_delay")
@@ -309,12 +311,10 @@ def weight_delay(
     )
 
 
-def _asked(
-    design: Design,
-    gains: Sequence[float | str] | None,
-    delays: Sequence[float | str] | None,
+def _given(
+    design: Design, gains: Sequence[float | str] | None, delays: Sequence[float | str] | None,
     realizations: int | None,
-) -> Design:
+) -> Design:  # fmt: skip
     """The design with what was given beside it, so that it alone makes the run again."""
     values: dict[str, Any] = {}
     for key, given in (("gains", gains), ("delays", delays)):
@@ -325,3 +325,84 @@ def _asked(
     if realizations is not None:
         values["uncertainty.realizations"] = realizations
     return design.replace(values) if values else design
+
+
+def following_design(design: Design) -> Design:
+    """The design with a weight on bit that follows the bit speed, as yet with no gain or delay."""
+    for path in VARIED:
+        if path in design.tables.uncertain:
+            where = design.where(f"uncertain.{path}")
+            raise InputError("is what the study runs over and cannot be drawn", where)
+    values = following_law(design, design.tables.weight_delay.values)
+    with design.within("weight_delay.set"):
+        result = design.replace({**values, GAIN: units.SI(0.0), DELAY: units.SI(0.0)})
+        # Limits are compared with the nominal weight only when the law is made of them.
+        result.weight_on_bit  # noqa: B018
+    uncertain_parameters(result)
+    return result
+
+
+def following_law(design: Design, given: dict[str, Any]) -> dict[str, Any]:
+    """Values of `[weight_on_bit]` whose law follows the bit speed: the design's, if it does."""
+    own = design.tables.weight_on_bit.law
+    values = {f"{LAW}law": LAWS[0] if own == "constant" else own, **given}
+    if (law := values[f"{LAW}law"]) not in LAWS:
+        raise InputError(
+            f"{law!r} does not follow the bit speed; allowed: {', '.join(LAWS)}",
+            design.where(f"{LAW}law"),
+        )
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class DelayedLanes:
+    """Every draw at every delay."""
+
+    # at no delay, where that is asked for, and at all others: without any lag the first is of the
+    # law that acts at once, which has a kernel of its own
+    parts: tuple[DrawnLanes, ...]
+    draws: int  # how many draws, the impossible ones included
+    delays: Array  # shape (delays,): Increasing (s)
+
+    def run(self, gain: float) -> Runs:
+        """Simulate all at one gain (N s/rad); runs of shape (delays, draws)."""
+        results = []
+        at = (self.delays > 0.0).astype(int)
+        sizes = [int((at == k).sum()) for k in (0, 1) if (at == k).any()]
+        for part, size in zip(self.parts, sizes, strict=True):
+            groups = tuple(
+                DrawnGroup(g.design, _with(g.lanes, gain=np.full(len(g.lanes), gain)), g.numbers)
+                for g in part.groups
+            )
+            runs = run_draws(DrawnLanes(groups, part.failures), size * self.draws)
+            results.append(runs.over((size, self.draws), KEPT))
+        return joined(results, np.concatenate)
+
+
+def delayed_lanes(following: Design, draws: Draws, delays: Array) -> DelayedLanes:
+    """Lanes of a design at every draw and delay."""
+    late = delays[delays > 0.0]
+    parts = []
+    if late.size < delays.size:
+        parts.append(drawn_lanes(following, draws))
+    if late.size:
+        first = drawn_lanes(following.replace({DELAY: units.SI(float(late[0]))}), draws)
+        parts.append(_at_delays(first, len(draws), late))
+    return DelayedLanes(tuple(parts), len(draws), delays)
+
+
+def _at_delays(drawn: DrawnLanes, count: int, delays: Array) -> DrawnLanes:
+    """All draws again at every delay, delay by delay."""
+    groups = []
+    for group in drawn.groups:
+        size = len(group.lanes)
+        lanes = group.lanes[np.tile(np.arange(size), len(delays))]
+        numbers = np.concatenate([group.numbers + k * count for k in range(len(delays))])
+        delayed = _with(lanes, delay=np.repeat(delays, size))
+        groups.append(DrawnGroup(group.design, delayed, numbers))
+    return DrawnLanes(tuple(groups), drawn.failures)
+
+
+def _with(lanes: Lanes, **numbers: Array) -> Lanes:
+    """Lanes with other numbers of their weight law."""
+    return replace(lanes, weight=lanes.weight._replace(**numbers))

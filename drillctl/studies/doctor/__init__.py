@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from drillctl import plots, units
+from drillctl.store.tables import Column, Table, number
 from drillctl.studies.base import Check, Option, Picture, Recipe, Run, Study
 
 if TYPE_CHECKING:
-    from drillctl import units
     from drillctl.design import Design
-    from drillctl.store.tables import Table
     from drillctl.studies.doctor.compute import Doctor
 
 MODES = {
@@ -48,7 +48,6 @@ def tables(result: Doctor) -> Iterator[Table]:
 
 
 def _scheme(scheme: dict[str, Any]) -> Table:
-    from drillctl.store.tables import Column, Table
     from drillctl.studies.doctor.scheme import FORMS
 
     rows = [["step", f"{1e3 * scheme['step']:.4g} ms", _why(scheme)]]
@@ -74,8 +73,6 @@ def _why(scheme: dict[str, Any]) -> str:
 
 
 def _errors(result: Doctor, estimate: dict[str, Any]) -> Table:
-    from drillctl.store.tables import Column, Table
-
     promised = estimate["promised"]
     rows = [
         ["median", estimate["median"], promised["median"]],
@@ -94,8 +91,6 @@ def _errors(result: Doctor, estimate: dict[str, Any]) -> Table:
 
 
 def _audited(audit: dict[str, Any]) -> Table:
-    from drillctl.store.tables import Column, Table
-
     rows = [
         [
             ", ".join(f"{path} = {value:.4g}" for path, value in lane["at"].items()) or "design",
@@ -114,8 +109,6 @@ def _audited(audit: dict[str, Any]) -> Table:
 
 
 def _speed(speed: dict[str, Any]) -> Table:
-    from drillctl.store.tables import Column, Table
-
     rows = [
         ["lanes per second", f"{speed['lanes_per_second']:,.0f} on {speed['threads']} threads"],
         ["a step of a lane", f"{speed['lane_step_ns']:.2f} ns of a core"],
@@ -126,8 +119,6 @@ def _speed(speed: dict[str, Any]) -> Table:
 
 def pictures(result: Doctor) -> Iterator[Picture]:
     """Estimated errors against J1."""
-    from drillctl import plots
-
     if len(result.cells):
         yield Picture(
             "errors", "Estimated relative error of J1 over a sample of the map.",
@@ -149,13 +140,11 @@ def remarks(result: Doctor, system: units.System) -> Iterator[str]:
 
 def checks(result: Doctor) -> Iterator[Check]:
     """Whether the accuracy is reached."""
-    from drillctl.store.tables import number
-
     if result.refused is None:
-        errors = result.estimate.errors
+        known = result.summary()["estimate"]
         detail = (
-            f"median {number(errors.median, 2)}, 99th percentile {number(errors.p99, 2)} over "
-            f"{errors.lanes} cells"
+            f"median {number(known['median'], 2)}, 99th percentile {number(known['p99'], 2)} over "
+            f"{known['lanes'] - known['failed']} cells"
         )
         better = f"; better: {result.advice}" if result.advice else ""
         reached = result.verdict in ("ok", "check")
@@ -168,7 +157,7 @@ STUDY = Study(
     group="Describe a rig",
     compute=computed,
     options=(
-        Option("audit", int, "Lanes to audit with the reference solver.", default=4, least=0),
+        Option("audit", int, "Audit this many lanes with the reference solver", default=4, least=0),
     ),
     axes=True,
     python="doctor",

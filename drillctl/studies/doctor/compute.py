@@ -8,7 +8,7 @@ simulated again with the reference solver.
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numba
@@ -17,7 +17,16 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.ensemble import audit as auditing
-from drillctl.ensemble.grid import Axis, Group, axes_of, cell_design, groups, shape_of, span
+from drillctl.ensemble.grid import (
+    Axis,
+    Group,
+    axes_of,
+    cell_design,
+    groups,
+    place_of,
+    shape_of,
+    span,
+)
 from drillctl.ensemble.running import load_kernel, measured
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
@@ -27,18 +36,16 @@ from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
 from drillctl.simulation.scheme import PROMISES
-from drillctl.store.codec import label
+from drillctl.store.codec import Array, Index, label
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 from drillctl.studies.doctor.scheme import (
     REFINEMENTS,
     ErrorEstimate,
-    SchemeReasons,
     errors_of,
     explain,
     refined,
 )
-
-Array = NDArray[np.float64]
 
 SEED = 20122  # seed of the sample: the same design is examined at the same cells
 LANES = 256  # lanes in the sample; fewer if the map has fewer cells
@@ -55,17 +62,6 @@ MOST_LANES = 65_536
 REPEATS = 3  # runs of which the fastest counts: what others take of the machine is not the engine
 
 
-@dataclass(frozen=True)
-class Speed:
-    """Speed of the engine on lanes of a design, the kernel warm."""
-
-    threads: int
-    lanes: int  # in a timed run
-    seconds: float  # it took (s)
-    lanes_per_second: float  # whole lanes, from their start to the end of their horizon
-    lane_step_ns: float  # processor time of a step of a lane (ns)
-
-
 @dataclass(frozen=True, eq=False)
 class Doctor(Result):
     """What the batch engine does with a design, on a sample of the cells of its map.
@@ -79,14 +75,16 @@ class Doctor(Result):
 
     design: Design = label(means="that was examined")
     axes: tuple[Axis, ...] = label(means="of the map that the sample is from")
-    cells: NDArray[np.int64] = label("lane", name="cell", means="the sample, in the flattened map")
+    cells: Index = label("lane", name="cell", means="the sample, in the flattened map")
     estimate: ErrorEstimate = label(flat=True, means="J1 of the lanes at three schemes")
     status: NDArray[np.int8] = label("lane", flags=STATUSES, means="status at the scheme")
     scheme: dict[str, Any] | None = label(means="None if the engine refuses the design")
     strings: int = label(means="strings in the sample")
     audit: auditing.Audit = label(means="lanes simulated again with the reference solver")
     requested_audit: int = label(means="how many were requested")
-    speed: dict[str, Any] | None = label(means="as `Speed`")
+    speed: dict[str, Any] | None = label(
+        means="threads, lanes and seconds of a timed run, lanes per second, ns of a core per step"
+    )
     refused: str | None = label(means="why the batch engine does not take this design")
     advice: str | None = label(means="what would keep the promise of the accuracy")
     total_seconds: float = label(unit="s", means="from call to return")
@@ -106,13 +104,13 @@ class Doctor(Result):
 
     @property
     def confirmed(self) -> bool | None:
-        """Whether the audited differences are such as the estimate says; None without any."""
+        """Whether the audited differences are such as the estimate expects; None without any."""
         known = np.isfinite(self.audit.differences)
         if not known.any():
             return None
         own = self.estimate.of_lanes[np.searchsorted(self.cells, self.audit.cells)]
-        said = np.fmax(own, self.estimate.errors.median)
-        allowed = CONFIRMED * said + REFERENCE
+        expected = np.fmax(own, self.estimate.errors.median)
+        allowed = CONFIRMED * expected + REFERENCE
         return bool((self.audit.differences[known] <= allowed[known]).all())
 
     @property
@@ -129,15 +127,12 @@ class Doctor(Result):
         promise = PROMISES[self.accuracy]
         scheme = None if self.scheme is None else self.scheme | {"strings": self.strings}
         return {
-            "verdict": self.verdict,
-            "refused": self.refused,
-            "advice": self.advice,
-            "engine": self.engine,
+            **picked(self, "verdict", "refused", "advice", "engine", "speed", "total_seconds"),
             "scheme": scheme,
             "estimate": {
                 "lanes": len(self.cells),
                 "failed": int((~np.isfinite(self.estimate.of_lanes)).sum()),
-                **self.estimate.errors.summary(),
+                **self.estimate.errors._asdict(),
                 "order": self.estimate.order,
                 "promised": {"median": promise.median, "p99": promise.p99},
             },
@@ -147,17 +142,14 @@ class Doctor(Result):
                 "confirms_estimate": self.confirmed,
                 "lanes": [self._audited(i) for i in range(len(self.audit.cells))],
             },
-            "speed": self.speed,
             "axes": span(self.axes),
-            "total_seconds": self.total_seconds,
         }
 
     def _audited(self, number: int) -> dict[str, Any]:
         cell = int(self.audit.cells[number])
-        where = np.unravel_index(cell, shape_of(self.axes)) if self.axes else ()
         lane = int(np.searchsorted(self.cells, cell))
         return {
-            "at": {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)},
+            "at": place_of(self.axes, cell),
             "j1": float(self.audit.batch[number]),
             "reference_j1": float(self.audit.reference[number]),
             "relative_difference": float(self.audit.differences[number]),
@@ -180,12 +172,12 @@ def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILE
     audit_cells : int
         Lanes to simulate again with the reference solver; none is begun after some seconds.
     progress : Progress
-        Told of what is being done.
+        Receives finished stages.
 
     Returns
     -------
     Doctor
-        A law that the batch engine does not take is told in it.
+        A law that the batch engine does not take is stated in it.
 
     Raises
     ------
@@ -211,11 +203,11 @@ def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILE
         cells=sample.cells,
         estimate=estimate,
         status=status,
-        scheme=main.reasons().summary(),
+        scheme=main.reasons(),
         strings=len(sample.parts),
         audit=audited,
         requested_audit=audit_cells,
-        speed=asdict(speed),
+        speed=speed,
         refused=None,
         advice=advice,
         total_seconds=time.perf_counter() - begin,
@@ -259,18 +251,18 @@ class _Part:
     """Lanes of the sample that share a string."""
 
     group: Group
-    chosen: NDArray[np.int64]  # lanes of the group
-    at: NDArray[np.int64]  # their places in the sample
+    chosen: Index  # lanes of the group
+    at: Index  # their places in the sample
     prepared: Prepared
 
-    def reasons(self) -> SchemeReasons:
+    def reasons(self) -> dict[str, Any]:
         table = self.group.design.tables.simulation
         return explain(self.group.telling, table, self.prepared)
 
 
 @dataclass(frozen=True, eq=False)
 class _Sample:
-    cells: NDArray[np.int64]
+    cells: Index
     parts: list[_Part]
 
     def examine(self, progress: Progress) -> tuple[ErrorEstimate, NDArray[np.int8]]:
@@ -319,7 +311,7 @@ def _sample(axes: tuple[Axis, ...], result: list[Group]) -> _Sample:
 def _audited(
     design: Design,
     axes: tuple[Axis, ...],
-    cells: NDArray[np.int64],
+    cells: Index,
     j1: Array,
     count: int,
     progress: Progress,
@@ -329,14 +321,14 @@ def _audited(
     if not len(lanes):
         known = np.flatnonzero(np.isfinite(j1))
         lanes = np.sort(known[np.argsort(j1[known])][:count])
-    designs = [cell_design(design, axes, int(cell)) if axes else design for cell in cells[lanes]]
+    designs = [cell_design(design, axes, int(cell)) for cell in cells[lanes]]
     reference = auditing.references(designs, progress, AUDIT_SECONDS)
     lanes = lanes[: len(reference)]
     return auditing.Audit(cells[lanes], j1[lanes], reference)
 
 
-def _speed(part: _Part) -> Speed:
-    """Time enough lanes for about two seconds."""
+def _speed(part: _Part) -> dict[str, Any]:
+    """Speed of the engine on lanes of a design, the kernel warm."""
     lanes, prepared = part.group.some(part.chosen), part.prepared
     load_kernel(lanes, prepared)
     many = lanes
@@ -345,8 +337,13 @@ def _speed(part: _Part) -> Speed:
         wanted = len(many) * min(10.0, max(1.5, 1.3 * TIMED_SECONDS / seconds))
         many = lanes[np.arange(min(MOST_LANES, int(wanted) + 1)) % len(lanes)]
     seconds, used = _best(many, prepared, REPEATS)
-    step = 1e9 * used / (len(many) * prepared.scheme.steps)
-    return Speed(numba.get_num_threads(), len(many), seconds, len(many) / seconds, step)
+    return {
+        "threads": numba.get_num_threads(),
+        "lanes": len(many),
+        "seconds": seconds,
+        "lanes_per_second": len(many) / seconds,  # from their start to the end of their horizon
+        "lane_step_ns": 1e9 * used / (len(many) * prepared.scheme.steps),
+    }
 
 
 def _best(lanes: Lanes, prepared: Prepared, repeats: int) -> tuple[float, float]:

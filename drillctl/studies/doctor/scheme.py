@@ -1,9 +1,8 @@
-"""Why the batch engine takes the step and the modes that it takes.
+"""Why the batch engine takes its step and modes, and how far off it is by its own estimate.
 
-`choose_scheme` is what chooses. Here each of its bounds is worked out once more and named, from the
-same constants and helpers, and what they give is held to what was chosen.
-
-Errors of the batch engine estimated from itself: the same lanes at finer schemes.
+`choose_scheme` is what chooses. Here each of its bounds is computed once more and named, from the
+same constants and helpers, and the outcome is compared with what was chosen. Errors are estimated
+from the same lanes at finer schemes.
 """
 
 from __future__ import annotations
@@ -11,10 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl.design.tables import SimulationTable
 from drillctl.rig.drillstring import Drillstring
@@ -32,7 +30,7 @@ from drillctl.simulation.scheme import (
     _whole_steps,
     bit_inertia,
 )
-from drillctl.store.codec import label
+from drillctl.store.codec import Array, label
 
 SHORTENED = 1e-3
 """Share by which a step must be shorter than its bound for whole steps to be the reason."""
@@ -40,60 +38,16 @@ FORMS = {"undamped": "undamped modes", "blocks": "2 x 2 blocks", "dense": "a den
 """Forms of the string, in words."""
 
 
-@dataclass(frozen=True)
-class Bound:
+class Bound(NamedTuple):
     """A bound on the step."""
 
-    name: str  # {'accuracy', 'elastic_mode', 'friction', 'given'}: What bounds it
+    name: str  # 'accuracy', 'elastic_mode', 'friction' or 'given'
     step: float  # longest step that it allows (s)
     reason: str  # in words
 
 
-@dataclass(frozen=True)
-class SchemeReasons:
-    """A scheme, and why it is this one."""
-
-    scheme: Scheme  # step, steps and modes
-    accuracy: str  # {'fast', 'standard', 'fine'}: Asked for
-    bounds: tuple[Bound, ...]  # on the step; a given step stands alone
-    # name of the bound that decides, or 'sampling' or 'program' where the step is shorter for
-    # whole steps to a period of the controller, or to what changes by the clock
-    decided_by: str
-    # {'turn', 'all', 'fewest', 'given'}: Modes that turn little enough in a step, all of the
-    # string, two, or as given
-    modes_by: str
-    highest_frequency: float  # of the modes kept (Hz)
-    turn: float  # of that mode in a step (rad)
-    # modes of the string that are not carried; their static share of the pipe torque is
-    left_out: int
-    form: str  # {'undamped', 'blocks', 'dense'}: What the string's step is made of
-
-    @property
-    def decisive(self) -> Bound:
-        """The bound that is the lowest."""
-        return min(self.bounds, key=lambda bound: bound.step)
-
-    def summary(self) -> dict[str, Any]:
-        """Scheme, bounds and reasons; SI units."""
-        return {
-            "accuracy": self.accuracy,
-            "step": self.scheme.step,
-            "steps": self.scheme.steps,
-            "modes": self.scheme.modes,
-            "sampling": self.scheme.sampling,
-            "decided_by": self.decided_by,
-            "bounds": {bound.name: bound.step for bound in self.bounds},
-            "reasons": {bound.name: bound.reason for bound in self.bounds},
-            "modes_by": self.modes_by,
-            "highest_frequency_hz": self.highest_frequency,
-            "turn": self.turn,
-            "modes_left_out": self.left_out,
-            "string": self.form,
-        }
-
-
-def explain(lanes: Lanes, table: SimulationTable, prepared: Prepared) -> SchemeReasons:
-    """Why a scheme was chosen."""
+def explain(lanes: Lanes, table: SimulationTable, prepared: Prepared) -> dict[str, Any]:
+    """A scheme and why it was chosen, as strict JSON values; SI units."""
     scheme, string = prepared.scheme, lanes.string
     bounds = _bounds(string, table, lanes.steepest_fall)
     asked = min(bound.step for bound in bounds)
@@ -105,17 +59,25 @@ def explain(lanes: Lanes, table: SimulationTable, prepared: Prepared) -> SchemeR
             f"reasons for {steps} steps, {sampling} to a sample, {modes} modes; chosen was {scheme}"
         )
     highest = float(string.undamped_modes[0][modes - 1])
-    return SchemeReasons(
-        scheme=scheme,
-        accuracy=table.accuracy,
-        bounds=bounds,
-        decided_by=_decided(bounds, asked, table.duration, scheme),
-        modes_by=modes_by,
-        highest_frequency=highest / (2.0 * math.pi),
-        turn=highest * scheme.step,
-        left_out=string.nodes - modes,
-        form=form_of(prepared.stepper.string),
-    )
+    return {
+        "accuracy": table.accuracy,
+        "step": scheme.step,
+        "steps": scheme.steps,
+        "modes": scheme.modes,
+        "sampling": scheme.sampling,
+        # A bound, or 'sampling' or 'program' where the step is shorter for whole steps to a period
+        # of the controller, or to what changes by the clock.
+        "decided_by": _decided(bounds, asked, table.duration, scheme),
+        "bounds": {bound.name: bound.step for bound in bounds},  # a given step stands alone
+        "reasons": {bound.name: bound.reason for bound in bounds},
+        # Modes that turn little enough in a step, all of the string, two, or as given.
+        "modes_by": modes_by,
+        "highest_frequency_hz": highest / (2.0 * math.pi),
+        "turn": highest * scheme.step,  # of that mode in a step (rad)
+        # Modes that are not carried; their static share of the pipe torque is.
+        "modes_left_out": string.nodes - modes,
+        "string": form_of(prepared.stepper.string),
+    }
 
 
 def form_of(string: Any) -> str:
@@ -164,37 +126,28 @@ def _modes(string: Drillstring, table: SimulationTable, step: float) -> tuple[in
     return turning, "all" if turning == string.nodes else "turn"
 
 
-Array = NDArray[np.float64]
-
 REFINEMENTS = (1, 2, 4)  # parts into which the step of the scheme is divided
 ORDER_TWO = 4.0 / 3.0
 """Error of a scheme of order 2 per difference to the same at half the step (Richardson)."""
-ENOUGH = 8  # lanes from which an order says something
+ENOUGH = 8  # fewest lanes from which an order is computed
 
 
-@dataclass(frozen=True)
-class Errors:
+class Errors(NamedTuple):
     """Relative errors of J1 over a sample of lanes."""
 
-    lanes: int  # lanes that have one
-    # percentiles, and the largest
     median: float
     p90: float
     p99: float
     worst: float
-
-    def summary(self) -> dict[str, float]:
-        """By name."""
-        return {"median": self.median, "p90": self.p90, "p99": self.p99, "worst": self.worst}
 
 
 def errors_of(values: Array) -> Errors:
     """Percentiles of those relative errors that are numbers; all NaN if none is."""
     known = values[np.isfinite(values)]
     if not known.size:
-        return Errors(0, np.nan, np.nan, np.nan, np.nan)
-    median, p90, p99 = (float(v) for v in np.percentile(known, (50, 90, 99)))
-    return Errors(len(known), median, p90, p99, float(known.max()))
+        return Errors(np.nan, np.nan, np.nan, np.nan)
+    median, p90, p99 = map(float, np.percentile(known, (50, 90, 99)))
+    return Errors(median, p90, p99, float(known.max()))
 
 
 @dataclass(frozen=True, eq=False)

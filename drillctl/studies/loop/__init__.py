@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from drillctl import units
+from drillctl.store.tables import Column, Quantity, Table
 from drillctl.studies.base import Option, Picture, Recipe, Run, Section, Study
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from drillctl import units
     from drillctl.design import Design
     from drillctl.linear.loop_analysis import LoopAnalysis
-    from drillctl.store.tables import Table
 
 SHOWN = 10  # oscillating poles in the table
 SLOPE = "N*m*s/rad"
@@ -30,7 +29,6 @@ def computed(design: Design, run: Run) -> LoopAnalysis:
 
 def tables(result: LoopAnalysis) -> Iterator[Table]:
     """Steady drilling, margins, oscillating poles; the map, if there is one."""
-    from drillctl.store.tables import Column, Table
     from drillctl.studies.loop_mapping import tables as of_map
 
     pair = (Column("quantity"), Column("value"), Column("unit", hidden=True))
@@ -47,15 +45,13 @@ def tables(result: LoopAnalysis) -> Iterator[Table]:
 
 
 def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
-    from drillctl.store.tables import Quantity
-
-    requested, found = result.design.tables.operating_point, result.operating_point
+    requested, steady = result.design.tables.operating_point, result.operating_point
     rows = (
         ("set speed", requested.speed, "rad/s"),
         ("weight on bit", requested.weight_on_bit, "N"),
-        ("speed of steady drilling", found.speed, "rad/s"),
-        ("bit torque at that speed", found.bit_torque, "N*m"),
-        ("falling slope of the rock, −dT/dω", found.slope, SLOPE),
+        ("speed of steady drilling", steady.speed, "rad/s"),
+        ("bit torque at that speed", steady.bit_torque, "N*m"),
+        ("falling slope of the rock, −dT/dω", steady.slope, SLOPE),
         ("falling slope that the loop tolerates, D*", result.slope_margin, SLOPE),
         ("critical speed (stability changes)", result.critical_speed, "rad/s"),
         ("nearest weight at which stability changes", result.critical_weight_on_bit, "N"),
@@ -64,8 +60,6 @@ def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
 
 
 def _margins(result: LoopAnalysis) -> list[list[Any]]:
-    from drillctl.store.tables import Quantity
-
     rows: list[tuple[str, float | None, str]] = [
         ("largest real part of the poles", result.spectral_abscissa, "1/s"),
         ("falling slope of the rock, −dT/dω", result.operating_point.slope, SLOPE),
@@ -73,15 +67,15 @@ def _margins(result: LoopAnalysis) -> list[list[Any]]:
         ("deciding frequency", result.deciding_frequency_hz, "Hz"),
         ("slope margin of the continuous string", result.continuum_slope_margin, SLOPE),
     ]
-    found = result.margins
-    if found is not None:
+    margins = result.margins
+    if margins is not None:
         rows += [
-            ("disk margin: gain", found.gain_db, "dB"),
-            ("disk margin: phase", found.phase_deg, "deg"),
-            ("largest sensitivity", found.peak_sensitivity, "1"),
-            ("frequency of the largest sensitivity", found.peak_sensitivity_hz, "Hz"),
-            ("delay at the top torque that is tolerated", found.delay, "s"),
-            ("deciding frequency", found.delay_hz, "Hz"),
+            ("disk margin: gain", margins.gain_db, "dB"),
+            ("disk margin: phase", margins.phase_deg, "deg"),
+            ("largest sensitivity", margins.peak_sensitivity, "1"),
+            ("frequency of the largest sensitivity", margins.peak_sensitivity_hz, "Hz"),
+            ("delay at the top torque that is tolerated", margins.delay, "s"),
+            ("deciding frequency", margins.delay_hz, "Hz"),
         ]
     if result.weight_delay_margin is not None:
         rows.append(("further delay of the moving weight that is tolerated",
@@ -92,7 +86,7 @@ def _margins(result: LoopAnalysis) -> list[list[Any]]:
 
 def pictures(result: LoopAnalysis) -> Iterator[Picture]:
     """Frequency responses, gains and impedance; the slope margin over the map."""
-    from drillctl.studies.loop.pictures import loop_pictures
+    from drillctl.studies.loop.compute import loop_pictures
     from drillctl.studies.loop_mapping import pictures as of_map
 
     yield from loop_pictures(result)

@@ -6,15 +6,14 @@ import itertools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from drillctl.studies.applies import over_two_axes
-from drillctl.studies.base import Option, Picture, Recipe, Run, Study
+from drillctl import plots, units
+from drillctl.store.tables import Column, Table
+from drillctl.studies.base import Option, Picture, Recipe, Run, Study, over_two_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from drillctl import units
     from drillctl.design import Design
-    from drillctl.store.tables import Table
     from drillctl.studies.loop_mapping.compute import LoopMap
 
 
@@ -28,8 +27,6 @@ def computed(design: Design, run: Run) -> LoopMap:
 
 def tables(result: LoopMap) -> Iterator[Table]:
     """A row a cell."""
-    from drillctl.store.tables import Column, Table
-
     columns = (
         *(Column(axis.path, unit=axis.unit) for axis in result.axes),
         *(Column(name, unit=result.unit(name)) for name in result.values),
@@ -57,7 +54,6 @@ def pictures(result: LoopMap) -> Iterator[Picture]:
 
 def slope_margin(result: LoopMap, system: units.System) -> Figure:
     """The slope margin, with the boundary of stable gains on a map over both gains."""
-    from drillctl import plots
     from drillctl.linear.boundary import gain_boundary
 
     design, axes, boundary = result.design, result.axes, None
@@ -72,7 +68,7 @@ STUDY = Study(
     help="Map quantities of the loop over two parameters",
     group="Analyse the loop",
     compute=computed,
-    options=(Option("quantities", tuple, "Quantities to map, all by default"),),
+    options=(Option("quantities", tuple, "Map these quantities; all by default"),),
     axes=True,
     command=False,
     tables=tables,

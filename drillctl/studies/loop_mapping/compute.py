@@ -10,18 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
-from drillctl.ensemble.grid import Axis, Group, axes_of, groups, other_axes, shape_of, span
+from drillctl.ensemble.grid import (
+    Axis,
+    Group,
+    axes_of,
+    groups,
+    other_axes,
+    place_of,
+    shape_of,
+    span,
+)
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_margins import peak_sensitivities
 from drillctl.linear.loop_model import many_loop_poles
 from drillctl.progress import SILENT, Progress
 from drillctl.rig.drillstring.frequencies import natural_frequencies
-from drillctl.store.codec import label
+from drillctl.store.codec import Array, Mask, label
 from drillctl.store.result import Result
 from drillctl.studies.three_regions.compute import gains_of, slopes_tolerated, steady_drilling
-
-Array = NDArray[np.float64]
 
 QUANTITIES = {
     "slope_margin": ("N*m*s/rad", "friction-slope margin D*"),
@@ -53,7 +60,7 @@ class LoopMap(Result):
     total_seconds: float = label(unit="s", means="from call to return")
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Mask:
         """Cells whose slope is under its margin, shape of the grid."""
         return np.asarray(self.values["slope"] < self.values["slope_margin"])
 
@@ -63,9 +70,8 @@ class LoopMap(Result):
         result = self.values["slope_margin"]
         if np.isnan(result).all():
             return None
-        where = np.unravel_index(int(np.nanargmax(result)), result.shape)
-        at = {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)}
-        return float(result[where]), at
+        cell = int(np.nanargmax(result))
+        return float(result.flat[cell]), place_of(self.axes, cell)
 
     def unit(self, quantity: str) -> str:
         """Unit of a quantity, SI."""
@@ -78,9 +84,7 @@ class LoopMap(Result):
             "axes": span(self.axes),
             "stable_cells": int(self.stable.sum()),
             "cells": int(self.stable.size),
-            "largest_slope_margin": None
-            if best is None
-            else {"slope_margin": best[0], "at": best[1]},
+            "largest_slope_margin": best and {"slope_margin": best[0], "at": best[1]},
             "total_seconds": self.total_seconds,
         }
 
@@ -107,7 +111,7 @@ def loop_map(
     quantities : tuple of str
         What to map, of `QUANTITIES`; slope and slope margin always are.
     progress : Progress
-        Told of finished cells.
+        Receives finished cells.
 
     Raises
     ------
@@ -149,9 +153,7 @@ def _figures(
     return results
 
 
-def _of_poles(
-    group: Group, slope: Array, stable: NDArray[np.bool_], wanted: set[str]
-) -> dict[str, Array]:
+def _of_poles(group: Group, slope: Array, stable: Mask, wanted: set[str]) -> dict[str, Array]:
     import numba
 
     if not group.design.simple_loop:

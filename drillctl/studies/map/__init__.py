@@ -6,15 +6,23 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drillctl.errors import InputError
-from drillctl.studies.applies import audited
-from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Section, Study
+from drillctl import plots, units
+from drillctl.store.tables import Column, Table, quantity
+from drillctl.studies.base import (
+    Check,
+    Option,
+    Picture,
+    Recipe,
+    Run,
+    Section,
+    Study,
+    audited,
+    mapped_in_batch,
+)
 
 if TYPE_CHECKING:
-    from drillctl import units
     from drillctl.design import Design
     from drillctl.ensemble.sweeps import Sweep
-    from drillctl.store.tables import Table
 
 
 def computed(design: Design, run: Run) -> Sweep:
@@ -22,18 +30,13 @@ def computed(design: Design, run: Run) -> Sweep:
     from drillctl.ensemble.storing import Folder
     from drillctl.ensemble.sweeps import kept_measures, sweep
 
-    try:
-        kept = kept_measures(run.options["measure"] or None)
-    except InputError as error:
-        raise InputError(error.problem, "--measure") from None
+    kept = kept_measures(run.options["measure"] or None, "--measure")
     store = None if run.folder is None else Folder(run.folder)
     return sweep(design, progress=run.progress, store=store, measures=kept)
 
 
 def tables(result: Sweep) -> Iterator[Table]:
     """Bounds of the regions."""
-    from drillctl.store.tables import Column, Table
-
     columns = [
         Column("level", "J1 at or under", "s"), Column("cells"),
         Column("area_fraction", "share of the map", percent=True),
@@ -58,19 +61,17 @@ def tables(result: Sweep) -> Iterator[Table]:
 
 def pictures(result: Sweep) -> Iterator[Picture]:
     """The map, and responses at some of its cells."""
-    from drillctl import plots
-
     axes, minimum = result.axes, result.minimum
     if len(axes) > 2:
         return
     draw = plots.stability_map if len(axes) == 2 else plots.sweep_line
-    told = f"Map of J1 over {' and '.join(axis.path for axis in axes)}."
+    alt = f"Map of J1 over {' and '.join(axis.path for axis in axes)}."
     if minimum is not None:
-        told += f" Least J1 {minimum[0]:.4g} s."
+        alt += f" Least J1 {minimum[0]:.4g} s."
     for level, region in result.regions.items():
-        told += f" {region.cells} cells at or under {level:g} s."
+        alt += f" {region.cells} cells at or under {level:g} s."
     yield Picture(
-        "map", "J1 over the map with its regions, its minimum and the audited cells.", told,
+        "map", "J1 over the map with its regions, its minimum and the audited cells.", alt,
         lambda system: draw(result, system=system), paper=len(axes) == 2,
     )  # fmt: skip
     if len(axes) == 2:
@@ -82,16 +83,13 @@ def pictures(result: Sweep) -> Iterator[Picture]:
 
 
 def _responses(result: Sweep) -> Any:
-    from drillctl import plots
-    from drillctl.studies.map.outputs import responses
+    from drillctl.ensemble.sweeps import responses
 
     return plots.time_response(responses(result), paths=[axis.path for axis in result.axes])
 
 
 def remarks(result: Sweep, system: units.System) -> Iterator[str]:
     """Minimum, audit and time."""
-    from drillctl.store.tables import quantity
-
     if result.minimum is not None:
         value, at = result.minimum
         units_of = {axis.path: axis.unit for axis in result.axes}
@@ -119,7 +117,7 @@ def notes(result: Sweep) -> Iterator[str]:
 
 def files(result: Sweep, folder: Path) -> None:
     """Every cell with its measures."""
-    from drillctl.studies.map.outputs import write_cells
+    from drillctl.ensemble.sweeps import write_cells
 
     write_cells(result, folder / "map.csv")
 
@@ -132,13 +130,6 @@ def check(design: Design) -> None:
         axes_of(design, design.tables.map.axes)
 
 
-def not_applicable(request: Requested) -> str:
-    """Why a report has no map."""
-    from drillctl.studies.applies import fitting_map, in_batch
-
-    return in_batch(request) or fitting_map(request)
-
-
 STUDY = Study(
     name="map",
     help="Map J1 over parameters, with regions and an audit",
@@ -146,7 +137,7 @@ STUDY = Study(
     compute=computed,
     options=(
         Option(
-            "audit", int, "Cells to audit with the reference solver", sets="map.audit_cells"
+            "audit", int, "Audit this many cells with the reference solver", sets="map.audit_cells"
         ),
         Option(
             "measure", list[str], "Keep only J1 and this measure; repeatable", metavar="NAME"
@@ -163,7 +154,7 @@ STUDY = Study(
     notes=notes,
     files=files,
     check=check,
-    recipes=(Recipe("map", "the J1 map", not_applicable, order=40),),
+    recipes=(Recipe("map", "the J1 map", mapped_in_batch, order=40),),
     sections=(
         Section("map", "J1 over the map", ("map", "cells"), order=50,
                 shows=("map", "regions", "statuses")),

@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from drillctl import plots, units
+from drillctl.store.tables import Column, Table
 from drillctl.studies.base import Option, Picture, Recipe, Run, Section, Study
 
 if TYPE_CHECKING:
-    from drillctl import units
     from drillctl.design import Design
     from drillctl.linear.modal import Modes
-    from drillctl.store.tables import Table
+
+
+STICK_SLIP = (
+    "Stick-slip has the period of the lowest mode with the top held, or longer: a stiff drive "
+    "makes the top a fixed end."
+)
 
 
 def computed(design: Design, run: Run) -> Modes:
@@ -23,8 +29,6 @@ def computed(design: Design, run: Run) -> Modes:
 
 def tables(result: Modes) -> Iterator[Table]:
     """Frequencies and damping ratios, the two end conditions side by side."""
-    from drillctl.store.tables import Column, Table
-
     columns = [Column("mode")]
     for name, head in (("free_free", "top free"), ("fixed_top", "top held")):
         columns.append(Column(f"{name}_frequency", f"{head}: frequency", "Hz", digits=6))
@@ -50,7 +54,6 @@ def _cells(result: tuple[Any, ...], order: int) -> list[Any]:
 
 def pictures(result: Modes) -> Iterator[Picture]:
     """Shapes of the modes, response of the ends, friction of the bit."""
-    from drillctl import plots
     from drillctl.linear.response import frequency_response, telling_frequencies
 
     design = result.design
@@ -79,10 +82,7 @@ def pictures(result: Modes) -> Iterator[Picture]:
 
 def remarks(result: Modes, system: units.System) -> Iterator[str]:
     """What the modes have to do with stick-slip."""
-    yield (
-        "Stick-slip has the period of the lowest mode with the top held, or longer: a stiff drive "
-        "makes the top a fixed end."
-    )
+    yield STICK_SLIP
 
 
 STUDY = Study(
@@ -90,7 +90,7 @@ STUDY = Study(
     help="Compute natural frequencies, damping and mode shapes",
     group="Analyse the loop",
     compute=computed,
-    options=(Option("count", int, "Modes of each end condition", 10),),
+    options=(Option("count", int, "Compute this many modes of each end condition", 10),),
     python="modes",
     call="drillctl.linear.modal:modes",
     tables=tables,
@@ -99,7 +99,6 @@ STUDY = Study(
     recipes=(Recipe("modes", "the modes", order=0),),
     sections=(
         Section("modes", "Modes of the string", ("modes",), order=30, shows=("modes", "bode"),
-                text="Stick-slip has the period of the lowest mode with the top held, or longer: a "
-                "stiff drive makes the top a fixed end."),
+                text=STICK_SLIP),
     ),
 )  # fmt: skip

@@ -5,25 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from drillctl.studies.base import Picture, Run, Study
+from drillctl import plots
+from drillctl.store.tables import Column, Table
+from drillctl.studies.base import Picture, Study
 
 if TYPE_CHECKING:
-    from drillctl.design import Design
-    from drillctl.store.tables import Table
     from drillctl.studies.regularisation.compute import Regularisation
-
-
-def computed(design: Design, run: Run) -> Regularisation:
-    """The study with its default widths."""
-    from drillctl.studies.regularisation.compute import regularisation
-
-    return regularisation(design, progress=run.progress)
 
 
 def tables(result: Regularisation) -> Iterator[Table]:
     """What each width does to J1 and to the regions."""
-    from drillctl.store.tables import Column, Table
-
     summary = result.summary()
     exact, total = summary["set_valued_cells"], result.j1.size
     columns = [
@@ -46,8 +37,6 @@ def tables(result: Regularisation) -> Iterator[Table]:
 
 def pictures(result: Regularisation) -> Iterator[Picture]:
     """Shift of J1 against the width."""
-    from drillctl import plots
-
     yield Picture(
         "regularisation", "Change of J1 by smoothing the friction, against the width of tanh.",
         "Median and largest change of J1 over the cells of the map against the width.",
@@ -59,7 +48,6 @@ STUDY = Study(
     name="regularisation",
     help="Compare the map with the map under smoothed friction",
     group="Simulate",
-    compute=computed,
     axes=True,
     python="regularisation",
     call="drillctl.studies.regularisation.compute:regularisation",

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
@@ -16,10 +15,8 @@ from drillctl.ensemble.grid import Axis, axes_of, other_axes, span
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.codec import label
+from drillctl.store.codec import Array, label
 from drillctl.store.result import Result
-
-Array = NDArray[np.float64]
 
 WIDTHS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
 """Widths of the regularisation that are compared by default (rad/s)."""
@@ -106,7 +103,7 @@ def regularisation(
     axes : tuple of Axis, optional
         Instead of the design's own.
     progress : Progress
-        Told of blocks.
+        Receives finished blocks.
 
     Raises
     ------
@@ -138,7 +135,7 @@ def regularisation(
 
 
 def _set_valued(design: Design) -> Design:
-    """The design with its friction as a set, whatever it says."""
+    """The design with its friction set-valued; refused (`InputError`) where it is smoothed."""
     if weight_moves(design.tables):
         raise InputError("friction under a weight that moves is not regularised", "weight_on_bit")
     if getattr(design.tables.bit_rock, "regularised_over", None) is None:

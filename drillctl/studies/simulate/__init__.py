@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Literal
 
-from drillctl.studies.applies import in_batch
-from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Study
+from drillctl import plots, units
+from drillctl.simulation.measures import MEASURES
+from drillctl.store.tables import Column, Quantity, Table, number
+from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Study, in_batch
 
 if TYPE_CHECKING:
     from drillctl.design import Design
     from drillctl.simulation.run import Simulation
-    from drillctl.store.tables import Table
 
 HIDDEN = ("j1_rate", "work_at_bit", "time_outside_table")  # measures that are in the summary alone
 BALANCED = 1e-6  # largest relative residual of a balanced run
@@ -29,9 +30,6 @@ def computed(design: Design, run: Run) -> Simulation:
 
 def tables(result: Simulation) -> Iterator[Table]:
     """Measures, status and engine."""
-    from drillctl.simulation.measures import MEASURES
-    from drillctl.store.tables import Column, Quantity, Table
-
     rows: list[list[Any]] = [
         [one.label, Quantity(getattr(result.measures, one.name), one.unit), one.unit]
         for one in MEASURES.values()
@@ -63,8 +61,6 @@ def tables(result: Simulation) -> Iterator[Table]:
 
 def checks(result: Simulation) -> Iterator[Check]:
     """Whether the energy balances."""
-    from drillctl.store.tables import number
-
     if result.energy is not None:
         residual = result.energy.relative_residual
         detail = f"relative residual {number(residual, 2)}"
@@ -73,8 +69,6 @@ def checks(result: Simulation) -> Iterator[Check]:
 
 def pictures(result: Simulation) -> Iterator[Picture]:
     """Speeds, torques and weight over time."""
-    from drillctl import plots
-
     j1 = "undefined" if result.measures.j1 is None else f"{result.measures.j1:.4g} s"
     yield Picture(
         "time-response", "Speeds of bit and top drive over time; grey where the bit stands still.",
@@ -85,18 +79,16 @@ def pictures(result: Simulation) -> Iterator[Picture]:
 
 def summary(result: Simulation) -> dict[str, Any]:
     """The result's own, and the share of the torsional yield where the grade is known."""
-    found = result.summary()
+    own: dict[str, Any] = result.summary()
     if result.share_of_yield is not None:
-        found["share_of_torsional_yield"] = result.share_of_yield
-    return found
+        own["share_of_torsional_yield"] = result.share_of_yield
+    return own
 
 
 def _cell(which: str) -> Callable[[Requested], Design]:
     """The design of the best or of a bad cell of the map."""
 
     def variant(request: Requested) -> Design:
-        from drillctl import units
-
         at = request.summary("cells")[which]
         values = {path: units.SI(value) for path, value in at.items()}
         return request.design.replace({**values, "simulation.engine": "batch"})
@@ -132,8 +124,6 @@ def _finer_step(parts: int) -> Callable[[Requested], Design]:
     """The design by the batch engine with its step divided."""
 
     def variant(request: Requested) -> Design:
-        from drillctl import units
-
         step = units.SI(request.summary("mesh-1")["step"] / parts)
         return request.design.replace({"simulation.engine": "batch", "simulation.step": step})
 
@@ -177,7 +167,7 @@ STUDY = Study(
     compute=computed,
     options=(
         Option(
-            "engine", Literal["reference", "batch"], "Located events, or fixed steps.",
+            "engine", Literal["reference", "batch"], "Locate events, or take fixed steps",
             sets="simulation.engine",
         ),
     ),

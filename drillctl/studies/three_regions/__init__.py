@@ -5,13 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from drillctl import plots, units
 from drillctl.errors import InputError
-from drillctl.studies.base import Picture, Recipe, Requested, Run, Section, Study
+from drillctl.store.tables import Column, Table
+from drillctl.studies.base import (
+    Picture,
+    Recipe,
+    Requested,
+    Run,
+    Section,
+    Study,
+    in_batch,
+    over_two_axes,
+)
 
 if TYPE_CHECKING:
-    from drillctl import units
     from drillctl.design import Design
-    from drillctl.store.tables import Table
     from drillctl.studies.three_regions.compute import ThreeRegions
 
 MEANINGS = {
@@ -43,8 +52,6 @@ def computed(design: Design, run: Run) -> ThreeRegions:
 
 def tables(result: ThreeRegions) -> Iterator[Table]:
     """Cells of each region."""
-    from drillctl.store.tables import Column, Table
-
     counts, total = result.counts, result.j1.size
     columns = (
         Column("region"), Column("cells"), Column("share", percent=True, digits=3),
@@ -55,8 +62,6 @@ def tables(result: ThreeRegions) -> Iterator[Table]:
 
 def pictures(result: ThreeRegions) -> Iterator[Picture]:
     """The regions over each other."""
-    from drillctl import plots
-
     counts = result.counts
     cells = ", ".join(f"{name.replace('_', ' ')} {counts[name]}" for name in list(MEANINGS)[:3])
     yield Picture(
@@ -80,8 +85,6 @@ def remarks(result: ThreeRegions, system: units.System) -> Iterator[str]:
 
 def not_applicable(request: Requested) -> str:
     """Why a report has no regions."""
-    from drillctl.studies.applies import in_batch, over_two_axes
-
     return in_batch(request) or over_two_axes(request)
 
 

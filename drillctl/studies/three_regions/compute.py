@@ -1,12 +1,9 @@
-"""Which lanes end in steady drilling: long runs from a bit at rest and from a wound-up string.
+"""Three regions of one grid that are easily taken for each other: each in its own name.
 
-Steady drilling of the cells of a grid: operating speed, slope of the rock, gains.
-
-Three regions of one grid that are easily taken for each other: each in its own name.
-
-Locally stable: small deviations from steady drilling die out; the linear loop tells, for ever
+Locally stable: small deviations from steady drilling die out; the linear loop decides, for ever
 and at once. Inside the level: J1 of the design's own run, nonlinear, from one start and over a
-finite time. Attracted: steady drilling is where long nonlinear runs from far away end.
+finite time. Attracted: steady drilling is where long nonlinear runs end, from a bit at rest and
+from a wound-up string.
 """
 
 from __future__ import annotations
@@ -17,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.ensemble.grid import (
@@ -41,11 +37,9 @@ from drillctl.progress import SILENT, Progress
 from drillctl.simulation.batch import Prepared, prepare, trace
 from drillctl.simulation.lanes import Kind, Lanes
 from drillctl.simulation.measures import NARROW_BAND, STATUSES, WINDOW
-from drillctl.store.codec import label
+from drillctl.store.codec import Array, Mask, label
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 HORIZON = 200.0
 """Length of the runs (s): on the paper's map sticking that will end has ended by 80 s."""
@@ -129,7 +123,7 @@ def slopes_tolerated(
 ) -> SlopeMargins:
     """Slope margins of the cells of a group that drill steadily at `speed`, shape (lanes,).
 
-    All at once where two gains tell the loop, one by one for other drives and for a weight that
+    All at once where two gains define the loop, one by one for other drives and for a weight that
     comes late.
     """
     lanes = group.lanes
@@ -252,17 +246,8 @@ class ThreeRegions(Result):
 
     def summary(self) -> dict[str, Any]:
         """Axes, level, counts, what attraction means here, time; strict JSON values, SI."""
-        return {
-            "axes": span(self.axes),
-            "level": self.level,
-            "cells": int(self.j1.size),
-            "counts": self.counts,
-            "combinations": self.combinations,
-            "horizon": self.horizon,
-            "band": self.band,
-            "window": self.window,
-            "total_seconds": self.total_seconds,
-        }
+        figures = ("level", "counts", "combinations", "horizon", "band", "window", "total_seconds")
+        return {"axes": span(self.axes), "cells": int(self.j1.size), **picked(self, *figures)}
 
     def requested(self) -> tuple[Design, dict[str, Any]]:
         """Axes and level that the design does not give."""
@@ -288,7 +273,7 @@ def three_regions(
         Level of J1 (s); 33 s if none is given, the one level that the paper gives a meaning,
         whatever levels the design wants drawn. It was judged on runs of 100 s.
     progress : Progress
-        Told of blocks and cells.
+        Receives finished blocks and cells.
 
     Returns
     -------
@@ -332,12 +317,9 @@ def three_regions(
 
 
 def _fill(
-    group: Group,
-    design: Design,
-    axes: tuple[Axis, ...],
-    fields: dict[str, Array],
+    group: Group, design: Design, axes: tuple[Axis, ...], fields: dict[str, Array],
     masks: dict[str, Mask],
-) -> None:
+) -> None:  # fmt: skip
     """Put the linear answer and the long runs of a group into the flat arrays."""
     cells = group.cells
     steady = steady_drilling(design, axes, group)

@@ -5,21 +5,20 @@ follow from it; `settings.py`: the keys of `[tune]`.
 
 Linear design, for the largest friction-slope margin over a set of loops:
 
-- `line_data.py`: a string as data, complex symbols.
-- `loops.py`, `requirements.py`: the loops that gains must hold for, their crossings, and how far
-  requirements are missed at given gains.
+- `loops.py`: the loops that gains must hold for, a string as data, crossings.
+- `requirements.py`: how far requirements are missed at given gains.
 - `linear_nlp.py`: the smooth program near given gains.
 - `linear_design.py`: starts, and the search from each.
 
 Nonlinear design, for the least statistic of J1 over realizations:
 
-- `runs.py`: runs of many gains by the batch engine; `problem.py`: objective and requirements.
+- `problem.py`: runs of many gains by the batch engine, objective and requirements.
 - `search.py`: from a first look to the gains, for the study of the advantage too.
 
 What follows for the gains:
 
 - `certificate.py`: runs at draws that no search has seen, margins, audit, how far gains may drift.
-- `baselines.py`: other gains and laws at the same draws.
+- `compute.py`: other gains and laws at the same draws.
 
 CasADi is imported where a function needs it.
 """
@@ -28,16 +27,25 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Section, Study
+from drillctl import plots, units
+from drillctl.store.tables import Column, Estimate, Quantity, Table, chance, number, percent
+from drillctl.studies.base import (
+    Check,
+    Option,
+    Picture,
+    Recipe,
+    Requested,
+    Run,
+    Section,
+    Study,
+    in_batch,
+)
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from drillctl import units
     from drillctl.design import Design
-    from drillctl.store.tables import Table
     from drillctl.studies.tune.certificate import FreshRuns
     from drillctl.studies.tune.compute import Tune
 
@@ -54,8 +62,6 @@ def computed(design: Design, run: Run) -> Tune:
 
 def tables(result: Tune) -> Iterator[Table]:
     """Gains with their tolerance, others beside them; cells and draws for files alone."""
-    from drillctl.store.tables import Column, Table
-
     yield _tolerance(result)
     yield _baselines(result)
     about = result.certificate.neighbourhood
@@ -77,8 +83,6 @@ def tables(result: Tune) -> Iterator[Table]:
 
 def _tolerance(result: Tune) -> Table:
     """Tuned values, and how far each alone may drift; nothing where the level is not kept."""
-    from drillctl.store.tables import Column, Quantity, Table
-
     certificate = result.certificate
     kept = certificate.runs.probability >= certificate.required
     rows = []
@@ -100,8 +104,6 @@ def _tolerance(result: Tune) -> Table:
 
 def _baselines(result: Tune) -> Table:
     """The tuned gains and each baseline at the same draws."""
-    from drillctl.store.tables import Column, Table
-
     runs = result.certificate.runs
     tuned, quantiles = result.tuning.tuned, list(runs.quantiles)
     rows = [["tuned", *result.gains.values(), *_figures(runs), ""]]
@@ -124,15 +126,11 @@ def _baselines(result: Tune) -> Table:
 
 
 def _figures(runs: FreshRuns) -> list[Any]:
-    from drillctl.store.tables import Estimate
-
     return [runs.value, Estimate(runs.probability, runs.interval), *runs.quantiles.values()]
 
 
 def pictures(result: Tune) -> Iterator[Picture]:
     """J1 at the tuned and other gains; how far the tuned ones may drift."""
-    from drillctl import plots
-
     yield Picture(
         "baselines", "Tuned gains and other gains at the same fresh draws.",
         "J1 over the fresh draws at the tuned gains and at other gains.",
@@ -146,23 +144,23 @@ def pictures(result: Tune) -> Iterator[Picture]:
 
 
 def remarks(result: Tune, system: units.System) -> Iterator[str]:
-    """What the certificate says beside its tables, and what search and certificate took."""
-    certificate, found = result.certificate, result.tuning
+    """What the certificate shows beside its tables, and what search and certificate took."""
+    certificate, search = result.certificate, result.tuning
     for one in result.baselines:
         if one.runs is None:
             yield f"{one.name}: left out: {one.reason}"
         elif one.name == "exhaustive grid":
-            share = found.trajectories / one.search["trajectories"]
+            share = search.trajectories / one.search["trajectories"]
             yield (
                 f"exhaustive grid: {one.search['trajectories']:,.0f} trajectories, "
                 f"{one.search['seconds']:.1f} s, objective {one.search['value']:.4g} s at the "
-                f"realizations of the search, which has {found.value:.4g} s from {share:.1%} of "
+                f"realizations of the search, which has {search.value:.4g} s from {share:.1%} of "
                 "them"
             )
     yield from _certified(result)
     yield (
-        f"search: {found.trajectories:,} trajectories at {found.realizations} realizations, "
-        f"{found.seconds:.1f} s; certificate: {certificate.trajectories:,} trajectories, "
+        f"search: {search.trajectories:,} trajectories at {search.realizations} realizations, "
+        f"{search.seconds:.1f} s; certificate: {certificate.trajectories:,} trajectories, "
         f"{certificate.seconds:.1f} s; {result.total_seconds:.1f} s in all"
     )
     yield result.message
@@ -185,34 +183,26 @@ def _certified(result: Tune) -> Iterator[str]:
     audit = certificate.audit
     yield (
         f"audit: {certificate.audit_verdict}, {len(audit.cells)} realizations by the reference "
-        f"solver, largest relative difference in J1 {_sized(audit.worst, 2)}, "
+        f"solver, largest relative difference in J1 {number(audit.worst, 2)}, "
         f"{certificate.other_side} on the other side of the level"
     )
 
 
 def _margins(result: Tune) -> str:
-    found = result.certificate.margins
-    if not found:
+    margins = result.certificate.margins
+    if not margins:
         return f"no margins: {result.certificate.no_margins}"
-    disk = found["disk_margin"] or {"gain_db": None, "phase_deg": None}
+    disk = margins["disk_margin"] or {"gain_db": None, "phase_deg": None}
     return (
-        f"loop: slope margin {_sized(found['slope_margin'], 4)} N m s/rad (the rock has "
-        f"{_sized(found['slope'], 4)}), disk margins {_sized(disk['gain_db'], 3)} dB and "
-        f"{_sized(disk['phase_deg'], 3)} deg, peak sensitivity "
-        f"{_sized(found['peak_sensitivity'], 3)}"
+        f"loop: slope margin {number(margins['slope_margin'], 4)} N m s/rad (the rock has "
+        f"{number(margins['slope'], 4)}), disk margins {number(disk['gain_db'], 3)} dB and "
+        f"{number(disk['phase_deg'], 3)} deg, peak sensitivity "
+        f"{number(margins['peak_sensitivity'], 3)}"
     )
-
-
-def _sized(value: float | None, digits: int) -> str:
-    from drillctl.store.tables import number
-
-    return number(value, digits)
 
 
 def checks(result: Tune) -> Iterator[Check]:
     """Whether the certificate is passed."""
-    from drillctl.store.tables import chance, number, percent
-
     certificate, runs = result.certificate, result.certificate.runs
     required = percent(certificate.required)
     detail = f"{chance(runs.probability, runs.interval)}, {len(runs.j1)} draws"
@@ -251,8 +241,6 @@ def check(design: Design) -> None:
 
 def not_applicable(request: Requested) -> str:
     """Why a report has no tuned gains."""
-    from drillctl.studies.applies import in_batch
-
     return in_batch(request) if request.profile.tuned else "gains are tuned with --profile full"
 
 
@@ -262,10 +250,10 @@ STUDY = Study(
     group="Decide",
     compute=computed,
     options=(
-        Option("realizations", int, "Draws of the search", sets="tune.realizations"),
-        Option("seed", int, "Seed of the search", sets="tune.seed"),
+        Option("realizations", int, "Search at this many draws", sets="tune.realizations"),
+        Option("seed", int, "Search with this seed", sets="tune.seed"),
         Option(
-            "certificate", int, "Fresh draws that certify the gains",
+            "certificate", int, "Certify the gains at this many fresh draws",
             sets="tune.certificate.realizations",
         ),
         Option("exhaustive", bool, "Run a grid of 41 x 41 gains as well", default=False),

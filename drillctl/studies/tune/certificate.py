@@ -1,4 +1,4 @@
-"""The certificate of found gains: runs at fresh draws, and what else an engineer asks.
+"""The certificate of gains: runs at fresh draws, and what else an engineer asks.
 
 A search has seen its realizations, and its optimum is better at them than at others. Here the
 gains are run at draws of another seed, by the batch engine at the accuracy of the design, a
@@ -23,7 +23,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design, parameter
@@ -34,12 +33,10 @@ from drillctl.ensemble.grid import Axis
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
-from drillctl.store.codec import label
-from drillctl.studies.tune.problem import GainProblem, Point, rank_weights
-from drillctl.studies.tune.runs import GainRuns
+from drillctl.store.codec import Array, label
+from drillctl.store.json_files import picked
+from drillctl.studies.tune.problem import GainProblem, GainRuns, Point, rank_weights
 from drillctl.studies.tune.tuned import Tuned
-
-Array = NDArray[np.float64]
 
 MARGINS = (
     "stable", "slope", "slope_margin", "deciding_frequency_hz", "disk_margin", "peak_sensitivity",
@@ -192,6 +189,10 @@ class Tolerance:
         "line {path}", name="probability {path}", means="share of the draws at or under the level"
     )
 
+    def summary(self) -> dict[str, Any]:
+        """As strict JSON values, SI."""
+        return picked(self, "value", "low", "high", "low_at_bound", "high_at_bound")
+
 
 @dataclass(frozen=True, eq=False)
 class Neighbourhood:
@@ -256,13 +257,9 @@ def _end(
 
 
 def _halved(
-    fresh: FreshDraws,
-    values: Array,
-    k: int,
-    inside: float,
-    outside: float,
+    fresh: FreshDraws, values: Array, k: int, inside: float, outside: float,
     seen: dict[float, float],
-) -> float:
+) -> float:  # fmt: skip
     """The last value that keeps the probability, by bisection."""
     for _ in range(HALVINGS):
         middle = 0.5 * (inside + outside)
@@ -282,13 +279,13 @@ def _moved(values: Array, k: int, others: Array) -> Array:
     return points
 
 
-def neighbourhood(fresh: FreshDraws, values: Array, found: tuple[Tolerance, ...]) -> Neighbourhood:
+def neighbourhood(fresh: FreshDraws, values: Array, ends: tuple[Tolerance, ...]) -> Neighbourhood:
     """Probability over the first two parameters, or the only one, about the optimum."""
     some = min(2, len(values))
     points = POINTS if some == 2 else LINE_POINTS
     axes = tuple(
         _about(tuned, one, points)
-        for tuned, one in zip(fresh.problem.tuned[:some], found[:some], strict=True)
+        for tuned, one in zip(fresh.problem.tuned[:some], ends[:some], strict=True)
     )
     grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
     cells = np.tile(values, (grid[0].size, 1))
@@ -394,16 +391,10 @@ class Certificate:
             "level": runs.level,
             "required_probability": self.required,
             "realizations": len(runs.j1),
-            "seed": self.seed,
-            "probability": runs.probability,
             "interval_95": list(runs.interval),
-            "passed": self.passed,
-            "verdict": self.verdict,
-            "message": self.message,
-            "value": runs.value,
-            "quantiles": runs.quantiles,
+            **picked(runs, "probability", "value", "quantiles"),
+            **picked(self, "seed", "passed", "verdict", "message", "violations"),
             "failures": [vars(one) for one in self.failures],
-            "violations": self.violations,
             "margins": self.margins or None,
             "no_margins": self.no_margins or None,
             "worst": self._worst(),
@@ -413,13 +404,12 @@ class Certificate:
                 "other_side_of_level": self.other_side,
                 "verdict": self.audit_verdict,
             },
-            "tolerance": {one.path: _of(one) for one in self.tolerances},
+            "tolerance": {one.path: one.summary() for one in self.tolerances},
             "neighbourhood": {
                 "parameters": [axis.path for axis in self.neighbourhood.axes],
                 "realizations": self.neighbourhood.realizations,
             },
-            "trajectories": self.trajectories,
-            "seconds": self.seconds,
+            **picked(self, "trajectories", "seconds"),
         }
 
     def _worst(self) -> dict[str, Any] | None:
@@ -431,13 +421,6 @@ class Certificate:
             "j1": float(self.runs.j1[number]),
             "drawn": {path: float(column[number]) for path, column in self.drawn.items()},
         }
-
-
-def _of(one: Tolerance) -> dict[str, Any]:
-    return {
-        "value": one.value, "low": one.low, "high": one.high,
-        "low_at_bound": one.low_at_bound, "high_at_bound": one.high_at_bound,
-    }  # fmt: skip
 
 
 def certified(

@@ -1,4 +1,8 @@
-"""Robust gains in one go: searched, certified, set beside what one would have had without."""
+"""Robust gains in one go: searched, certified, compared with what one would have without.
+
+Baselines are other gains and other laws at the same fresh draws. Where one does not apply, the
+reason stands in its place.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +10,22 @@ import time
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from drillctl.design import Design
+import numpy as np
+
+from drillctl.design import Design, load, parameter
+from drillctl.ensemble.grid import Axis
+from drillctl.ensemble.sweeps import sweep
+from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
-from drillctl.store.codec import label
+from drillctl.store.codec import Array, label
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
-from drillctl.studies.tune.baselines import Baseline, baselines
-from drillctl.studies.tune.certificate import Certificate, FreshDraws, certified
+from drillctl.studies.tune.certificate import Certificate, FreshDraws, FreshRuns, certified
+from drillctl.studies.tune.linear_design import linear_design
+from drillctl.studies.tune.problem import PRICE, GainProblem
 from drillctl.studies.tune.search import Tuning, search, search_problem
-from drillctl.studies.tune.tuned import tuned_parameters
+from drillctl.studies.tune.tuned import Tuned, by_path, tuned_parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +71,7 @@ class Tune(Result):
         if self.tuning.share < self.certificate.required:
             return f"{self.tuning.message}; {result}"
         at = ", ".join(f"{path} = {value:.6g}" for path, value in self.gains.items())
-        return f"{result}; the closest found is {at}"
+        return f"{result}; the closest is {at}"
 
     @property
     def _nearer(self) -> str:
@@ -137,3 +148,134 @@ def tune(
         baselines=baselines(design, fresh, grid, progress),
         total_seconds=time.perf_counter() - begin,
     )
+
+
+PAPER = {"controller.kp": 200.0, "controller.ki": 100.0}
+"""Gains that Monteiro & Trindade (2012) begin with (N m s/rad, N m/rad)."""
+PAPER_RIG = "monteiro-trindade-2012"
+OTHER_LAWS = {"soft torque": "soft-torque", "Z-torque": "z-torque", "stiff speed": "stiff-speed"}
+"""Laws at their default tuning."""
+ANY_OTHER = {"soft-torque": "stiff-speed", "z-torque": "stiff-speed", "stiff-speed": "soft-torque"}
+"""A law to change to on the way, which drops the numbers that a law has already."""
+POINTS = 41  # along each axis of a grid
+MOST_AXES = 2  # of a grid that is gone through
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """Gains or a law beside the tuned ones."""
+
+    name: str  # what it is
+    gains: dict[str, Any]  # by path (SI); of another law its name alone
+    runs: FreshRuns | None  # at the fresh draws; None where it does not apply
+    reason: str  # why it does not
+    # of a search of its own: value (s) where it searched, trajectories, seconds
+    search: dict[str, float]
+
+    def summary(self) -> dict[str, Any]:
+        """Strict JSON values, SI."""
+        summary: dict[str, Any] = {"gains": self.gains, "reason": self.reason or None}
+        if self.runs is not None:
+            summary |= picked(self.runs, "value", "probability", "quantiles")
+            summary["interval_95"] = list(self.runs.interval)
+        return summary | ({"search": self.search} if self.search else {})
+
+
+def baselines(
+    design: Design, fresh: FreshDraws, exhaustive: GainProblem | None, progress: Progress = SILENT
+) -> tuple[Baseline, ...]:
+    """What the tuned gains are compared with."""
+    made = [
+        ("as designed", lambda: _own(design, fresh)),
+        ("paper's gains", lambda: _paper(design, fresh)),
+        ("largest slope margin", lambda: _linear(design, fresh)),
+        ("least nominal J1", lambda: _nominal(design, fresh)),
+        *(
+            (name, lambda law=law: ({"law": law}, fresh.of_design(_law(design, law)), {}))
+            for name, law in OTHER_LAWS.items()
+        ),
+    ]
+    if exhaustive is not None:
+        made.append(("exhaustive grid", lambda: _exhaustive(exhaustive, fresh)))
+    progress.begin("baselines", len(made))
+    results = []
+    for name, make in made:
+        try:
+            gains, runs, more = make()
+            results.append(Baseline(name, gains, runs, "", more))
+        except InputError as error:
+            results.append(Baseline(name, {}, None, error.problem, {}))
+        progress.advance(1)
+    return tuple(results)
+
+
+Made = tuple[dict[str, Any], FreshRuns, dict[str, float]]
+
+
+def _own(design: Design, fresh: FreshDraws) -> Made:
+    tuned = fresh.problem.tuned
+    gains = {t.path: parameter(design, t.path).value for t in tuned}
+    if any(value is None for value in gains.values()):  # by a rule of its law
+        return gains, fresh.of_design(design), {}
+    # The same runs; the draws are not made again.
+    return gains, fresh.of_gains(np.array([gains[t.path] for t in tuned], dtype=float))[1], {}
+
+
+def _paper(design: Design, fresh: FreshDraws) -> Made:
+    if design.tables.controller.law != "pi":
+        raise InputError(f"gains of a PI; the law is {design.tables.controller.law}")
+    if design.string.parts != load(PAPER_RIG).string.parts:
+        raise InputError("gains of the rig of Monteiro & Trindade (2012); this is another one")
+    other = design.replace(dict(PAPER))
+    if set(PAPER) <= {t.path for t in fresh.problem.tuned}:
+        return dict(PAPER), _own(other, fresh)[1], {}
+    return dict(PAPER), fresh.of_design(other), {}
+
+
+def _law(design: Design, law: str) -> Design:
+    """The design with a law at its default tuning; the drive around it stays."""
+    return design.replace({"controller.law": ANY_OTHER[law]}).replace({"controller.law": law})
+
+
+def _linear(design: Design, fresh: FreshDraws) -> Made:
+    result = linear_design(design)
+    return result.gains, fresh.of_gains(result.values)[1], {"slope_margin": result.slope_margin}
+
+
+def _nominal(design: Design, fresh: FreshDraws) -> Made:
+    tuned = fresh.problem.tuned
+    begin = time.perf_counter()
+    axes = tuple(Axis(t.path, t.unit, line) for t, line in zip(tuned, _lines(tuned), strict=True))
+    result = sweep(design, axes, audit_cells=0, measures=("j1",))
+    if result.minimum is None:
+        raise InputError("no cell of the nominal map gives a finite answer")
+    j1, at = result.minimum
+    values = np.array([at[t.path] for t in tuned])
+    more = {"value": j1, "trajectories": result.j1.size, "seconds": time.perf_counter() - begin}
+    return by_path(tuned, values), fresh.of_gains(values)[1], more
+
+
+def _lines(tuned: tuple[Tuned, ...]) -> list[Array]:
+    if len(tuned) > MOST_AXES:
+        raise InputError(f"a grid goes over {MOST_AXES} parameters, {len(tuned)} are tuned")
+    return [np.linspace(t.low, t.high, POINTS) for t in tuned]
+
+
+def _exhaustive(problem: GainProblem, fresh: FreshDraws) -> Made:
+    """The best of a grid by the plain objective at all realizations of the search."""
+    begin, before = time.perf_counter(), problem.trajectories
+    grid = np.meshgrid(*_lines(problem.tuned), indexing="ij")
+    cells = np.stack([column.ravel() for column in grid], axis=1)
+    least, best = np.inf, cells[0]
+    value = np.inf
+    for first in range(0, len(cells), POINTS):
+        for point in problem.points(cells[first : first + POINTS], len(problem)):
+            merit = point.value + PRICE * sum(problem.violations(point).values())
+            if merit < least:
+                least, best, value = merit, point.values, point.value
+    more = {
+        "value": value,
+        "trajectories": problem.trajectories - before,
+        "seconds": time.perf_counter() - begin,
+    }
+    return by_path(problem.tuned, best), fresh.of_gains(best)[1], more

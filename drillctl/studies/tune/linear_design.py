@@ -11,33 +11,30 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import tolerated_slope
+from drillctl.store.codec import Array, documented, label
+from drillctl.store.json_files import picked, strict
 from drillctl.studies.tune.linear_nlp import PRICE, LinearProgram
-from drillctl.studies.tune.loops import Loop, least_seen, loops_of, refuse_not_linear
+from drillctl.studies.tune.loops import least_seen, loops_of, refuse_not_linear
 from drillctl.studies.tune.requirements import Loops, LoopsState
 from drillctl.studies.tune.settings import TuneConstraintsTable
 from drillctl.studies.tune.tuned import (
     Tuned,
+    TunedGains,
     by_path,
     designs_at,
     put,
-    save_design,
     spread,
     tuned_parameters,
+    unmet,
 )
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-Array = NDArray[np.float64]
 
 LOOKED_AT = 48  # starts that are looked at on the grid, for each tuned parameter
 LOOPS_LOOKED_AT = 4  # loops at which they are
@@ -52,80 +49,39 @@ KEPT = 1e-6  # violation that is rounding
 
 
 @dataclass(frozen=True, eq=False)
-class LinearDesign:
-    """Gains found by the linear design.
+@documented
+class LinearDesign(TunedGains):
+    """Gains of the linear design."""
 
-    Attributes
-    ----------
-    design : Design
-        With the gains put in.
-    tuned : tuple of Tuned
-        What was tuned.
-    values : ndarray, shape (parameters,)
-        Their values (SI); of an infeasible problem the closest that was found.
-    loops : int
-        How many loops they hold for.
-    excess : float
-        Least slope margin less slope of the rock over the loops (N m s/rad).
-    slope_margin : float
-        D* of the design itself with these gains (N m s/rad).
-    deciding_frequency_hz : float
-        Frequency of the poles that decide it (Hz).
-    violations : dict
-        Requirements that are missed, with how far; empty for a feasible design. Slopes count over
-        the steepest slope of the rock, sensitivities over their limit, damping ratios as they are.
-    message : str
-        What was found, or what could not be met.
-    starts : list of dict
-        What each start led to.
-    programs : int
-        Nonlinear programs solved.
-    seconds, processor_seconds : float
-        Time that it took (s).
-    """
-
-    design: Design
-    tuned: tuple[Tuned, ...]
-    values: Array
-    loops: int
-    excess: float
-    slope_margin: float
-    deciding_frequency_hz: float
-    violations: dict[str, float]
-    message: str
-    starts: list[dict[str, Any]]
-    programs: int
-    seconds: float
-    processor_seconds: float
-
-    @property
-    def feasible(self) -> bool:
-        """Whether everything that was asked is kept."""
-        return not self.violations
-
-    @property
-    def gains(self) -> dict[str, float]:
-        """Values by path (SI)."""
-        return by_path(self.tuned, self.values)
+    design: Design = label(means="with the gains put in")
+    tuned: tuple[Tuned, ...] = label(means="what was tuned")
+    values: Array = label(
+        "parameter", means="tuned values (SI); of an infeasible problem the closest ones"
+    )
+    loops: int = label(means="how many loops they hold for")
+    excess: float = label(
+        unit="N*m*s/rad", means="least slope margin less slope of the rock over the loops"
+    )
+    slope_margin: float = label(unit="N*m*s/rad", means="D* of the design itself with these gains")
+    deciding_frequency_hz: float = label(unit="Hz", means="of the poles that decide it")
+    violations: dict[str, float] = label(
+        means="requirements that are missed, with how far; empty for a feasible design. Slopes "
+        "count over the steepest slope of the rock, sensitivities over their limit, damping ratios "
+        "as they are"
+    )
+    message: str = label(means="the result, or what could not be met")
+    starts: list[dict[str, Any]] = label(means="what each start led to")
+    programs: int = label(means="nonlinear programs solved")
+    seconds: float = label(unit="s", means="time that it took")
+    processor_seconds: float = label(unit="s", means="processor time that it took")
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI."""
-        return {
-            "gains": self.gains,
-            "excess": _finite(self.excess),
-            "slope_margin": _finite(self.slope_margin),
-            "deciding_frequency_hz": _finite(self.deciding_frequency_hz),
-            "loops": self.loops,
-            "feasible": self.feasible,
-            "violations": dict(self.violations),
-            "message": self.message,
-            "programs": self.programs,
-            "seconds": self.seconds,
-        }
-
-    def save(self, folder: str | Path) -> Path:
-        """Write the design with its gains as a new design file, ready to run, and the summary."""
-        return save_design(self.design, self.summary(), folder)
+        figures = picked(
+            self, "gains", "excess", "slope_margin", "deciding_frequency_hz", "loops", "feasible",
+            "violations", "message", "programs", "seconds",
+        )  # fmt: skip
+        return dict(strict(figures))
 
 
 def linear_design(
@@ -153,7 +109,7 @@ def linear_design(
     Returns
     -------
     LinearDesign
-        Requirements that cannot be met are told in its message, with the closest point found.
+        Requirements that cannot be met are stated in its message, with the closest point.
 
     Raises
     ------
@@ -178,10 +134,10 @@ def linear_design(
             "tune.parameters",
         )
     best = min(followed, key=_merit)
-    return _told(design, problem, best, followed, program.solves, begin, processor)
+    return _result(design, problem, best, followed, program.solves, begin, processor)
 
 
-def _told(
+def _result(
     design: Design,
     problem: Loops,
     best: LoopsState,
@@ -217,15 +173,10 @@ def _told(
 def _message(best: LoopsState, missed: dict[str, float]) -> str:
     at = ", ".join(f"{k} = {v:.6g}" for k, v in by_path(best.problem.tuned, best.values).items())
     if missed:
-        worst = max(missed, key=lambda key: missed[key])
-        return (
-            f"the requirements cannot all be met between these bounds: at the closest point found, "
-            f"{at}, {', '.join(missed)} {'is' if len(missed) == 1 else 'are'} missed, "
-            f"{worst} by {missed[worst]:.3g}"
-        )
+        return unmet(at, missed)
     if best.excess < 0.0:
         return (
-            f"no gains between these bounds are stable: at the best found, {at}, the slope of the "
+            f"no gains between these bounds are stable: at the best gains, {at}, the slope of the "
             f"rock exceeds the slope margin by {-best.excess:.4g} N m s/rad"
         )
     return f"largest slope margin at {at}: {best.excess:.4g} N m s/rad above the slope of the rock"
@@ -236,7 +187,7 @@ def _starts(problem: Loops) -> list[LoopsState]:
     tuned, loops = problem.tuned, problem.loops
     looked = loops[:: max(1, len(loops) // LOOPS_LOOKED_AT)][:LOOPS_LOOKED_AT]
     points = spread(tuned, LOOKED_AT * len(tuned))
-    excess = [min(_seen_excess(x, by_path(tuned, p)) for x in looked) for p in points]
+    excess = [min(least_seen(x, by_path(tuned, p)) - x.slope for x in looked) for p in points]
     width = np.array([t.high - t.low for t in tuned])
     chosen: list[LoopsState] = []
     for k in np.argsort(-np.array(excess), kind="stable"):
@@ -249,10 +200,6 @@ def _starts(problem: Loops) -> list[LoopsState]:
         if len(chosen) == STARTS:
             break
     return chosen
-
-
-def _seen_excess(loop: Loop, values: dict[str, float]) -> float:
-    return least_seen(loop, values) - loop.slope
 
 
 def _merit(state: LoopsState) -> float:
@@ -276,7 +223,3 @@ def _followed(problem: Loops, program: LinearProgram, state: LoopsState) -> Loop
             break
         reach = min(2.0 * reach, 1.0)
     return state
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

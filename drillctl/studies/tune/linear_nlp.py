@@ -10,8 +10,8 @@ smooth. With the crossings' frequencies as variables and the margin above the sl
 over the crossings k of all loops. Poles of the first modes, and the delays that a loop bears, are
 followed in the same way by the characteristic equation. Sensitivities are limited at the
 frequencies of their peaks. What is required may be missed by v, at a price that pays for nothing:
-a program without a feasible point ends at the closest one. Crossings, poles and peaks are found
-afresh at the result (`linear_design.py`), as others may have become the lowest.
+a program without a feasible point ends at the closest one. Crossings, poles and peaks are computed
+again at the result (`linear_design.py`), as others may have become the lowest.
 
 Crossings, poles, delays and sensitivities are CasADi functions that take the tuned values first;
 the string comes as data, the series of a circle, and what differs from loop to loop as constants:
@@ -25,24 +25,23 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from drillctl.studies.tune.line_data import (
+from drillctl.store.codec import Array
+from drillctl.studies.tune.loops import (
     TERMS,
     WITHIN,
     Chain,
     Circle,
+    Crossing,
+    Loop,
     Pair,
     chain,
     chain_at,
     circles,
     pair,
 )
-from drillctl.studies.tune.loops import Crossing, Loop
 from drillctl.studies.tune.requirements import Loops, LoopsState, LoopState
 from drillctl.studies.tune.tuned import StringNumbers, Tuned, by_path, drive_numbers
-
-Array = NDArray[np.float64]
 
 PRICE = 100.0  # of missing a requirement, over what a unit of it could gain in margin
 WIDER = 1.6  # crossings up to this many times the lowest are in the program
@@ -182,7 +181,7 @@ def _points(state: LoopsState) -> Iterator[Point]:
     named = by_path(state.problem.tuned, state.values)
     inside = (-WITHIN, WITHIN)
     for one in state.loops:
-        for crossing in _telling(one):
+        for crossing in _deciding(one):
             u = (crossing.omega - crossing.circle.centre.imag) / crossing.circle.radius
             data = circle_data(crossing.circle)
             yield Point("crossing", one.loop, data, (u,), (inside,), crossing.slope <= 0.0)
@@ -215,8 +214,8 @@ def _size(loop: Loop, named: dict[str, float], s: complex) -> float:
     return abs(complex(chain(loop.ends, at).characteristic(loop.drive(named, at), rock)[0]))
 
 
-def _telling(state: LoopState) -> list[Crossing]:
-    """Crossings that may decide near the gains they were found at."""
+def _deciding(state: LoopState) -> list[Crossing]:
+    """Crossings that may decide near the gains of a state."""
     positive = [c for c in state.crossings if c.slope > 0.0]
     negative = [c for c in state.crossings if c.slope <= 0.0]
     limit = WIDER * positive[0].slope if positive else 0.0
@@ -228,8 +227,8 @@ def _telling(state: LoopState) -> list[Crossing]:
     return chosen + negative[-2:]
 
 
-DATA = 8 * TERMS + 4  # numbers that tell a circle
-CONSTANTS = 6  # numbers that tell a loop from another of its kind
+DATA = 8 * TERMS + 4  # numbers that describe a circle
+CONSTANTS = 6  # numbers in which a loop differs from another of its kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +262,7 @@ def kind_of(loop: Loop, tuned: tuple[Tuned, ...]) -> tuple[Any, ...]:
 
 
 def constants_of(loop: Loop) -> Array:
-    """What tells a loop from another of its kind."""
+    """Numbers in which a loop differs from another of its kind."""
     return np.array([*loop.string, loop.slope, 0.0 if loop.weight is None else loop.weight.torque])
 
 
@@ -276,14 +275,30 @@ def point_functions(loop: Loop, tuned: tuple[Tuned, ...]) -> PointFunctions:
     values = {t.path: pair(p[k]) for k, t in enumerate(tuned)}
     string = StringNumbers(*(pair(known[k]) for k in range(4)))
     side = None if loop.weight is None else replace(loop.weight, torque=pair(known[5]))
-    own = replace(loop, string=string, slope=known[4], weight=side)
+    loop = replace(loop, string=string, slope=known[4], weight=side)
     data = ca.SX.sym("circle", DATA)
-    return PointFunctions(
-        _crossing(own, values, p, known, data),
-        _pole(own, values, p, known, data),
-        _late(own, values, p, known, data),
-        _sensitivity(own, values, p, known),
-    )
+    terms, centre, radius, size = _read(data)
+
+    def function(name: str, own: Any, results: list[Any]) -> Any:
+        return ca.Function(name, [p, known, data, own], results)
+
+    def root(s: Pair, u: Pair, drive: Pair) -> Any:
+        end = chain_at(terms, u).characteristic(drive, loop.rock(values, s) - loop.slope)
+        return ca.vertcat(end.re, end.im) / size
+
+    u, both = ca.SX.sym("u"), ca.SX.sym("u", 2)
+    s = Pair(0.0, centre.im + radius * u)
+    over, under = chain_at(terms, Pair(0.0, u)).bit(loop.drive(values, s))
+    impedance = over * under.conjugate() * (1.0 / under.square) + loop.rock(values, s)
+    crossing = function("crossing", u, [impedance.re, impedance.im])
+    at = Pair(both[0], both[1])
+    s = centre + at * radius
+    ratio = -s.re / ca.sqrt(s.square)
+    pole = function("pole", both, [root(s, at, loop.drive(values, s)), ratio])
+    s = Pair(0.0, centre.im + radius * both[0])
+    drive = loop.drive(values, s) * (-s * both[1]).exp()
+    late = function("late", both, [root(s, Pair(0.0, both[0]), drive)])
+    return PointFunctions(crossing, pole, late, _sensitivity(loop, values, p, known))
 
 
 def _read(data: Any) -> tuple[tuple[Any, Any], Pair, Any, Any]:
@@ -294,42 +309,6 @@ def _read(data: Any) -> tuple[tuple[Any, Any], Pair, Any, Any]:
     terms = ca.reshape(data[:half], 4, TERMS), ca.reshape(data[half : 2 * half], 4, TERMS)
     rest = data[2 * half :]
     return terms, Pair(rest[0], rest[1]), rest[2], rest[3]
-
-
-def _crossing(loop: Loop, values: dict[str, Any], p: Any, known: Any, data: Any) -> Any:
-    import casadi as ca
-
-    terms, centre, radius, _ = _read(data)
-    u = ca.SX.sym("u")
-    s = Pair(0.0, centre.im + radius * u)
-    over, under = chain_at(terms, Pair(0.0, u)).bit(loop.drive(values, s))
-    impedance = over * under.conjugate() * (1.0 / under.square) + loop.rock(values, s)
-    return ca.Function("crossing", [p, known, data, u], [impedance.re, impedance.im])
-
-
-def _pole(loop: Loop, values: dict[str, Any], p: Any, known: Any, data: Any) -> Any:
-    import casadi as ca
-
-    terms, centre, radius, size = _read(data)
-    both = ca.SX.sym("u", 2)
-    u = Pair(both[0], both[1])
-    s = centre + u * radius
-    rock = loop.rock(values, s) - loop.slope
-    root = chain_at(terms, u).characteristic(loop.drive(values, s), rock)
-    ratio = -s.re / ca.sqrt(s.square)
-    return ca.Function("pole", [p, known, data, both], [ca.vertcat(root.re, root.im) / size, ratio])
-
-
-def _late(loop: Loop, values: dict[str, Any], p: Any, known: Any, data: Any) -> Any:
-    import casadi as ca
-
-    terms, centre, radius, size = _read(data)
-    both = ca.SX.sym("u", 2)
-    s = Pair(0.0, centre.im + radius * both[0])
-    rock = loop.rock(values, s) - loop.slope
-    drive = loop.drive(values, s) * (-s * both[1]).exp()
-    root = chain_at(terms, Pair(0.0, both[0])).characteristic(drive, rock)
-    return ca.Function("late", [p, known, data, both], [ca.vertcat(root.re, root.im) / size])
 
 
 def _sensitivity(loop: Loop, values: dict[str, Any], p: Any, known: Any) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,27 +15,24 @@ from drillctl.linear.loop_analysis import ROUNDING
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.rig.drillstring.frequencies import natural_frequencies
-from drillctl.studies.tune.line_data import chain
-from drillctl.studies.tune.loops import Crossing, Loop, crossings_of, slope_margin_of
+from drillctl.store.codec import Array
+from drillctl.studies.tune.loops import Crossing, Loop, chain, crossings_of, slope_margin_of
 from drillctl.studies.tune.settings import TuneConstraintsTable
 from drillctl.studies.tune.tuned import Tuned, by_path, put
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
-PEAKS = 6  # peaks of a sensitivity, and delays, that are told: the worst
+PEAKS = 6  # peaks of a sensitivity, and delays, that are kept: the worst
 
 
-@dataclass(frozen=True)
-class Peak:
+class Peak(NamedTuple):
     """A peak of the sensitivity: its angular frequency (rad/s) and height."""
 
     omega: float
     height: float
 
 
-@dataclass(frozen=True)
-class Late:
+class Late(NamedTuple):
     """A delay (s) of the drive at which poles lie on the axis, and their frequency (rad/s)."""
 
     omega: float

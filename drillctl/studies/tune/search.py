@@ -13,8 +13,8 @@ the population: they would draw all of it into their valley, though others may b
 law contains another, whose valley is a thousandth of its bounds, it must never end above that one:
 the study of the advantage polishes known gains however far they are behind.
 
-J1 jumps where a stick event appears or goes, and the derivatives of its trajectories do not tell
-of it; docs/robust-gains.md has what a search by derivatives took, for the same gains or worse.
+J1 jumps where a stick event appears or goes, and the derivatives of its trajectories do not show
+it; docs/robust-gains.md has what a search by derivatives took, for the same gains or worse.
 """
 
 from __future__ import annotations
@@ -22,23 +22,27 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
+from drillctl.store.codec import Array
+from drillctl.store.json_files import picked
 from drillctl.studies.tune.linear_design import linear_design
 from drillctl.studies.tune.problem import GainProblem, Point
-from drillctl.studies.tune.tuned import Tuned, by_path, put, save_design, spread, tuned_parameters
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-Array = NDArray[np.float64]
+from drillctl.studies.tune.tuned import (
+    Tuned,
+    TunedGains,
+    by_path,
+    put,
+    spread,
+    tuned_parameters,
+    unmet,
+)
 
 LOOK = (64, 300, 500, 800)
 """Gains of the first look by the number of parameters; more have as many as four."""
@@ -160,8 +164,8 @@ def _around(problem: GainProblem, best: Point, step: float, gained: Array) -> Ar
 
 
 @dataclass(frozen=True, eq=False)
-class Tuning:
-    """Gains found by a search, not certified yet."""
+class Tuning(TunedGains):
+    """Gains of a search, not certified yet."""
 
     design: Design  # with the gains put in
     tuned: tuple[Tuned, ...]  # what was tuned
@@ -179,66 +183,32 @@ class Tuning:
     seconds: float
     processor_seconds: float
 
-    @property
-    def feasible(self) -> bool:
-        """Whether every requirement is kept."""
-        return not self.violations
-
-    @property
-    def gains(self) -> dict[str, float]:
-        """Values by path (SI)."""
-        return by_path(self.tuned, self.values)
-
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI."""
         table = self.design.tables.tune
-        return {
-            "gains": self.gains,
-            "objective": table.objective
-            + (f" {table.quantile:g}" if table.objective in ("quantile", "cvar") else ""),
-            "value": self.value,
-            "level": table.level,
-            "share": self.share,
-            "feasible": self.feasible,
-            "violations": self.violations,
-            "realizations": self.realizations,
-            "trajectories": self.trajectories,
-            "stages": self.stages,
-            "message": self.message,
-            "seconds": self.seconds,
-            "processor_seconds": self.processor_seconds,
-        }
-
-    def save(self, folder: str | Path) -> Path:
-        """Write the design with its gains as a new design file, ready to run, and the summary."""
-        return save_design(self.design, self.summary(), folder)
-
-
-@dataclass
-class _Log:
-    """Stages as they end."""
-
-    problem: GainProblem
-    progress: Progress
-    stages: list[dict[str, Any]] = field(default_factory=list)
-
-    def note(self, stage: str, best: Point) -> None:
-        """A stage is over."""
-        self.progress.advance(1)
-        self.stages.append({
-            "stage": stage, "best": by_path(self.problem.tuned, best.values), "merit": best.merit,
-            "realizations": best.realizations, "trajectories": self.problem.trajectories,
-        })  # fmt: skip
+        figures = picked(
+            self, "gains", "value", "share", "feasible", "violations", "realizations",
+            "trajectories", "stages", "message", "seconds", "processor_seconds",
+        )  # fmt: skip
+        return {"objective": table.objective_name, "level": table.level, **figures}
 
 
 def search(design: Design, progress: Progress = SILENT, verbose: bool = False) -> Tuning:
     """Search the gains of the least objective."""
     begin, processor = time.perf_counter(), time.process_time()
     problem = search_problem(design, tuned_parameters(design))
-    log = _Log(problem, progress)
+    stages: list[dict[str, Any]] = []
+
+    def note(stage: str, best: Point) -> None:
+        progress.advance(1)
+        stages.append({
+            "stage": stage, "best": by_path(problem.tuned, best.values), "merit": best.merit,
+            "realizations": best.realizations, "trajectories": problem.trajectories,
+        })  # fmt: skip
+
     progress.begin("tuning", len(RACE) + 2)
     known = [one for one in (problem.own(design), _linear(design, verbose)) if one is not None]
-    best = optimum(problem, known, NEAR, problem.table.starts, log.note)
+    best = optimum(problem, known, NEAR, problem.table.starts, note)
     missed = problem.violations(best)
     return Tuning(
         design=put(design, problem.tuned, best.values),
@@ -249,7 +219,7 @@ def search(design: Design, progress: Progress = SILENT, verbose: bool = False) -
         violations=missed,
         realizations=len(problem),
         trajectories=problem.trajectories,
-        stages=log.stages,
+        stages=stages,
         message=_message(problem, best, missed),
         seconds=time.perf_counter() - begin,
         processor_seconds=time.process_time() - processor,
@@ -275,16 +245,11 @@ def _message(problem: GainProblem, best: Point, missed: dict[str, float]) -> str
     at = ", ".join(f"{k} = {v:.6g}" for k, v in by_path(problem.tuned, best.values).items())
     table = problem.table
     if missed:
-        worst = max(missed, key=lambda key: missed[key])
-        return (
-            f"the requirements cannot all be met between these bounds: at the closest point found, "
-            f"{at}, {', '.join(missed)} {'is' if len(missed) == 1 else 'are'} missed, "
-            f"{worst} by {missed[worst]:.3g} of its limit"
-        )
+        return unmet(at, missed) + " of its limit"
     if best.share < table.probability:
         return (
             f"no gains between these bounds have J1 <= {table.level:g} s with probability "
-            f"{table.probability:g}: at the best found, {at}, it is {best.share:.3f} over "
+            f"{table.probability:g}: at the best gains, {at}, it is {best.share:.3f} over "
             f"{best.realizations} realizations"
         )
-    return f"least {table.objective} of J1 found: {best.value:.4g} s at {at}"
+    return f"least {table.objective} of J1: {best.value:.4g} s at {at}"

@@ -134,6 +134,12 @@ class TuneTable(Table):
         return self
 
     @property
+    def objective_name(self) -> str:
+        """The objective with its quantile, if it has one."""
+        named = self.objective in ("quantile", "cvar")
+        return self.objective + (f" {self.quantile:g}" if named else "")
+
+    @property
     def fresh_seed(self) -> int:
         """Seed of the certificate's draws."""
         given = self.certificate.seed

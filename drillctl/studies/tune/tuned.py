@@ -14,7 +14,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design, parameter, to_toml
@@ -22,10 +21,9 @@ from drillctl.ensemble.parameters import Draws
 from drillctl.errors import InputError, nearest
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive.law import StringNumbers, drive_laws, tracking
+from drillctl.store.codec import Array
 from drillctl.store.json_files import write_json, write_text
 from drillctl.studies.tune.settings import RangeTable
-
-Array = NDArray[np.float64]
 
 WEIGHT_KEYS = ("weight_on_bit.gain", "weight_on_bit.path.delay")
 """Numbers of a weight on bit that follows the bit speed that may be tuned."""
@@ -51,17 +49,14 @@ def tuned_parameters(design: Design) -> tuple[Tuned, ...]:
         result = _defaults(design)
     for path in (t.path for t in result if t.path in design.tables.uncertain):
         raise InputError(
-            "is drawn in [uncertain], and cannot be tuned as well", _where(design, path)
+            "is drawn in [uncertain], and cannot be tuned as well",
+            design.where(f"tune.parameters.{path}"),
         )
     return result
 
 
-def _where(design: Design, path: str) -> str:
-    return f"{design.origin}: " * bool(design.origin) + f"tune.parameters.{path}"
-
-
 def _read(design: Design, path: str, entry: RangeTable) -> Tuned:
-    where = _where(design, path)
+    where = design.where(f"tune.parameters.{path}")
     try:
         target = parameter(design, path)
         low, high = target.parse(entry.min), target.parse(entry.max)
@@ -144,13 +139,45 @@ def designs_at(design: Design, draws: Draws) -> Iterator[Design]:
         yield variant
 
 
-def save_design(design: Design, summary: dict[str, Any], folder: str | Path) -> Path:
-    """Write `design.toml` and `summary.json` into a folder, which is made; returns it."""
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "design.toml", to_toml(design))
-    write_json(folder / "summary.json", summary)
-    return folder
+class TunedGains:
+    """What every design of gains has."""
+
+    design: Design  # with the gains put in
+    tuned: tuple[Tuned, ...]
+    values: Array  # shape (parameters,): SI
+    violations: dict[str, float]  # requirements that are missed
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every requirement is kept."""
+        return not self.violations
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """Values by path (SI)."""
+        return by_path(self.tuned, self.values)
+
+    def summary(self) -> dict[str, Any]:
+        """Strict JSON values, SI."""
+        raise NotImplementedError
+
+    def save(self, folder: str | Path) -> Path:
+        """Write `design.toml`, ready to run, and `summary.json` into a folder, which is made."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / "design.toml", to_toml(self.design))
+        write_json(folder / "summary.json", self.summary())
+        return folder
+
+
+def unmet(at: str, missed: Mapping[str, float]) -> str:
+    """A sentence about requirements that are missed at the closest point."""
+    worst = max(missed, key=lambda key: missed[key])
+    return (
+        "the requirements cannot all be met between these bounds: at the closest point, "
+        f"{at}, {', '.join(missed)} {'is' if len(missed) == 1 else 'are'} missed, {worst} by "
+        f"{missed[worst]:.3g}"
+    )
 
 
 def string_numbers(string: Drillstring) -> StringNumbers:

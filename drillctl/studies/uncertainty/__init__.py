@@ -1,8 +1,9 @@
 """Stability regions under uncertainty: a map at thousands of realizations.
 
-- `compute.py`: from design to result; `result.py`: `Uncertainty`; `outputs.py`: what is written.
-- `best.py`: best cells by several objectives, and those that are no worse beyond doubt.
-- `convergence.py`: how many realizations are enough; `sensitivity.py`: Sobol indices.
+- `compute.py`: from design to result; `result.py`: `Uncertainty`, and how many realizations are
+  enough; `outputs.py`: what is written.
+- `best.py`: best cells by several objectives, and those that are no worse beyond doubt;
+  `sensitivity.py`: Sobol indices.
 """
 
 from __future__ import annotations
@@ -11,21 +12,33 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from drillctl import plots, units
 from drillctl.errors import InputError
-from drillctl.studies.applies import audited, in_batch
-from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Section, Study
+from drillctl.store.tables import Column, Estimate, Table, chance, number, open_estimate
+from drillctl.studies.base import (
+    SEED,
+    Check,
+    Option,
+    Picture,
+    Recipe,
+    Requested,
+    Run,
+    Section,
+    Study,
+    audited,
+    in_batch,
+    mapped_in_batch,
+)
 
 if TYPE_CHECKING:
-    from drillctl import units
     from drillctl.design import Design
     from drillctl.store.folder import Growing
-    from drillctl.store.tables import Table
     from drillctl.studies.uncertainty.result import Uncertainty
 
 
 def computed(design: Design, run: Run) -> Uncertainty:
     """The regions, from the blocks that the folder may hold, here or on a cluster."""
-    from drillctl.ensemble.cluster import Cluster, connect
+    from drillctl.ensemble.running import Cluster, connect
     from drillctl.ensemble.storing import Folder
     from drillctl.studies.uncertainty.compute import uncertainty
     from drillctl.studies.uncertainty.outputs import Interim
@@ -57,12 +70,10 @@ def growing(design: Design) -> Growing | None:
 
 def tables(result: Uncertainty) -> Iterator[Table]:
     """Areas of the regions, best cells, Sobol indices, and how areas settle."""
-    from drillctl.store.tables import Column, Estimate, Table
-
     yield _areas("areas", "share of the map by probability (95 % interval)", result)
-    for number, (value, one) in enumerate(result.slices().items(), start=1):
+    for k, (value, one) in enumerate(result.slices().items(), start=1):
         title = f"the same at {result.axes[2].path} = {value:g} {result.axes[2].unit}".rstrip()
-        yield _areas(f"areas-{number}", title, one)
+        yield _areas(f"areas-{k}", title, one)
     yield _best(result)
     if result.sensitivity is not None:
         yield indices(result)
@@ -80,8 +91,6 @@ def tables(result: Uncertainty) -> Iterator[Table]:
 
 
 def _areas(name: str, title: str, result: Uncertainty) -> Table:
-    from drillctl.store.tables import Column, Estimate, Table
-
     columns = (
         Column("level", "J1 at or under", "s"),
         Column("nominal", "nominal design", percent=True, digits=3),
@@ -101,8 +110,6 @@ def _areas(name: str, title: str, result: Uncertainty) -> Table:
 
 
 def _best(result: Uncertainty) -> Table:
-    from drillctl.store.tables import Column, Table, open_estimate
-
     columns = (
         Column("objective", "best by"), Column("value", interval=True),
         *(Column(axis.path, unit=axis.unit) for axis in result.axes),
@@ -111,22 +118,20 @@ def _best(result: Uncertainty) -> Table:
     rows: list[list[Any]] = []
     for name in result.objectives:
         try:
-            found = result.best(name)
+            best = result.best(name)
         except InputError as error:
             rows.append([f"{name}: {error.problem}", *[None] * (len(columns) - 1)])
             continue
-        alike = None if found.alike is None else int(found.alike.sum())
-        at = result.at(found.cell).values()
-        rows.append([name, open_estimate(found.value, found.interval), *at, alike])
+        alike = None if best.alike is None else int(best.alike.sum())
+        at = result.at(best.cell).values()
+        rows.append([name, open_estimate(best.value, best.interval), *at, alike])
     return Table("best", "best cells over the draws (J1 in s, 95 % interval)", columns, rows)
 
 
 def indices(result: Uncertainty) -> Table:
     """Sobol indices of each uncertain parameter."""
-    from drillctl.store.tables import Column, Table
-
-    found = result.sensitivity
-    assert found is not None
+    sensitivity = result.sensitivity
+    assert sensitivity is not None
     columns = (
         Column("of"), Column("parameter"),
         Column("first", "first index", digits=3), Column("first_error_95", "±", digits=2),
@@ -137,17 +142,15 @@ def indices(result: Uncertainty) -> Table:
             one.of, path,
             *(float(x[k]) for x in (one.first, one.first_error, one.total, one.total_error)),
         ]
-        for one in found.indices
-        for k, path in enumerate(found.parameters)
+        for one in sensitivity.indices
+        for k, path in enumerate(sensitivity.parameters)
     ]  # fmt: skip
-    title = f"Sobol indices from {found.samples} points (95 % interval)"
+    title = f"Sobol indices from {sensitivity.samples} points (95 % interval)"
     return Table("sensitivity", title, columns, rows)
 
 
 def pictures(result: Uncertainty) -> Iterator[Picture]:
     """Regions by probability, their sampling error, convergence, distributions, indices."""
-    from drillctl import plots
-
     flat = {"": result} if len(result.axes) == 2 else {}
     flat |= {f"-{k}": one for k, one in enumerate(result.slices().values(), start=1)}
     for ending, one in flat.items():
@@ -171,8 +174,6 @@ def pictures(result: Uncertainty) -> Iterator[Picture]:
 
 
 def _maps(result: Uncertainty, ending: str) -> Iterator[Picture]:
-    from drillctl import plots
-
     areas = "; ".join(f"under {x:g} s {next(iter(a.values())).value:.1%}"
                       for x, a in result.areas.items())  # fmt: skip
     yield Picture(
@@ -201,10 +202,7 @@ def remarks(result: Uncertainty, system: units.System) -> Iterator[str]:
             f"{high:.2%}, {seen.confidence:.2%} interval)"
         )
     for failure in result.failures:
-        yield (
-            f"{failure.count} of {result.realizations} draws failed; {failure.reason}: "
-            f"{failure.example}"
-        )
+        yield failure.sentence(result.realizations)
     if result.censored.any():
         yield (
             f"{result.censored.mean():.1%} of the lanes were stopped once J1 had passed "
@@ -235,13 +233,6 @@ def files(result: Uncertainty, folder: Path) -> None:
     from drillctl.studies.uncertainty.outputs import write_columns_of
 
     write_columns_of(result, folder)
-
-
-def not_applicable(request: Requested) -> str:
-    """Why a report has no map under uncertainty."""
-    from drillctl.studies.applies import fitting_map
-
-    return in_batch(request) or fitting_map(request)
 
 
 def audited_as_profile(request: Requested) -> Design:
@@ -302,8 +293,6 @@ def setting_summary(result: Uncertainty) -> dict[str, Any]:
 
 def setting_remark(summary: dict[str, Any]) -> Iterator[str]:
     """The probability of keeping the level in a sentence."""
-    from drillctl.store.tables import chance, number
-
     yield (
         f"At the current setting, with {summary['realizations']} draws: P(J1 ≤ "
         f"{number(summary['level'])} s) = {chance(summary['probability'], summary['interval_95'])}."
@@ -323,20 +312,22 @@ STUDY = Study(
     group="Decide",
     compute=computed,
     options=(
-        Option("realizations", int, "Number of draws; more than before extends a run",
+        Option("realizations", int, "Use this many draws; more than before extend a run",
                sets="uncertainty.realizations"),
-        Option("seed", int, "Seed of the draws", sets="uncertainty.seed"),
+        SEED,
         Option("sampling", Literal["monte-carlo", "sobol", "latin-hypercube"],
-               "Method of sampling", sets="uncertainty.sampling"),
+               "Draw by this method", sets="uncertainty.sampling"),
         Option("full", bool, "Run every lane to its end, for means and quantiles",
                sets="uncertainty.full"),
-        Option("sensitivity", int, "Sobol indices from so many points",
+        Option("sensitivity", int, "Compute Sobol indices from this many points",
                sets="uncertainty.sensitivity.samples"),
-        Option("audit", int, "Lanes to audit with the reference solver", sets="map.audit_cells"),
+        Option("audit", int, "Audit this many lanes with the reference solver",
+               sets="map.audit_cells"),
         Option("resume", bool, "Resume the run in --out; fail if there is none", False, how=True),
         Option("allow_mixed", bool, "Accept processors of several types", False, how=True),
-        Option("scheduler", str, "Address of a dask.distributed scheduler", how=True),
-        Option("interim", float, "Seconds between interim pictures", how=True, least=0.0),
+        Option("scheduler", str, "Use the dask.distributed scheduler at this address", how=True),
+        Option("interim", float, "Draw interim pictures this many seconds apart", how=True,
+               least=0.0),
     ),
     axes=True,
     python="uncertainty",
@@ -353,7 +344,7 @@ STUDY = Study(
     recipes=(
         Recipe("setting", "the draws at the current setting", in_batch, at_setting,
                compute=setting, summary=setting_summary, says=setting_remark, order=30),
-        Recipe("uncertainty", "the map under uncertainty", not_applicable, audited_as_profile,
+        Recipe("uncertainty", "the map under uncertainty", mapped_in_batch, audited_as_profile,
                order=90),
     ),
     sections=(

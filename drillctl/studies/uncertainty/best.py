@@ -1,6 +1,6 @@
 """The best cell of a map under uncertainty, and the cells that are as good as far as is known.
 
-Each objective is a functional of the distribution of J1 in a cell. Its influence function says
+Each objective is a functional of the distribution of J1 in a cell. Its influence function is
 what every realization adds to it, so that its sampling error, and that of a difference between
 two cells at the same realizations, is that of a mean (Hampel, J. Am. Stat. Assoc. 69 (1974)
 383-393). Smaller is better for all of them.
@@ -10,7 +10,7 @@ realization. A cell is worse than the best one when its difference is above zero
 sampling error, corrected for the number of cells (Bonferroni): the truly best cell is among those
 that are left with at least 95 % (Gupta, Technometrics 7 (1965) 225-245).
 
-A lane that was stopped early is known to be worse than it says. An objective is still certain
+The J1 of a lane that was stopped early is a lower bound. An objective is still certain
 where no such lane enters it, and the best cell is still certain where every other cell is worse
 even by what is known; otherwise the answer is refused.
 """
@@ -22,17 +22,14 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl.ensemble.cases import CONFIDENCE, mean_interval, share_interval
 from drillctl.ensemble.probability import Scatter, needed
 from drillctl.errors import InputError
-
-Array = NDArray[np.float64]
-
+from drillctl.store.codec import Array, Mask
 
 FEWEST_BEYOND = 10.0 - 1e-9
-"""Realizations that are to be expected beyond a quantile for its error to be told from them."""
+"""Realizations that are to be expected beyond a quantile for its error to follow from them."""
 
 
 class Objective(Protocol):
@@ -40,20 +37,23 @@ class Objective(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is called."""
-        ...
+        """By which it is asked for."""
 
     def values(self, ordered: Array) -> Array:
         """Of each cell, from realizations in increasing order, shape (realizations, cells)."""
-        ...
 
     def influence(self, j1: Array, ordered: Array) -> Array:
         """Influence of every realization, shape (realizations, cells); its mean is about 0."""
-        ...
 
-    def enough(self, count: int) -> bool:
-        """Whether so many realizations tell an error by way of the influence function."""
-        ...
+
+def enough(objective: Objective, count: int) -> bool:
+    """Whether so many realizations give an error by way of the influence function.
+
+    Two have a scatter; of a quantile and a tail some must be expected beyond it.
+    """
+    if isinstance(objective, (Quantile, TailMean)):
+        return count * (1.0 - objective.probability) >= FEWEST_BEYOND
+    return count > 1
 
 
 class Mean(NamedTuple):
@@ -63,17 +63,11 @@ class Mean(NamedTuple):
 
     def values(self, ordered: Array) -> Array:
         """Means."""
-        result: Array = ordered.mean(axis=0)
-        return result
+        return np.asarray(ordered.mean(axis=0))
 
     def influence(self, j1: Array, ordered: Array) -> Array:
         """Deviations from the mean."""
-        deviations: Array = j1 - ordered.mean(axis=0)
-        return deviations
-
-    def enough(self, count: int) -> bool:
-        """Two have a scatter."""
-        return count > 1
+        return np.asarray(j1 - ordered.mean(axis=0))
 
 
 class Quantile(NamedTuple):
@@ -103,12 +97,7 @@ class Quantile(NamedTuple):
         low = max(int(np.floor(count * (p - width))), 0)
         high = min(int(np.ceil(count * (p + width))), count - 1)
         sparsity = (ordered[high] - ordered[low]) * count / max(high - low, 1)
-        influence: Array = (p - (j1 <= self.values(ordered))) * sparsity
-        return influence
-
-    def enough(self, count: int) -> bool:
-        """Some must be expected beyond the quantile."""
-        return count * (1.0 - self.probability) >= FEWEST_BEYOND
+        return np.asarray((p - (j1 <= self.values(ordered))) * sparsity)
 
 
 class TailMean(NamedTuple):
@@ -128,19 +117,13 @@ class TailMean(NamedTuple):
         """Quantile and mean excess over it."""
         at = Quantile(self.probability).values(ordered)
         excess = np.maximum(ordered - at, 0.0).mean(axis=0)
-        result: Array = at + excess / (1.0 - self.probability)
-        return result
+        return np.asarray(at + excess / (1.0 - self.probability))
 
     def influence(self, j1: Array, ordered: Array) -> Array:
         """Excess over the quantile less the tail mean's; no density is needed."""
         at = Quantile(self.probability).values(ordered)
         each = at + np.maximum(j1 - at, 0.0) / (1.0 - self.probability)
-        influence: Array = each - self.values(ordered)
-        return influence
-
-    def enough(self, count: int) -> bool:
-        """Some must be expected in the tail."""
-        return count * (1.0 - self.probability) >= FEWEST_BEYOND
+        return np.asarray(each - self.values(ordered))
 
 
 class Exceedance(NamedTuple):
@@ -155,20 +138,12 @@ class Exceedance(NamedTuple):
 
     def values(self, ordered: Array) -> Array:
         """Shares of the realizations."""
-        result: Array = (ordered > self.level).mean(axis=0)
-        return result
+        return np.asarray((ordered > self.level).mean(axis=0))
 
     def influence(self, j1: Array, ordered: Array) -> Array:
         """Whether above, less how often."""
-        influence: Array = (j1 > self.level) - self.values(ordered)
-        return influence
+        return np.asarray((j1 > self.level) - self.values(ordered))
 
-    def enough(self, count: int) -> bool:
-        """Two have a scatter."""
-        return count > 1
-
-
-Mask = NDArray[np.bool_]
 
 CELLS = 128  # cells looked at at a time: bounds the memory
 NEEDS_FULL = "lanes were stopped at the highest level: run with --full"
@@ -184,7 +159,7 @@ class Best:
     # 95 % interval of the value in that cell, which was chosen on the same realizations; None for
     # an end that is not known
     interval: tuple[float | None, float | None]
-    # shape (cells,): Cells that cannot be told apart from it, itself included; None if lanes were
+    # shape (cells,): Cells that are not significantly worse, itself included; None if lanes were
     # stopped or realizations are too few to say
     alike: Mask | None
 
@@ -228,20 +203,16 @@ def values_of(asked: Iterable[Objective], j1: Array, censored: Mask) -> dict[str
 
 
 def best_cells(
-    asked: Iterable[Objective],
-    found: Mapping[str, Values],
-    j1: Array,
-    censored: Mask,
-    scatter: Scatter,
-    seed: int,
-) -> dict[str, Best | InputError]:
+    asked: Iterable[Objective], known: Mapping[str, Values], j1: Array, censored: Mask,
+    scatter: Scatter, seed: int,
+) -> dict[str, Best | InputError]:  # fmt: skip
     """The best cell by each objective, or why it is not known."""
     asked = tuple(asked)
     cells: dict[str, int | InputError] = {
-        one.name: _cell(one, found[one.name], j1) for one in asked
+        one.name: _cell(one, known[one.name], j1) for one in asked
     }
-    known = [one for one in asked if isinstance(cells[one.name], int)]
-    alike = _alike(known, found, cells, j1, censored, scatter)
+    certain = [one for one in asked if isinstance(cells[one.name], int)]
+    alike = _alike(certain, known, cells, j1, censored, scatter)
     best: dict[str, Best | InputError] = {}
     for one in asked:
         cell = cells[one.name]
@@ -249,8 +220,8 @@ def best_cells(
             best[one.name] = cell
             continue
         low, high = _interval(one, j1[:, cell], censored[:, cell], scatter, seed)
-        value = float(found[one.name].values[cell])
-        if isinstance(one, Exceedance):  # told as the probability of the level being kept
+        value = float(known[one.name].values[cell])
+        if isinstance(one, Exceedance):  # reported as the probability of the level being kept
             value, low, high = 1.0 - value, *_swapped(low, high)
         best[one.name] = Best(one.name, cell, value, (low, high), alike.get(one.name))
     return best
@@ -278,16 +249,12 @@ def _chosen(known: Array, j1: Array) -> int:
 
 
 def _alike(
-    asked: Iterable[Objective],
-    result: Mapping[str, Values],
-    chosen: Mapping[str, Any],
-    j1: Array,
-    censored: Mask,
-    scatter: Scatter,
-) -> dict[str, Mask]:
-    """Cells that cannot be told apart from the best, for the objectives where that is known."""
+    asked: Iterable[Objective], result: Mapping[str, Values], chosen: Mapping[str, Any], j1: Array,
+    censored: Mask, scatter: Scatter,
+) -> dict[str, Mask]:  # fmt: skip
+    """Cells not significantly worse than the best, for the objectives where that is known."""
     count, cells = j1.shape
-    asked = [] if censored.any() else [one for one in asked if one.enough(count)]
+    asked = [] if censored.any() else [one for one in asked if enough(one, count)]
     reference = {}
     for one in asked:
         own = j1[:, chosen[one.name], None]
@@ -318,7 +285,7 @@ def _interval(
     if scatter.independent and isinstance(objective, Quantile):
         bound = float(np.where(censored, j1, np.inf).min())
         return quantile_interval(np.sort(j1), objective.probability, bound)
-    if censored.any() or not objective.enough(len(j1)):
+    if censored.any() or not enough(objective, len(j1)):
         return None, None
     column = j1[:, None]
     ordered = np.sort(column, axis=0)

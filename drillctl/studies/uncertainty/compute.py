@@ -9,32 +9,34 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.design import Design
+from drillctl.design import Design, parameter
 from drillctl.design.uncertain_tables import SensitivityTable
 from drillctl.ensemble import audit as auditing
-from drillctl.ensemble.draws import Failures, beyond_the_table, told
+from drillctl.ensemble.draws import Failures, beyond_the_table, by_reason
 from drillctl.ensemble.grid import Axis, cell_design, refuse_more_bytes, shape_of
-from drillctl.ensemble.parameters import drawing
+from drillctl.ensemble.parameters import drawing, sampling_of
 from drillctl.ensemble.probability import Scatter
-from drillctl.ensemble.realizations import Drawn, Listed, Realizations, Source
-from drillctl.ensemble.running import Blocks, Workers, run
-from drillctl.ensemble.sampling import sampling_of
-from drillctl.ensemble.storing import Memory, Store
-from drillctl.ensemble.sweeps import sweep
+from drillctl.ensemble.realizations import Realizations
+from drillctl.ensemble.running import Blocks, Cluster, Workers, run
+from drillctl.ensemble.storing import Store, in_memory
+from drillctl.ensemble.sweeps import kept_measures, sweep
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
-from drillctl.simulation.measures import BATCH_MEASURES
+from drillctl.store.codec import Array
 from drillctl.studies.uncertainty import sensitivity as indices
-from drillctl.studies.uncertainty.convergence import Look, level_of, look, schedule
-from drillctl.studies.uncertainty.result import Uncertainty, map_axes
+from drillctl.studies.uncertainty.result import (
+    Look,
+    Uncertainty,
+    level_of,
+    look,
+    map_axes,
+    schedule,
+)
 
 if TYPE_CHECKING:
     from distributed import Client
-
-Array = NDArray[np.float64]
 
 SoFar = Callable[[], Uncertainty | None]
 
@@ -70,7 +72,7 @@ def uncertainty(
     client : distributed.Client, optional
         Cluster that computes blocks, instead of threads of this process.
     progress : Progress
-        Told of lanes.
+        Receives finished lanes.
     store : Store, optional
         Where finished blocks are stored, for a run that resumes; in memory by default.
     workers : Workers, optional
@@ -95,36 +97,24 @@ def uncertainty(
     asked = {path: value for path, value in given.items() if value is not None}
     design = design.replace(asked) if asked else design
     axes = map_axes(design) if axes is None else axes
-    study = _Study(design, axes, progress, store or Memory(), workers or _workers(client), interim)
+    workers = Cluster(client) if client is not None and workers is None else workers
+    study = _Study(design, axes, progress, store or in_memory, workers, interim)
     return study.result(begin, audit_cells)
-
-
-def _workers(client: Client | None) -> Workers | None:
-    if client is None:
-        return None
-    from drillctl.ensemble.cluster import Cluster
-
-    return Cluster(client)
 
 
 class _Study:
     """What the steps of a study have in common."""
 
     def __init__(
-        self,
-        design: Design,
-        axes: tuple[Axis, ...],
-        progress: Progress,
-        store: Store,
-        workers: Workers | None,
-        interim: Callable[[SoFar], None] | None,
-    ) -> None:
+        self, design: Design, axes: tuple[Axis, ...], progress: Progress, store: Store,
+        workers: Workers | None, interim: Callable[[SoFar], None] | None,
+    ) -> None:  # fmt: skip
         self.design, self.axes, self.progress = design, axes, progress
         self.store, self.workers, self.interim = store, workers, interim
         self.table = design.tables.uncertainty
         self.levels = design.tables.map.levels
         refuse_impossible(design, axes)
-        self.measures = _kept(self.table.keep)
+        self.measures = kept_measures(self.table.keep, "uncertainty.keep")
         self.draw = drawing(design, self.table.seed)
         cells = int(np.prod(shape_of(axes)))
         refuse_more_bytes(
@@ -136,20 +126,20 @@ class _Study:
     def result(self, begin: float, audit_cells: int | None) -> Uncertainty:
         """All of it."""
         nominal = sweep(self.design, self.axes, audit_cells=0, progress=self.progress).j1
-        job = self._job(Drawn(self.table.seed), None if self.table.full else self.levels[-1])
-        kept = self.store.blocks("realizations", job)
+        job = self._job(self.table.seed, None if self.table.full else self.levels[-1])
+        kept = self.store("realizations", job)
         job = job.prepared(kept.prepared)
         count, looks, seconds = self._run(job, kept, nominal)
-        found = self._made(kept, count, nominal)
+        made = self._made(kept, count, nominal)
         sensitivity = None
         if self.table.sensitivity is not None:
             sensitivity, more = self._sensitivity(self.table.sensitivity)
             seconds += more
         wanted = self.design.tables.map.audit_cells if audit_cells is None else audit_cells
         return replace(
-            found,
-            audit=self._audit(found, wanted),
-            failures=self._failures(found),
+            made,
+            audit=self._audit(made, wanted),
+            failures=self._failures(made),
             looks=looks,
             sensitivity=sensitivity,
             seconds=seconds,
@@ -157,7 +147,7 @@ class _Study:
         )
 
     def _made(self, kept: Blocks, count: int, nominal: Array) -> Uncertainty:
-        """The first `count` realizations, as yet without what is found out about them."""
+        """The first `count` realizations, as yet without what follows from them."""
         measures, status = kept.read(count)
         shape = (count, *shape_of(self.axes))
         return Uncertainty(
@@ -176,7 +166,7 @@ class _Study:
             total_seconds=0.0,
         )
 
-    def _job(self, source: Source, censor: float | None) -> Realizations:
+    def _job(self, source: int | dict[str, Array], censor: float | None) -> Realizations:
         return Realizations(self.design, self.axes, source, self.measures, censor)
 
     def _run(
@@ -211,8 +201,8 @@ class _Study:
 
     def _sensitivity(self, table: SensitivityTable) -> tuple[indices.Sensitivity, float]:
         columns = indices.points(self.design, table.samples, self.table.seed)
-        job = self._job(Listed(columns), None)  # a variance is of all that J1 may be
-        kept = self.store.blocks("sensitivity", job)
+        job = self._job(columns, None)  # a variance is of all that J1 may be
+        kept = self.store("sensitivity", job)
         job = job.prepared(kept.prepared)
         count = len(next(iter(columns.values())))
         seconds = run(job, count, kept, self.workers, self.progress).total
@@ -246,7 +236,7 @@ class _Study:
                 broken += 1
             except InputError as error:
                 errors.append(error)
-        reasons = told(errors)
+        reasons = by_reason(errors)
         if broken:
             reasons = (*reasons, Failures("no finite answer", broken, "in any cell"))
         return reasons
@@ -261,13 +251,12 @@ def refuse_impossible(design: Design, axes: tuple[Axis, ...]) -> None:
     table = design.tables.uncertainty
     for a in axes:
         if a.path in design.tables.uncertain:
-            where = f"uncertain.{a.path}"
             raise InputError(
                 "is an axis of the map, which gives it its values, and cannot be drawn",
-                f"{design.origin}: {where}" if design.origin else where,
+                design.where(f"uncertain.{a.path}"),
             )
     drawing(design, table.seed)
-    _kept(table.keep)
+    kept_measures(table.keep, "uncertainty.keep")
     if table.until is not None:
         level_of(table.until, design.tables.map.levels)
     if table.sensitivity is not None:
@@ -275,19 +264,8 @@ def refuse_impossible(design: Design, axes: tuple[Axis, ...]) -> None:
         indices.refuse_correlated(design)
 
 
-def _kept(names: tuple[str, ...]) -> tuple[str, ...]:
-    for name in names:
-        if name not in BATCH_MEASURES:
-            raise InputError(
-                f"no measure {name!r}; {nearest(name, BATCH_MEASURES)}", "uncertainty.keep"
-            )
-    return tuple(dict.fromkeys(("j1", *names)))
-
-
 def _cells(design: Design, axes: tuple[Axis, ...], table: SensitivityTable) -> dict[int, str]:
     """Cells nearest to what was asked for, with what they are called."""
-    from drillctl.design import parameter
-
     where = "uncertainty.sensitivity.cells"
     known = {a.path: a for a in axes}
     results: dict[int, str] = {}

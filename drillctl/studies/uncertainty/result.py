@@ -1,19 +1,29 @@
-"""Stability regions under uncertainty: what was simulated, and all that follows from it."""
+"""Stability regions under uncertainty: what was simulated, and all that follows from it.
+
+Areas settle as realizations are added. A run that is to stop when they have does so by a fixed
+schedule of looks: looking at the data again and again until an interval happens to be narrow makes
+it hold less often than it says. The looks are fixed before the first lane is run, and the interval
+of each has its share of the error that all may make together (Bonferroni).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.design import Design
+from drillctl.design.uncertain_tables import UntilTable
 from drillctl.ensemble.audit import Audit, unaudited
+from drillctl.ensemble.cases import CONFIDENCE, Interval
 from drillctl.ensemble.draws import Failures
-from drillctl.ensemble.grid import Axis, axes_of, other_axes
+from drillctl.ensemble.grid import Axis, axes_of, other_axes, place_of, span
+from drillctl.ensemble.parameters import sampling_of, uncertain_parameters
 from drillctl.ensemble.probability import (
     INNER,
     MEDIAN,
@@ -24,13 +34,13 @@ from drillctl.ensemble.probability import (
     probability_map,
     region_areas,
 )
-from drillctl.ensemble.regions import Region, region
-from drillctl.ensemble.sampling import sampling_of
+from drillctl.ensemble.sweeps import Region, outline, region
 from drillctl.errors import InputError
 from drillctl.provenance import provenance
-from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.store.codec import label
+from drillctl.simulation.measures import MEASURES, STATUSES, status_counts
+from drillctl.store.codec import Array, Mask, label
 from drillctl.store.folder import Growing, growing_realizations
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 from drillctl.studies.uncertainty.best import (
     NEEDS_FULL,
@@ -44,16 +54,82 @@ from drillctl.studies.uncertainty.best import (
     objectives,
     values_of,
 )
-from drillctl.studies.uncertainty.convergence import Convergence, Look, convergence
 from drillctl.studies.uncertainty.sensitivity import Sensitivity
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import shapely
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+FEWEST = 16  # realizations that the first point of a curve has, or two a replicate
+
+
+class Convergence(NamedTuple):
+    """Areas of the inner regions against the number of realizations."""
+
+    counts: tuple[int, ...]  # realizations, from the first on
+    # by level, one a count, with 95 % intervals of that count by itself
+    areas: dict[float, tuple[Area, ...]]
+
+
+def convergence(j1: Array, levels: tuple[float, ...], scatter: Scatter, seed: int) -> Convergence:
+    """Areas of the inner regions at doubling numbers of realizations."""
+    counts, count = [], max(FEWEST, 2 * scatter.replicates)
+    while count < len(j1):
+        counts.append(count)
+        count *= 2
+    counts.append(len(j1))
+    rows = []
+    for count in counts:
+        asked = [(probability_map(j1[:count], level, scatter), INNER) for level in levels]
+        rows.append(region_areas(j1[:count], asked, scatter, seed))
+    return Convergence(
+        tuple(counts),
+        {level: tuple(row[k] for row in rows) for k, level in enumerate(levels)},
+    )
+
+
+class Look(NamedTuple):
+    """The area as it was known at a number of realizations."""
+
+    realizations: int  # how many had been run
+    area: float  # share of the map
+    interval: Interval  # corrected for the number of looks
+    confidence: float  # of this interval by itself
+
+    def enough(self, half_width: float) -> bool:
+        """Whether the area is known to within a half-width on either side."""
+        low, high = self.interval
+        return max(self.area - low, high - self.area) <= half_width
+
+
+def schedule(first: int, most: int) -> tuple[int, ...]:
+    """Numbers of realizations at which the area is looked at: doubling, up to the most."""
+    looks = []
+    while first < most:
+        looks.append(first)
+        first *= 2
+    return (*looks, most)
+
+
+def level_of(table: UntilTable, levels: tuple[float, ...]) -> float:
+    """The level whose region is to be known: that of the table, or the highest of the map."""
+    if table.level is None:
+        return levels[-1]
+    if table.level not in levels:
+        allowed = ", ".join(f"{level:g}" for level in levels)
+        raise InputError(
+            f"{table.level:g} is no level of the map; allowed: {allowed}", "uncertainty.until.level"
+        )
+    return table.level
+
+
+def look(
+    j1: Array, table: UntilTable, level: float, looks: int, scatter: Scatter, seed: int
+) -> Look:
+    """The area at one of the looks."""
+    confidence = 1.0 - (1.0 - CONFIDENCE) / looks
+    result = probability_map(j1, level, scatter)
+    (area,) = region_areas(j1, [(result, table.probability)], scatter, seed, confidence)
+    return Look(len(j1), area.value, area.interval, confidence)
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,8 +327,6 @@ class Uncertainty(Result):
             Lanes were stopped, so that the outline between cells is not known; or the map does
             not run over two parameters.
         """
-        from drillctl.ensemble.regions import outline
-
         if self.censored[realization].any():
             raise InputError(f"outlines between cells: {NEEDS_FULL}", "contours")
         if len(self.axes) != 2:
@@ -288,23 +362,96 @@ class Uncertainty(Result):
 
     def at(self, cell: int) -> dict[str, float]:
         """Parameters (SI) of a cell of the flattened map."""
-        where = np.unravel_index(cell, self.nominal.shape)
-        return {a.path: float(a.values[k]) for a, k in zip(self.axes, where, strict=True)}
+        return place_of(self.axes, cell)
 
     def _flat(self, values: NDArray[Any]) -> NDArray[Any]:
         return values.reshape(len(values), -1)
 
+    @property
+    def known(self) -> dict[str, Array]:
+        """Mean, 95 % quantile and tail mean in every cell (s); NaN where stopped lanes enter."""
+        results = {}
+        for name in (Mean().name, Quantile().name, TailMean().name):
+            one = self.values[name]
+            certain = np.where(one.certain, one.values, np.nan)
+            results[name] = certain.reshape(self.nominal.shape)
+        return results
+
     def derived(self) -> dict[str, Any]:
         """Counts and probabilities by level, moments, and draws with their units."""
-        from drillctl.studies.uncertainty.outputs import derived
-
-        return derived(self)
+        paths = [a.path for a in self.axes]
+        results: dict[str, Any] = {
+            one.path: ("realization", self.drawn[one.path], {"units": one.unit})
+            for one in uncertain_parameters(self.design)
+        }
+        results["level"] = ("level", np.array(self.levels), {"units": "s"})
+        every = list(self.maps.values())
+        columns: dict[str, list[NDArray[Any]]] = {
+            "count": [one.counts for one in every],
+            "probability": [one.probability for one in every],
+        }
+        for kind, name in (("interval", "probability"), ("simultaneous", "simultaneous")):
+            for k, end in enumerate(("low", "high")):
+                columns[f"{name}_{end}"] = [getattr(one, kind)[k] for one in every]
+        results |= {name: (["level", *paths], np.stack(rows), {}) for name, rows in columns.items()}
+        return results | {
+            f"j1_{name}": (paths, values, {"units": "s"}) for name, values in self.known.items()
+        }
 
     def summary(self) -> dict[str, Any]:
         """Levels with areas and intervals, best cells, failures, audit; SI units."""
-        from drillctl.studies.uncertainty.outputs import summary
+        result: dict[str, Any] = {
+            **picked(self, "realizations", "seed", "trajectories", "seconds", "total_seconds"),
+            "sampling": self.design.tables.uncertainty.sampling,
+            "replicates": self.scatter.replicates,
+            "uncertain": list(self.drawn),
+            "axes": span(self.axes),
+            "levels": self._levels(),
+            "best": {name: self._best_summary(name) for name in self.objectives},
+            "looks": [one._asdict() | {"interval": list(one.interval)} for one in self.looks],
+            "statuses": status_counts(self.status),
+            "failures": [asdict(one) for one in self.failures],
+            "audit": self.audit.summary(),
+        }
+        if len(self.axes) == 3:
+            slices = [{"value": x, "levels": one._levels()} for x, one in self.slices().items()]
+            result["slices"] = {self.axes[2].path: slices}
+        if self.sensitivity is not None:
+            result["sensitivity"] = self.sensitivity.summary()
+        return result
 
-        return summary(self)
+    def _levels(self) -> dict[str, Any]:
+        return {f"{level:g}": self._level(level) for level in self.levels}
+
+    def _level(self, level: float) -> dict[str, Any]:
+        areas, one = self.areas[level], self.maps[level]
+        low, high = one.simultaneous
+        return {
+            "nominal_area": self.nominal_regions[level].area_fraction,
+            "area_p95": areas[INNER].value,
+            "area_p50": areas[MEDIAN].value,
+            "area_p05": areas[OUTER].value,
+            "interval_95": list(areas[INNER].interval),
+            "interval_95_p50": list(areas[MEDIAN].interval),
+            "interval_95_p05": list(areas[OUTER].interval),
+            "area_always": float(one.always.mean()),
+            "area_ever": float(one.ever.mean()),
+            # Cells in the inner region, and that may be, with all cells' intervals at once.
+            "simultaneous_95": [float((low >= INNER).mean()), float((high >= INNER).mean())],
+        }
+
+    def _best_summary(self, name: str) -> dict[str, Any]:
+        try:
+            best = self.best(name)
+        except InputError as error:
+            nothing = dict.fromkeys(("at", "value", "interval_95", "alike_cells"))
+            return nothing | {"reason": error.problem}
+        return {
+            "at": self.at(best.cell),
+            "value": best.value,
+            "interval_95": list(best.interval),
+            "alike_cells": None if best.alike is None else int(best.alike.sum()),
+        }
 
     def requested(self) -> tuple[Design, dict[str, Any]]:
         """Axes and audited lanes that the design does not give."""

@@ -20,10 +20,9 @@ from drillctl.ensemble.cases import CONFIDENCE
 from drillctl.ensemble.parameters import uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
-from drillctl.store.codec import label
+from drillctl.store.codec import Array, label
+from drillctl.store.json_files import picked, strict
 from drillctl.studies.uncertainty.best import NEEDS_FULL
-
-Array = NDArray[np.float64]
 
 _EDGE = 2.0**-53  # nearest to 0 and to 1 that a point comes, where quantiles are infinite
 RESAMPLES = 1000  # of the bootstrap of the indices
@@ -55,15 +54,9 @@ class Sensitivity:
         """Indices by figure and parameter."""
         return {
             "parameters": list(self.parameters),
-            "samples": self.samples,
-            "trajectories": self.trajectories,
+            **picked(self, "samples", "trajectories"),
             "indices": {
-                one.of: {
-                    "unit": one.unit,
-                    "variance": one.variance,
-                    **{key: getattr(one, key).tolist() for key in COLUMNS},
-                }
-                for one in self.indices
+                one.of: strict(picked(one, "unit", "variance", *COLUMNS)) for one in self.indices
             },
         }
 

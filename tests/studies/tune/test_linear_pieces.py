@@ -8,9 +8,19 @@ import drillctl
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_analysis import tolerated_slope
 from drillctl.linear.slope_margin import slope_margin
-from drillctl.studies.tune.line_data import TERMS, WITHIN, Pair, chain, circles, pair
 from drillctl.studies.tune.linear_nlp import circle_data, constants_of, point_functions
-from drillctl.studies.tune.loops import crossings_of, least_seen, loops_of, slope_margin_of
+from drillctl.studies.tune.loops import (
+    TERMS,
+    WITHIN,
+    Pair,
+    chain,
+    circles,
+    crossings_of,
+    least_seen,
+    loops_of,
+    pair,
+    slope_margin_of,
+)
 from drillctl.studies.tune.tuned import (
     by_path,
     drive_numbers,

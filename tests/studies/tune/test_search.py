@@ -9,8 +9,7 @@ import drillctl
 from drillctl.ensemble.draws import drawn_lanes, run_draws
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
-from drillctl.studies.tune.problem import GainProblem
-from drillctl.studies.tune.runs import GainRuns
+from drillctl.studies.tune.problem import GainProblem, GainRuns
 from drillctl.studies.tune.search import optimum, polished, search, search_problem
 from drillctl.studies.tune.tuned import put, tuned_parameters
 
