@@ -6,6 +6,7 @@ A comment before the fence says what is not to be done with a block as with othe
     <!-- code: not run: reason -->        commands are parsed, Python is compiled
     <!-- code: not run yet: reason -->    neither
     <!-- code: file NAME -->              written to the folder that the page runs in
+    <!-- code: line NAME -->              a line for a file of the package, which a test inserts
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ def test_every_block_says_what_it_is(page):
         where = f"{page.name}:{block.line}"
         known = block.language in (*RUN, "toml", "matlab", "text") or block.language.startswith("{")
         assert known, f"{where}: of what language is it?"
-        marked = block.mark and not block.mark.startswith("file ")
+        marked = block.mark and not block.mark.startswith(("file ", "line "))
         assert not marked or block.language in RUN, f"{where}: a mark on what never runs"
 
 
