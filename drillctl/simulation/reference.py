@@ -170,21 +170,31 @@ def stuck_between(motion: Motion, begin: float, end: float) -> float:
     return float(np.maximum(parts, 0.0)[motion.directions == 0.0].sum())
 
 
-def solve(design: Design, tolerance: float = 1e-8, progress: Progress = SILENT) -> Motion:
-    """Simulate a design with located events."""
-    return _run(design, numbers_of(design), tolerance, progress)
+def solve(
+    design: Design,
+    tolerance: float = 1e-8,
+    progress: Progress = SILENT,
+    stiff: bool | None = None,
+) -> Motion:
+    """Simulate a design with located events; `stiff` overrules what its string would take."""
+    return _run(design, numbers_of(design), tolerance, progress, stiff)
 
 
 def solve_whole(design: Design, tolerance: float = 1e-8) -> Motion:
     """The same, with the motion of every node kept."""
-    return _run(design, numbers_of(design, np.arange(2 * design.string.nodes)), tolerance, SILENT)
+    return _run(
+        design, numbers_of(design, np.arange(2 * design.string.nodes)), tolerance, SILENT, None
+    )
 
 
-def _run(design: Design, numbers: Numbers, tolerance: float, progress: Progress) -> Motion:
+def _run(
+    design: Design, numbers: Numbers, tolerance: float, progress: Progress, stiff: bool | None
+) -> Motion:
     from drillctl.simulation import reference_run as r
 
     rig, state = numbers.rig, numbers.state
-    work, method = r.work_for(len(state)), r.explicit_method()
+    stiff = is_stiff(numbers) if stiff is None else stiff
+    work, method = r.work_for(len(state)), r.method_for(stiff, design.string.nodes, len(state))
     clock = _clock(design, numbers, tolerance)
     r.begin(rig, clock, work, state)
     progress.begin("simulated seconds", math.ceil(clock.duration))
@@ -210,7 +220,7 @@ def _run(design: Design, numbers: Numbers, tolerance: float, progress: Progress)
         extremes=clock.extremes[: count[r.EXTREMES]],
         energy=_audit(design, numbers.arrays["begin"], state),
         tolerance=tolerance,
-        method="DOP853",
+        method="Rodas5P" if stiff else "DOP853",
         steps=int(rig["steps"][0]),
         refused=int(count[r.REFUSED]),
     )
@@ -221,7 +231,7 @@ def _clock(design: Design, numbers: Numbers, tolerance: float) -> Any:
 
     return r.Clock(
         tolerance, design.tables.simulation.duration, 0, numbers.kept,
-        np.array(design.program.breaks()), np.zeros(6), np.zeros(7, dtype=np.int64),
+        np.array(design.program.breaks()), np.zeros(8), np.zeros(7, dtype=np.int64),
         np.zeros((64, 4)), np.zeros((64, 4)), np.zeros((256, 2)), np.zeros((1024, 2)),
     )  # fmt: skip
 
@@ -260,6 +270,52 @@ def _audit(design: Design, before: Array, after: Array) -> EnergyAudit:
 
     drive, bit, damping = (float(w) for w in after[2 * nodes : 2 * nodes + 3])
     return EnergyAudit(drive, bit, damping, stored(after) - stored(before))
+
+
+# Explicit or stiff steps.
+
+FEW = 300.0
+"""Explicit steps a second that no string is spared: below that they cost less than stiff ones."""
+EXPLICIT_SWING, EXPLICIT_DECAY = 4.5, 6.4
+"""Frequency and decay (1/s) of a mode that DOP853 follows in steps of a second, as measured."""
+RATIO = 0.005
+"""Damping ratio of the fastest mode from which it dies out by itself. Less damped, its swing after
+each stick would have to be followed all the same, at which explicit steps are better."""
+TURNS = 60  # of the power iteration: the fastest mode within a few per cent
+
+
+def is_stiff(numbers: Numbers) -> bool:
+    """Whether explicit steps would follow modes that have died out long before."""
+    rig = numbers.rig
+    if rig["tolerance"][0] > 0.0 or rig["full"][0] or not rig["damped"][0]:
+        return False
+    swing, decay = _fastest(numbers)
+    needed = max(swing / EXPLICIT_SWING, decay / EXPLICIT_DECAY)
+    return needed > FEW and decay > 2.0 * RATIO * swing
+
+
+def _fastest(numbers: Numbers) -> tuple[float, float]:
+    """Largest frequency without damping (1/s), and largest rate of decay without springs (1/s)."""
+    from drillctl.simulation import reference_rates as f
+
+    bands = numbers.arrays["bands"]
+    n = bands.shape[1]
+    largest = []
+    springs = np.concatenate([[0.0], bands[f.STIFFNESS, : n - 1], [0.0]])
+    for own, side in (
+        (springs[:-1] + springs[1:], -bands[f.STIFFNESS]),
+        (bands[f.DAMPING], bands[f.SIDE_DAMPING]),
+    ):
+        mode = np.where(np.arange(n) % 2, 1.0, -1.0) * (1.0 + np.arange(n) / n)
+        for _ in range(TURNS):
+            mode /= np.linalg.norm(mode)
+            force = own * mode
+            force[:-1] += side[: n - 1] * mode[1:]
+            force[1:] += side[: n - 1] * mode[:-1]
+            f.accelerate(numbers.rig, force, n)
+            mode = force
+        largest.append(float(np.linalg.norm(mode)))
+    return math.sqrt(largest[0]), largest[1]
 
 
 # A design in numbers.
@@ -307,7 +363,7 @@ def _string_arrays(string: Drillstring, set_speed: float) -> dict[str, Array]:
     from drillctl.simulation import reference_rates as f
 
     n = string.nodes
-    bands = np.zeros((9, n))
+    bands = np.zeros((10, n))
     mass, side_mass = string.mass.diagonal(), string.mass.diagonal(1)
     pivot = mass[0]
     bands[f.PIVOT, 0] = 1.0 / pivot
@@ -315,6 +371,7 @@ def _string_arrays(string: Drillstring, set_speed: float) -> dict[str, Array]:
         bands[f.FACTOR, i] = side_mass[i] / pivot
         pivot = mass[i + 1] - bands[f.FACTOR, i] * side_mass[i]
         bands[f.PIVOT, i + 1] = 1.0 / pivot
+    bands[f.MASS] = mass
     bands[f.STIFFNESS, : n - 1] = string.element_stiffness
     bands[f.DAMPING] = string.damping.diagonal()
     bands[f.SIDE_DAMPING, : n - 1] = string.damping.diagonal(1)

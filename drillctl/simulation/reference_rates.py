@@ -79,10 +79,12 @@ RIG = np.dtype([(name, np.int64) for name in WHOLE_NUMBERS] + [(name, float) for
 One pointer is all that a call passes on; tuples of arrays would be copied at each.
 """
 
-STIFFNESS, DAMPING, SIDE_DAMPING, LOAD, SIDE_MASS, FACTOR, PIVOT, HELD_TOP, FREE_TOP = range(9)
-"""Rows of `bands`, shape (9, nodes): stiffness of each element (N m/rad), diagonal and side
-diagonal of C (N m s/rad), g Omega (N m), side diagonal of M (kg m2), its factors, one over its
-pivots, accelerations per torque at the top with the bit held and free (1/(kg m2))."""
+STIFFNESS, DAMPING, SIDE_DAMPING, LOAD, SIDE_MASS, FACTOR, PIVOT, HELD_TOP, FREE_TOP, MASS = range(
+    10
+)
+"""Rows of `bands`, shape (10, nodes): stiffness of each element (N m/rad), diagonal and side
+diagonal of C (N m s/rad), g Omega (N m), diagonal and side diagonal of M (kg m2), its factors, one
+over its pivots, accelerations per torque at the top with the bit held and free (1/(kg m2))."""
 DRIVE, ROCK, ROCK_BEFORE, WEIGHT, PRESENT, PATH, SPEED_PROGRAM, WEIGHT_PROGRAM = range(8)
 """Rows of `laws`: the numbers of each law, of the weight law at the nominal weight of the moment,
 of the path of the weight and of the programs of speed and weight."""
@@ -347,7 +349,7 @@ def weight(rig: Any, time: float, state: Any, speed: float) -> float:
 
 
 @compiled
-def _weight_rates(rig: Any, time: float, state: Any, top_torque: float, rates: Any) -> None:
+def weight_rates(rig: Any, time: float, state: Any, top_torque: float, rates: Any) -> None:
     """Rates of the memory of the weight."""
     memory, out, path = memory_of_weight(rig, state), memory_of_weight(rig, rates), law(rig, PATH)
     count = rig.weight_states
@@ -519,7 +521,7 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
     rates[2 * n + 1] = bit_torque * bit_speed(rig, state)
     rates[2 * n + 2] = _damping_power(rig, state)
     if rig.weight_states:
-        _weight_rates(rig, time, state, top_torque, rates)
+        weight_rates(rig, time, state, top_torque, rates)
     return bit_torque
 
 

@@ -61,16 +61,29 @@ from drillctl.simulation.reference_steps import (
     SAFETY,
     SMALLEST,
     STAGES,
+    Dense,
     Tableau,
     Work,
     explicit_dense,
+    explicit_dense_output,
     explicit_error,
-    explicit_record,
     explicit_step,
-    explicit_whole,
     first_length,
+    record,
+    record_whole,
     state_at,
     tableau,
+)
+from drillctl.simulation.reference_stiff import (
+    StiffTableau,
+    StiffWork,
+    change_with_time,
+    linearise,
+    stiff_dense_output,
+    stiff_error,
+    stiff_step,
+    stiff_tableau,
+    stiff_work,
 )
 
 LONGEST_STEP = 0.05  # longest step (s): a touch of zero speed shorter than that could go unseen
@@ -79,7 +92,6 @@ WITHIN_STEP = 2e-3
 MOST_PHASES = 100_000
 """Give up beyond this many phases: the bit chatters and time no longer advances."""
 CLOSE = 4.0 * 2.220446049250313e-16  # to which an event is located, as a share of its step
-ORDER = 7.0  # of the lower of the pair, which the length of a step follows
 
 DRIVE_PERIOD = SampledDrive._fields.index("period")
 
@@ -95,7 +107,8 @@ class Clock(NamedTuple):
     room: int  # steps that the tape has room for
     kept: Any  # states that are kept of each step
     breaks: Any  # times at which a program begins, ends or jumps (s)
-    now: Any  # shape (6,): time, length of the next step, end of the piece, its begin; margins
+    # shape (7,): time, length of the next step, end of the piece, its begin, bit torque; margins
+    now: Any
     count: Any  # shape (7,): phase, in a piece, pieces, changes, crossings, extremes, steps refused
     # shape (room, 4): begin, end, phase and first step; (room, 3): time, release or stick,
     # direction; (room, 2): time and angle, time and speed
@@ -105,7 +118,7 @@ class Clock(NamedTuple):
     extremes: Any
 
 
-TIME, STEP, STOP, PIECE_BEGIN, MARGINS = range(5)
+TIME, STEP, STOP, PIECE_BEGIN, BIT_TORQUE, MARGINS = range(6)
 PHASE, IN_PIECE, PIECES, CHANGES, CROSSINGS, EXTREMES, REFUSED = range(7)
 
 
@@ -418,14 +431,15 @@ def begin(rigs: Any, clock: Any, work: Any, state: Any) -> None:
 
 
 @compiled
-def _begin_piece(rig: Any, clock: Any, work: Any, state: Any) -> None:
+def _begin_piece(rig: Any, method: Any, clock: Any, work: Any, state: Any) -> None:
     now, phase = clock.now, clock.count[PHASE]
     time = now[TIME]
     torque = rates_of(rig, time, phase, state, work.stages[0])
     now[STOP], now[PIECE_BEGIN] = _next_stop(rig, clock, time), time
     now[STEP] = first_length(
-        rig, work, time, now[STOP], _longest(phase), clock.tolerance, ORDER + 1.0, phase, state
+        rig, work, time, now[STOP], _longest(phase), clock.tolerance, method.order, phase, state
     )
+    now[BIT_TORQUE] = torque
     for which in range(2):
         now[MARGINS + which] = _margin_of(rig, time, phase, which, torque, state)
     clock.pieces[clock.count[PIECES], 3] = rig.steps
@@ -472,25 +486,45 @@ def _has_room(rig: Any, clock: Any) -> bool:
 
 
 @compiled
+def _trial(
+    rig: Any, method: Any, clock: Any, work: Any, state: Any, step: float, torque: float
+) -> tuple[float, float]:
+    """One trial step: the bit torque at its end, and its error over the tolerance."""
+    time, phase = clock.now[TIME], clock.count[PHASE]
+    if method.stiff:
+        solver = method.solver
+        bit = clock.now[BIT_TORQUE]
+        end = stiff_step(
+            rig, method.implicit, work, solver, time, step, phase, state, (torque, bit)
+        )
+        return end, stiff_error(work, clock.tolerance, state)
+    end = explicit_step(rig, method.explicit, work, time, step, phase, state)
+    return end, explicit_error(method.explicit, work, step, clock.tolerance, state)
+
+
+@compiled
 def _try_step(rig: Any, method: Any, clock: Any, work: Any, state: Any) -> tuple[float, float]:
     """Take a step within the tolerance; its length, 0 if there is none, and the bit torque."""
-    now, phase, tolerance = clock.now, clock.count[PHASE], clock.tolerance
+    now, phase = clock.now, clock.count[PHASE]
     time, end = now[TIME], now[STOP]
     least = 10.0 * (math.nextafter(time, math.inf) - time)
-    length, refused = min(max(now[STEP], least), _longest(phase)), False
+    length, refused, torque = min(max(now[STEP], least), _longest(phase)), False, 0.0
+    power = -1.0 / method.order
+    if method.stiff:
+        torque = linearise(rig, method.solver, time, phase, state, work.stages[0])
+        change_with_time(rig, method.solver, time, length, phase, state, work.stages[0])
     while length >= least:
         step = min(length, end - time)
-        torque = explicit_step(rig, method, work, time, step, phase, state)
-        error = explicit_error(method, work, step, tolerance, state)
+        bit_torque, error = _trial(rig, method, clock, work, state, step, torque)
         if error < 1.0:
-            factor = LARGEST if error == 0.0 else min(LARGEST, SAFETY * error ** (-1.0 / 8.0))
+            factor = LARGEST if error == 0.0 else min(LARGEST, SAFETY * error**power)
             now[STEP] = step * (min(1.0, factor) if refused else factor)
-            return step, torque
+            return step, bit_torque
         refused = True
         clock.count[REFUSED] += 1
         factor = SMALLEST
         if error < math.inf:
-            factor = max(SMALLEST, SAFETY * error ** (-1.0 / 8.0))
+            factor = max(SMALLEST, SAFETY * error**power)
         length = step * factor
     return 0.0, 0.0
 
@@ -503,11 +537,11 @@ def _keep_step(
     """Record a step and its events, move on; whether the phase ended by itself."""
     now, phase, last = clock.now, clock.count[PHASE], 2 * rig.nodes - 1
     time = now[TIME]
-    explicit_dense(rig, method, work, time, step, phase, state)
+    if not method.stiff:
+        explicit_dense(rig, method.explicit, work, time, step, phase, state)
     row = tape_row(rig, rig.steps)
-    explicit_record(
-        method, work, time, step, state, sums[0 if is_held(phase) else 1], clock.kept, row
-    )
+    summed = sums[0 if is_held(phase) else 1]
+    record(method.dense, work, time, step, state, summed, clock.kept, row)
     rig.steps += 1
     values, until = work.values, 2.0
     values[:2] = now[MARGINS : MARGINS + 2]
@@ -521,7 +555,7 @@ def _keep_step(
         if not _happens(which, phase, before, after):
             continue
         if which < 2 and until == 2.0:
-            explicit_whole(method, work, step, state)
+            record_whole(method.dense, work, step, state)
         share = _locate(which, rig, work, row, phase, state, before, after)
         if which < 2:
             until = min(until, share)
@@ -535,6 +569,7 @@ def _keep_step(
     now[TIME] = now[STOP] if step == now[STOP] - time else time + step
     state[:] = work.after
     work.stages[0] = work.stages[STAGES]
+    now[BIT_TORQUE] = torque
     return False
 
 
@@ -573,7 +608,7 @@ def advance(
         if not count[IN_PIECE]:
             if now[TIME] >= clock.duration:
                 return DONE
-            _begin_piece(rig, clock, work, state)
+            _begin_piece(rig, method, clock, work, state)
         step, torque = _try_step(rig, method, clock, work, state)
         if step == 0.0:
             return TOO_SHORT
@@ -595,7 +630,19 @@ def work_for(size: int) -> Work:
     return Work(stages, np.zeros(size), np.zeros(size), errors, np.zeros(20), np.zeros(8), dense)
 
 
-@cache
-def explicit_method() -> Tableau:
-    """The coefficients of the explicit steps."""
-    return tableau()
+class Method(NamedTuple):
+    """How steps are taken."""
+
+    stiff: bool
+    order: float  # power of the length of a step that its error goes with
+    explicit: Tableau
+    implicit: StiffTableau
+    dense: Dense
+    solver: StiffWork
+
+
+def method_for(stiff: bool, nodes: int, states: int) -> Method:
+    """Explicit steps, or linearly implicit ones, for a rig."""
+    dense = stiff_dense_output() if stiff else explicit_dense_output()
+    solver = stiff_work(nodes, states)
+    return Method(stiff, 5.0 if stiff else 8.0, tableau(), stiff_tableau(), dense, solver)

@@ -40,7 +40,14 @@ class Tableau(NamedTuple):
     errors: Any  # shape (2, 16): error estimates of order 5 and 3, then
     errors_of: Any
     errors_count: Any
-    dense: Any  # shape (4, 16)
+
+
+class Dense(NamedTuple):
+    """A dense output: F1 to F6 of the nested form as sums of the stages and of the change."""
+
+    weights: Any  # shape (6, 16)
+    changes: Any  # shape (6,)
+    by_step: bool  # whether the stages are rates, to be multiplied with the step
 
 
 def tableau() -> Tableau:
@@ -54,7 +61,16 @@ def tableau() -> Tableau:
     errors = np.zeros((2, DENSE_STAGES))
     errors[0, : STAGES + 1], errors[1, : STAGES + 1] = DOP853.E5, DOP853.E3
     c = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
-    return Tableau(*_without_zeros(a), c, *_without_zeros(errors), DOP853.D.copy())
+    return Tableau(*_without_zeros(a), c, *_without_zeros(errors))
+
+
+def explicit_dense_output() -> Dense:
+    """The dense output as SciPy holds it."""
+    from scipy.integrate import DOP853
+
+    weights = np.zeros((6, DENSE_STAGES))
+    weights[0, 0], weights[1, [0, STAGES]], weights[2:] = 1.0, -1.0, DOP853.D
+    return Dense(weights, np.array([-1.0, 2.0, 0.0, 0.0, 0.0, 0.0]), by_step=True)
 
 
 def _without_zeros(weights: Array) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
@@ -151,67 +167,57 @@ def explicit_error(method: Any, work: Any, step: float, tolerance: float, state:
     return step * fifth / math.sqrt((fifth + 0.01 * third) * size)
 
 
-@compiled
-def _write(row: Any, component: int, begin: float, change: float, first: float, last: float,
-           high: Any) -> None:  # fmt: skip
-    """Eight numbers of a component; `first`, `last`: its rates at both ends times the step."""
-    place = FIRST + 8 * component
-    row[place] = begin
-    row[place + 1] = change
-    row[place + 2] = first - change
-    row[place + 3] = 2.0 * change - (first + last)
-    for k in range(4):
-        row[place + 4 + k] = high[k]
+# The dense output: value = begin + x (F0 + (1 - x) (F1 + x (F2 + (1 - x) (F3 + ...)))), x the share
+# of the step, F0 the change over it and the others sums of that and of the stages.
 
 
 @compiled
-def explicit_record(
-    method: Any, work: Any, time: float, step: float, state: Any, sums: Any, kept: Any, row: Any
+def record(
+    dense: Any, work: Any, time: float, step: float, state: Any, sums: Any, kept: Any, row: Any
 ) -> None:
     """Keep the dense output of some states and of sums of states."""
     row[BEGIN], row[LENGTH] = time, step
-    high, summed = work.scratch[:4], work.scratch[4:]
+    stages, after, unit = work.stages, work.after, step if dense.by_step else 1.0
     for c in range(len(kept)):
-        i = kept[c]
-        for k in range(4):
+        i, place = kept[c], FIRST + 8 * c
+        change = after[i] - state[i]
+        row[place], row[place + 1] = state[i], change
+        for k in range(6):
             total = 0.0
             for j in range(DENSE_STAGES):
-                total += method.dense[k, j] * work.stages[j, i]
-            high[k] = step * total
-        _write(row, c, state[i], work.after[i] - state[i], step * work.stages[0, i],
-               step * work.stages[STAGES, i], high)  # fmt: skip
+                total += dense.weights[k, j] * stages[j, i]
+            row[place + 2 + k] = dense.changes[k] * change + unit * total
+    summed = work.scratch
     for c in range(len(sums)):
-        weights, length = sums[c], sums.shape[1]
-        begin, end = 0.0, 0.0
-        for i in range(length):
+        weights, place = sums[c], FIRST + 8 * (len(kept) + c)
+        begin, change = 0.0, 0.0
+        for i in range(len(weights)):
             begin += weights[i] * state[i]
-            end += weights[i] * work.after[i]
+            change += weights[i] * (after[i] - state[i])
         for j in range(DENSE_STAGES):
             summed[j] = 0.0
-            for i in range(length):
-                summed[j] += weights[i] * work.stages[j, i]
-        for k in range(4):
-            high[k] = 0.0
+            for i in range(len(weights)):
+                summed[j] += weights[i] * stages[j, i]
+        row[place], row[place + 1] = begin, change
+        for k in range(6):
+            total = 0.0
             for j in range(DENSE_STAGES):
-                high[k] += step * method.dense[k, j] * summed[j]
-        _write(row, len(kept) + c, begin, end - begin, step * summed[0],
-               step * summed[STAGES], high)  # fmt: skip
+                total += dense.weights[k, j] * summed[j]
+            row[place + 2 + k] = dense.changes[k] * change + unit * total
 
 
 @compiled
-def explicit_whole(method: Any, work: Any, step: float, state: Any) -> None:
+def record_whole(dense: Any, work: Any, step: float, state: Any) -> None:
     """The dense output of every state."""
-    dense, stages = work.dense, work.stages
+    whole, unit = work.dense, step if dense.by_step else 1.0
     for i in range(len(state)):
         change = work.after[i] - state[i]
-        dense[0, i] = change
-        dense[1, i] = step * stages[0, i] - change
-        dense[2, i] = 2.0 * change - step * (stages[STAGES, i] + stages[0, i])
-        for k in range(4):
+        whole[0, i] = change
+        for k in range(6):
             total = 0.0
             for j in range(DENSE_STAGES):
-                total += method.dense[k, j] * stages[j, i]
-            dense[3 + k, i] = step * total
+                total += dense.weights[k, j] * work.stages[j, i]
+            whole[1 + k, i] = dense.changes[k] * change + unit * total
 
 
 @compiled

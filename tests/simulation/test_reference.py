@@ -1,12 +1,16 @@
 """The reference solver against event-accurate values, balances and known behaviour."""
 
+import numba
 import numpy as np
 import pytest
 
 import drillctl
 from benchmarks.peers.reference import solver as peer
 from drillctl.design import Design
-from drillctl.simulation.reference import solve
+from drillctl.simulation import reference_run as run
+from drillctl.simulation.reference import numbers_of, solve, solve_whole
+from drillctl.simulation.reference_rates import rates_of, slip_torque
+from drillctl.simulation.reference_stiff import change_with_time, linearise, stiff_step
 from drillctl.simulation.run import sample
 
 HOLDS = (
@@ -126,6 +130,64 @@ def test_the_peer_in_plain_python_agrees(name):
     ]
     for value, other in zip(motion.torques(times)[:3], np.array(torques).T, strict=True):
         assert value == pytest.approx(other, rel=1e-6, abs=1e-2)
+
+
+STIFF = {"drillstring.sections.pipe.stiffness_damping": "1e-3 s", "simulation.duration": "15 s"}
+
+
+@pytest.mark.parametrize("name", [name for name in LAWS if name != "modal damping"])
+def test_stiff_steps_agree_with_explicit_ones(name):
+    design = paper(400, 100, 140, **STIFF | LAWS[name])
+    due, motion = solve(design, 1e-11), solve(design, 1e-8, stiff=True)
+    assert motion.method == "Rodas5P"
+    assert [event.kind for event in motion.events] == [event.kind for event in due.events]
+    times = [event.time for event in due.events]
+    assert [event.time for event in motion.events] == pytest.approx(times, abs=2e-6)
+    assert sample(motion).measures.j1 == pytest.approx(sample(due).measures.j1, rel=1e-6)
+    assert motion.energy.relative_residual < 1e-8
+
+
+def test_order_of_stiff_steps(figure):
+    # Slip of the bit alone, in steps of one length; the drive has a filter and a limit.
+    drive = {"controller.drive.lag": "0.2 s", "simulation.duration": "0.32 s"}
+    design = paper(400, 100, 140, **STIFF | drive)
+    due = solve_whole(design, 1e-13).states(np.array([0.32]))[:, 0]
+    errors = []
+    for step in (0.02, 0.01, 0.005):
+        numbers = numbers_of(design)
+        states = len(numbers.state)
+        work = run.work_for(states)
+        method = run.method_for(True, design.string.nodes, states)
+        end = fixed_steps(numbers, method, work, step, round(0.32 / step))
+        errors.append(np.abs(end[: len(due)] - due).max())
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    figure("order of the stiff steps", orders[-1])
+    assert orders[-1] > 4.8  # of a string that is nearly linear it is 6
+
+
+def fixed_steps(numbers, method, work, step, count):
+    state = numbers.state.copy()
+    _steps(numbers.rig, method, work, state, step, count)
+    return state
+
+
+@numba.njit
+def _steps(rigs, method, work, state, step, count):
+    for k in range(count):
+        rates_of(rigs[0], k * step, 1, state, work.stages[0])
+        solver = method.solver
+        torque = linearise(rigs[0], solver, k * step, 1, state, work.stages[0])
+        change_with_time(rigs[0], solver, k * step, step, 1, state, work.stages[0])
+        rock = slip_torque(rigs[0], k * step, state, 1)
+        stiff_step(rigs[0], method.implicit, work, solver, k * step, step, 1, state, (torque, rock))
+        state[:] = work.after
+
+
+def test_method_by_what_the_string_asks():
+    fine = {"drillstring.sections.pipe.elements": 400, "simulation.duration": "1 s"}
+    assert solve(paper(400, 100, 140, **fine)).method == "DOP853"
+    assert solve(paper(400, 100, 140, **STIFF | fine)).method == "Rodas5P"
+    assert solve(paper(400, 100, 140, **STIFF)).method == "DOP853"
 
 
 @pytest.mark.parametrize("kind", ["rest", "turning", "wound_up"])
