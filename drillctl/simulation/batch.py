@@ -131,6 +131,7 @@ def _run(
     """Raw measures, shape (MEASURES, lanes), and traces, shape (samples, signals, lanes)."""
     from drillctl.simulation.kernels.advance import TRACED, Clock, kernel
     from drillctl.simulation.kernels.rows import MEASURES, ROWS, WIDTH
+    from drillctl.simulation.kernels.string_step import MOST_READ
 
     count = len(lanes)
     # Every block is full: the last one is filled up with copies of the last lane.
@@ -166,6 +167,7 @@ def _run(
     )  # fmt: skip
     run = kernel(*arguments[1:7])
     rows = ROWS + 2 * len(state) + ticks.remembered + 2 * ticks.estimated
+    rows += -(-MOST_READ * len(state) // WIDTH)
 
     watch = np.zeros(1, dtype=np.int64)  # other than zero: stop
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -227,7 +228,7 @@ print(json.dumps([float(x).hex() for x in batch.measures["j1"]]))
 
 
 @pytest.mark.parametrize(
-    ("width", "threads"), [(8, 2), pytest.param(32, 1, marks=pytest.mark.slow)]
+    ("width", "threads"), [(4, 1), (8, 2), pytest.param(64, 1, marks=pytest.mark.slow)]
 )
 def test_the_same_bits_for_any_block_width_and_threads(width, threads, tmp_path):
     code = _PRINT_BITS.format(folder=os.path.dirname(__file__), threads=threads)  # noqa: PTH120
@@ -241,6 +242,19 @@ def test_the_same_bits_for_any_block_width_and_threads(width, threads, tmp_path)
     assert json.loads(other.stdout.splitlines()[-1]) == [float(x).hex() for x in here]
 
 
+@pytest.mark.parametrize(
+    ("features", "lanes"), [("+avx512f,+avx2", 16), ("+avx2,+fma", 8), ("+sse4.2", 4)]
+)
+def test_rows_have_two_registers_of_the_machine(features, lanes):
+    code = "from drillctl.simulation.kernels.rows import PASS; print(PASS)"
+    environment = os.environ | {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": features}
+    told = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    if platform.machine() in ("x86_64", "AMD64"):
+        assert int(told.stdout) == lanes
+
+
 def test_a_run_that_nobody_can_mean_is_refused_with_the_count():
     with pytest.raises(drillctl.errors.InputError, match=r"1e\+11 steps of 1 ns .*at most 1e\+08"):
         measured(paper(600, 100, 140, **{"simulation.step": "1 ns"}))
@@ -250,27 +264,29 @@ def test_a_run_that_nobody_can_mean_is_refused_with_the_count():
 
 
 _LONG_RUN = """
+import time
 import drillctl
 design = drillctl.load("monteiro-trindade-140kn", **{"simulation.duration": "1 s"})
 drillctl.simulate(design, "batch")  # compiled
 print("ready", flush=True)
-drillctl.simulate(design, "batch", **{"simulation.duration": "100 s", "simulation.step": "2 us"})
+try:
+    long = design.replace({"simulation.duration": "100 s", "simulation.step": "2 us"})
+    drillctl.simulate(long, "batch")
+except KeyboardInterrupt:
+    print(time.time(), flush=True)
 """
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no signals to send")
 def test_a_long_run_is_interrupted_within_a_second():
-    run = subprocess.Popen(
-        [sys.executable, "-c", _LONG_RUN], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    run = subprocess.Popen([sys.executable, "-c", _LONG_RUN], stdout=subprocess.PIPE, text=True)
     assert run.stdout.readline().strip() == "ready"
     time.sleep(1.5)
     assert run.poll() is None
+    begin = time.time()
     run.send_signal(signal.SIGINT)
-    begin = time.monotonic()
-    _, told = run.communicate(timeout=20)
-    assert time.monotonic() - begin < 1.0 + 1.0  # and the interpreter's own end
-    assert "KeyboardInterrupt" in told
+    told, _ = run.communicate(timeout=20)
+    assert float(told) - begin < 1.0
 
 
 def test_a_lane_that_overflows_fails_alone():

@@ -12,10 +12,12 @@ from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import OPTIONS
 from drillctl.simulation.kernels.observer_step import NoObserver
 from drillctl.simulation.kernels.string_step import (
+    MOST_READ,
     BlockString,
     DenseString,
     UndampedString,
     complete_and_propagate,
+    load_string,
     look,
 )
 from drillctl.simulation.kernels.vectors import emitted, put
@@ -34,8 +36,9 @@ STEP = 0.02
 
 
 @emitted
-def _pass(string, drive, observer, state, work):
-    complete_and_propagate(string, drive, observer, state, work)
+def _pass(string, drive, observer, room, state, work):
+    load_string(string, room)
+    complete_and_propagate(string, drive, observer, room, state, work)
 
 
 @emitted
@@ -46,9 +49,9 @@ def _look(string, state, work):
 
 
 @numba.njit(**OPTIONS)
-def _steps(string, drive, observer, state, work, torques, seen):
+def _steps(string, drive, observer, room, state, work, torques, seen):
     for n in range(len(torques)):
-        _pass(string, drive, observer, state, work)
+        _pass(string, drive, observer, room, state, work)
         work[r.TOP_TORQUE] = torques[n, 0]
         work[r.BIT_TORQUE] = torques[n, 1]
         _look(string, state, work)
@@ -60,7 +63,8 @@ def run_steps(*arguments):
     """The steps of a string that nothing asks for its top speed."""
     nothing = np.zeros(1)
     string, *rest = arguments
-    _steps(string, PI(nothing, nothing), NoObserver(nothing), *rest)
+    room = np.zeros(MOST_READ * len(string.push))
+    _steps(string, PI(nothing, nothing), NoObserver(nothing), room, *rest)
 
 
 def by_kernel(string: Drillstring, angle, speed, torques, modes=999):

@@ -65,6 +65,10 @@ class NavarroLopezSuarez(NamedTuple):
         falling = (self.a2 - self.a1) * weight * exp(-self.beta * speed)
         return self.a1 * weight + falling, -self.beta * falling
 
+    def held(self, weight: Any) -> tuple[Any, Any, Any]:
+        """Torque at high speed, static torque (N m) and decay (s/rad) under `weight` (N)."""
+        return self.a1 * weight, self.a2 * weight, self.beta
+
 
 # Coefficients that follow the weight on bit.
 

@@ -27,7 +27,6 @@ from drillctl.simulation.kernels.arithmetic import (
     law_at,
     least,
     load_block,
-    most,
 )
 from drillctl.simulation.kernels.drive_step import (
     begin_drive,
@@ -39,17 +38,19 @@ from drillctl.simulation.kernels.drive_step import (
 )
 from drillctl.simulation.kernels.measure_step import (
     Before,
+    Window,
     begin_measures,
+    conclude,
     conclude_bands,
     conclude_load,
     measure,
     measure_load,
-    measure_pipe,
+    note,
 )
 from drillctl.simulation.kernels.program_step import advance_program, begin_program
 from drillctl.simulation.kernels.rock_step import hold_rock, meet_rock
-from drillctl.simulation.kernels.rows import WIDTH
-from drillctl.simulation.kernels.string_step import complete_and_propagate, look
+from drillctl.simulation.kernels.rows import CHUNK, PASS, WIDTH
+from drillctl.simulation.kernels.string_step import complete_and_propagate, load_string, look
 from drillctl.simulation.kernels.vectors import (
     Variable,
     at,
@@ -57,6 +58,7 @@ from drillctl.simulation.kernels.vectors import (
     loop,
     pick,
     put,
+    rows_of,
     when,
 )
 from drillctl.simulation.kernels.weight_step import (
@@ -74,7 +76,7 @@ TRACED = (
 )  # fmt: skip
 """Signals of a trace, in the order in which they leave the kernel."""
 
-LOOK = 64  # steps from one look at whether to stop, or lanes may be given up, to the next
+LOOK = 4  # chunks from one look at whether to stop, or lanes may be given up, to the next
 
 
 class Clock(NamedTuple):
@@ -90,11 +92,6 @@ class Clock(NamedTuple):
     remembered: int  # steps whose signals a weight law may ask for; 0 if none does
     estimated: int  # states of the observer; 0 without one
     give_up: float  # J1 (s) over which nothing more is asked of a lane; infinite for none
-
-
-def _share_after(begin: Any, step: Any, moment: Any) -> Any:
-    """Share of a step that lies after a moment."""
-    return least(most((begin + step - moment) / step, 0.0), 1.0)
 
 
 def _load(
@@ -114,7 +111,7 @@ def _load(
     put(work, r.PIPE_OFFSET, string.pipe_offset * set_speed)
 
 
-def _begin_rock(friction: Any, weight: Any, work: Any) -> None:
+def _begin_rock(friction: Any, weight: Any, program: Any, work: Any) -> None:
     """What bit and rock are to each other at time zero."""
     speed = at(work, r.BIT_SPEED)
     load = acting(weight, work)
@@ -126,8 +123,8 @@ def _begin_rock(friction: Any, weight: Any, work: Any) -> None:
     direction = pick(speed > 0.0, 1.0, pick(speed < 0.0, -1.0, 0.0))
     put(work, r.SLOPE, slope)
     put(work, r.DIRECTION, direction)
-    put(work, r.KINETIC, direction * torque)
-    put(work, r.HOLDING, -1.0)
+    put(work, r.KINETIC, pick(direction == 0.0, 0.0, torque))
+    hold_rock(friction, weight, program, work, begins=True)
 
 
 def _begin(
@@ -141,7 +138,7 @@ def _begin(
     begin_program(program, before, work, first)
     begin_drive(drive, string, work, 1.0 / clock.step)
     begin_weight(weight, observer, work, memory, first)
-    _begin_rock(friction, weight, work)
+    _begin_rock(friction, weight, program, work)
     begin_measures(work, top_torque_now(drive, work, at(work, r.TOP_SPEED)))
 
 
@@ -163,7 +160,8 @@ def _sample(
     put(signals[2], first, at(work, r.ANGLE))
     put(signals[3], first, at(work, r.SEEN_TWIST) - string.twist_offset * set_speed)
     put(signals[4], first, pipe + at(work, r.PIPE_OFFSET))
-    put(signals[5], first, pick(stuck, at(work, r.BIT_TORQUE), at(work, r.KINETIC)))
+    sliding = at(work, r.DIRECTION) * at(work, r.KINETIC)
+    put(signals[5], first, pick(stuck, at(work, r.BIT_TORQUE), sliding))
     put(signals[6], first, pick(stuck, 1.0, 0.0))
     put(signals[7], first, top_torque_now(drive, work, top_speed))
     put(signals[8], first, at(work, r.LOAD))
@@ -172,7 +170,7 @@ def _sample(
 def _conclude(string: Any, drive: Any, observer: Any, swing: Any, reduced: Any, outcome: Any,
               work: Any) -> None:  # fmt: skip
     """Top torque of the step, and the state at its end."""
-    net_torque = fma(reduced.share, outcome.torque, reduced.alone) - at(work, r.DRAG)
+    net_torque = fma(reduced.share, outcome.torque, reduced.alone)
     put(work, r.TOP_TORQUE, net_torque)
     put(work, r.BIT_TORQUE, outcome.torque)
     angle = fma(string.angle_by_top, net_torque, swing.top_angle)
@@ -182,7 +180,6 @@ def _conclude(string: Any, drive: Any, observer: Any, swing: Any, reduced: Any, 
     put(work, r.DIRECTION, outcome.direction)
     put(work, r.KINETIC, outcome.kinetic)
     put(work, r.SLOPE, outcome.slope)
-    put(work, r.HOLDING, outcome.holding)
 
 
 def _all_given_up(work: Any, level: Any) -> Any:
@@ -196,6 +193,44 @@ def _all_given_up(work: Any, level: Any) -> Any:
     return ~any_of(at(work, r.BOUND) == 0.0)
 
 
+class Now(NamedTuple):
+    """A step that is being taken."""
+
+    n: Any  # its number
+    slot: Any  # its place among those whose measures are added up together
+    traced: Any  # whether it begins with a sample of a trace
+    sample: Any  # number of that
+    sampled: Any  # whether a sampled controller works
+
+
+def _step(
+    string: Any, friction: Any, drive: Any, weight: Any, program: Any, observer: Any, clock: Any,
+    now: Now, room: Any, work: Any, state: Any, memory: Memory, traces: Any, first: Any,
+) -> None:  # fmt: skip
+    """One step of some lanes of a block; of the one after the last only what it begins with."""
+    n, step, rate = now.n, clock.step, 1.0 / clock.step
+    advance_program(program, friction, weight, work, first, n * step, step)
+    with when(now.traced):
+        _look_around(string, state, work)
+    swing = complete_and_propagate(string, drive, observer, room, state, work)
+    put(work, r.PIPE, swing.pipe)
+    with when(now.traced):
+        _sample(string, drive, work, swing.pipe, traces, now.sample, first)
+    with when(n < clock.steps):
+        sample_drive(drive, work, now.sampled)
+        raise_weight(weight, program, work, memory, n, step)
+        hold_rock(friction, weight, program, work)
+        was = Before(at(work, r.BIT_SPEED), at(work, r.TOP_SPEED), at(work, r.LOAD))
+        reduced = eliminate(drive, program, string, swing, work, rate)
+        outcome = meet_rock(friction, weight, program, reduced, work, now.slot)
+        _conclude(string, drive, observer, swing, reduced, outcome, work)
+        move_load(weight, program, work)
+        follow_drive(drive, work, was.top_speed, rate)
+        follow_weight(weight, observer, work, memory, was, n, step)
+        measure_load(weight, program, work, was, outcome, step)
+        note(work, now.slot, outcome, swing.pipe)
+
+
 @emitted
 def _advance_block(
     string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any, observer: Any,
@@ -207,56 +242,48 @@ def _advance_block(
     ring = r.ROWS * WIDTH + 2 * WIDTH * start.shape[0]
     estimate = ring + clock.remembered * WIDTH
     moved = estimate + clock.estimated * WIDTH
+    read = moved + clock.estimated * WIDTH
     work, state = kept[: r.ROWS * WIDTH], kept[r.ROWS * WIDTH : ring]
-    memory = Memory(kept[ring:estimate], kept[estimate:moved], kept[moved:])
+    memory = Memory(kept[ring:estimate], kept[estimate:moved], kept[moved:read])
+    room = kept[read:]
     with loop(kept.shape[0] // WIDTH) as rows:
         put(kept, rows.index * WIDTH, 0.0)
     _begin(
         string, friction, before, drive, weight, program, observer,
         speed, start, clock, state, work, memory, first,
     )  # fmt: skip
-    rate = 1.0 / clock.step
+    load_string(string, room)
+    of_j1, late = Window(clock.step, clock.j1_from), Window(clock.step, clock.window_from)
     # Steps at which the next sample is due: of a trace, of the controller.
     traced = Variable(pick(clock.every > 0, 0, clock.steps + 1))
-    samples = Variable(0 * clock.every)
     sampled = Variable(pick(clock.sampling > 0, 0, clock.steps + 1))
-    with loop(clock.steps + 1) as steps:
-        n = steps.index
-        begin = n * clock.step
-        advance_program(program, friction, weight, work, first, begin, clock.step)
-        is_traced = n == traced.get()
-        with when(is_traced):
-            _look_around(string, state, work)
-        swing = complete_and_propagate(string, drive, observer, state, work)
-        measure_pipe(work, swing.pipe)
-        with when(is_traced):
-            _sample(string, drive, work, swing.pipe, traces, samples.get(), first)
-            samples.set(samples.get() + 1)
-            traced.set(traced.get() + clock.every)
-        with when(n == clock.steps):
-            steps.leave()
-        is_sampled = n == sampled.get()
-        sample_drive(drive, work, is_sampled)
-        with when(is_sampled):
-            sampled.set(sampled.get() + clock.sampling)
-        raise_weight(weight, program, work, memory, n, clock.step)
-        hold_rock(friction, weight, work)
-        was = Before(at(work, r.BIT_SPEED), at(work, r.TOP_SPEED), at(work, r.LOAD))
-        reduced = eliminate(drive, program, string, swing, work, rate)
-        outcome = meet_rock(friction, weight, reduced, work)
-        _conclude(string, drive, observer, swing, reduced, outcome, work)
-        move_load(weight, program, work)
-        follow_drive(drive, work, was.top_speed, rate)
-        follow_weight(weight, observer, work, memory, was, n, clock.step)
-        in_j1 = _share_after(begin, clock.step, clock.j1_from)
-        in_window = _share_after(begin, clock.step, clock.window_from)
-        measure(work, was, outcome, begin, clock.step, in_j1, in_window)
-        measure_load(weight, program, work, was, outcome, clock.step)
+    samples = Variable(0 * clock.every)
+    with loop(clock.steps // CHUNK + 1) as chunks:
+        first_step = chunks.index * CHUNK
+        count = least(clock.steps - first_step, CHUNK)
+        with loop(least(count + 1, CHUNK)) as steps:
+            n = first_step + steps.index
+            now = Now(n, steps.index, n == traced.get(), samples.get(), n == sampled.get())
+            with rows_of(PASS), loop(WIDTH // PASS) as parts:
+                at_lane = parts.index * PASS
+                _step(
+                    string, friction, drive, weight, program, observer, clock, now, room,
+                    work[at_lane:], state[at_lane:], memory.part(at_lane), traces,
+                    first + at_lane,
+                )  # fmt: skip
+            with when(now.traced):
+                samples.set(samples.get() + 1)
+                traced.set(n + clock.every)
+            with when(now.sampled):
+                sampled.set(n + clock.sampling)
+        with when(count > 0):
+            measure(work, clock.step, of_j1, late, first_step, count)
         with (
-            when((n & (LOOK - 1)) == LOOK - 1),
+            when((chunks.index & (LOOK - 1)) == LOOK - 1),
             when((watch[0] != 0) | _all_given_up(work, clock.give_up)),
         ):
-            steps.leave()
+            chunks.leave()
+    conclude(work, clock.step)
     conclude_bands(work, clock.steps * clock.step)
     conclude_load(weight, program, work, clock.steps * clock.step)
     for measured in range(r.MEASURES):
@@ -342,8 +369,8 @@ drive, weight, program, observer, speed, start, clock, kept, measures, traces, w
 - `kept`, shape (rows x WIDTH,): memory of one block, `rows.py`; each thread brings its own.
 - `measures`, shape (MEASURES, lanes): written; the rows from `rows.FIRST_MEASURE` on.
 - `traces`, shape (samples, len(TRACED), lanes): written if `clock.every` > 0.
-- `watch`, shape (1,), whole numbers: looked at every `LOOK` steps; another thread makes it other
-  than zero to stop the run.
+- `watch`, shape (1,), whole numbers: looked at every `LOOK` chunks of steps; another thread makes
+  it other than zero to stop the run.
 
 `lanes` must be a multiple of `WIDTH`. Returns the fingerprint of the sources.
 """

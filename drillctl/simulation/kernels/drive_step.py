@@ -111,7 +111,8 @@ SLOWEST = 1e-9  # speed (rad/s) under which a limit of power no longer grows
 class Reduced(NamedTuple):
     """String and drive eliminated: what the torque on the bit decides in a step."""
 
-    # mean top torque of the step were the bit torque zero (N m), and what each of its N m adds
+    # mean top torque of the step were the bit torque zero (N m), net of the drag of all damping to
+    # ground at the set speed, and what each N m of the bit torque adds
     alone: Any
     share: Any
     # bit speed at its end were the bit torque zero (rad/s), its fall per bit torque (rad/s per N
@@ -165,7 +166,7 @@ def _begin_ideal(drive: Any, string: Any, work: Any, rate: Any) -> None:
     shrink = 1.0 / (1.0 + slope * string.angle_by_top)
     share = slope * string.angle_by_bit * shrink
     gain = string.speed_by_bit - string.speed_by_top * share
-    put(work, r.LINE_LEVEL, (level + slope * string.angle_by_top * drag) * shrink)
+    put(work, r.LINE_LEVEL, (level + slope * string.angle_by_top * drag) * shrink - drag)
     put(work, r.LINE_BACK, (level_of_one - level) * shrink)
     put(work, r.LINE_FORTH, -slope * shrink)
     put(work, r.SHARE, share)
@@ -206,16 +207,17 @@ def _by_ideal_drive(string: Any, swing: Any, work: Any, angle: Any, free_angle: 
     alone = fma(at(work, r.LINE_BACK), angle, at(work, r.LINE_LEVEL))
     alone = fma(at(work, r.LINE_FORTH), free_angle, alone)
     free = at(work, r.SET_SPEED) + swing.bit_speed
-    free = fma(string.speed_by_top, alone - at(work, r.DRAG), free)
+    free = fma(string.speed_by_top, alone, free)
     return Reduced(alone, at(work, r.SHARE), free, at(work, r.GAIN), at(work, r.PER_GAIN))
 
 
 def _by_number(string: Any, swing: Any, work: Any, torque: Any) -> Any:
     """A mean torque that is known beforehand."""
     free = at(work, r.SET_SPEED) + swing.bit_speed
-    free += string.speed_by_top * (torque - at(work, r.DRAG))
+    alone = torque - at(work, r.DRAG)
+    free += string.speed_by_top * alone
     gain = string.speed_by_bit
-    return Reduced(torque, each(0.0), free, each(gain), each(1.0 / gain))
+    return Reduced(alone, each(0.0), free, each(gain), each(1.0 / gain))
 
 
 def _by_real_drive(drive: Any, string: Any, swing: Any, work: Any, rate: Any) -> Any:
@@ -248,11 +250,11 @@ def _by_real_drive(drive: Any, string: Any, swing: Any, work: Any, rate: Any) ->
     number = pick(at_rate, motor + 0.5 * moved, given + law.mean * (motor - given))
     angle = swing.top_angle - string.angle_by_top * drag
     top_speed = swing.top_speed - string.top_speed_by_top * drag
-    alone = (offset - slope * angle + speed_slope * top_speed) * at(work, r.SHRINK)
+    alone = (offset - slope * angle + speed_slope * top_speed) * at(work, r.SHRINK) - drag
     limits = _by_number(string, swing, work, number)
-    free = at(work, r.SET_SPEED) + swing.bit_speed + string.speed_by_top * (alone - drag)
+    free = at(work, r.SET_SPEED) + swing.bit_speed + string.speed_by_top * alone
     return Reduced(
-        pick(limited, number, alone),
+        pick(limited, limits.alone, alone),
         pick(limited, 0.0, at(work, r.SHARE)),
         pick(limited, limits.free, free),
         pick(limited, limits.gain, at(work, r.GAIN)),

@@ -102,7 +102,7 @@ def _turn(program: Any, friction: Any, weight: Any, work: Any, first: Any, now: 
     load = acting(weight, work)
     torque, slope = contact(law_at(friction, work, r.FRICTION), load, speed, exp)
     turning = direction != 0.0
-    put(work, r.KINETIC, pick(turning, direction * torque, at(work, r.KINETIC)))
+    put(work, r.KINETIC, pick(turning, torque, at(work, r.KINETIC)))
     put(work, r.SLOPE, pick(turning, slope, at(work, r.SLOPE)))
     put(work, r.LOAD, load.weight(speed))
     put(work, r.REST_END, load.weight(speed * 0.0))

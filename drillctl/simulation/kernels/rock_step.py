@@ -23,14 +23,24 @@ are the torques and the decay that follow from it: they are looked up once a ste
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
-from drillctl.rig.bit_rock import OverWeight, contact
+from drillctl.rig.bit_rock import NavarroLopezSuarez, OverWeight, contact
 from drillctl.rig.bit_rock.law import Exp
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import any_of, everywhere, exp, law_at, least, most
+from drillctl.simulation.kernels.arithmetic import (
+    any_of,
+    everywhere,
+    exp,
+    law_at,
+    least,
+    most,
+    signed,
+)
+from drillctl.simulation.kernels.rows import CHUNK, WIDTH
 from drillctl.simulation.kernels.vectors import Variable, at, each, loop, pick, put, when
-from drillctl.simulation.kernels.weight_step import acting, has_memory
+from drillctl.simulation.kernels.weight_step import acting, has_memory, stays
 
 NEWTON_STEP = 1e-3
 """A lane has converged when Newton moves it less than this (rad/s, relative over 1 rad/s). What
@@ -46,66 +56,72 @@ class Outcome(NamedTuple):
 
     speed: Any  # bit speed at its end (rad/s)
     direction: Any  # +1 or -1 turning, 0 stuck
-    # friction torque at that speed, signed (N m), and the law's slope there (N m s/rad)
+    # friction torque at that speed against it (N m), and the law's slope there (N m s/rad)
     kinetic: Any
     slope: Any
     torque: Any  # mean torque on the bit over the step (N m)
-    holding: Any  # mean torque that held a bit which was stuck throughout (N m); -1 of any other
     stuck: Any  # share of the step spent stuck
 
 
-def stick_or_slip(friction: Any, weight: Any, reduced: Any, work: Any) -> Any:
-    """The `Outcome` of a step under a set-valued law."""
-    law, load, at_rest = rock(friction, weight, work), acting(weight, work), at(work, r.REST_LOAD)
+def stick_or_slip(law: Any, load: Any, reduced: Any, work: Any, slot: Any) -> Outcome:
+    """The `Outcome` of a step under a set-valued law.
+
+    A mask that lives on beyond a branch has no register of its own; hence the infinite torques,
+    by which one comparison tells who sticks.
+    """
+    at_rest = at(work, r.REST_LOAD)
     static, kinetic = law.static_torque(at_rest), law.kinetic_torque_at_rest(at_rest)
     free, half = reduced.free, 0.5 * reduced.gain
-    direction, before = at(work, r.DIRECTION), at(work, r.KINETIC)
-    was_stuck = direction == 0.0
-    own = direction * (free - half * before) > half * kinetic
+    direction, last = at(work, r.DIRECTION), abs(at(work, r.BIT_SPEED))
+    before, start = half * at(work, r.KINETIC), half * kinetic
+    ahead = direction * free - before
+    own = ahead > start
     # A stuck bit, and one that is turned round, starts from the torque at rest.
-    sign = pick(own, direction, pick(free > 0.0, 1.0, -1.0))
-    previous = pick(own, sign * before, kinetic)
-    right = sign * free - half * previous
+    before = pick(own, before, start)
+    push = Variable(pick(own, ahead, abs(free) - start))
+    turns = pick(own, direction, free)
     holding = abs(free) * reduced.per_gain
-    loose = was_stuck & (holding > static)
-    released, push = Variable(each(0.0)), Variable(right)
+    holds = pick(own, math.inf, holding)
+    released = Variable(each(0.0))
+    loose = pick(direction == 0.0, holding, 0.0) > static
     with when(any_of(loose)):
-        share, early = time_release(static, kinetic, holding, reduced.gain, at(work, r.HOLDING))
-        released.set(share)
-        push.set(pick(loose, right + early, right))
+        # Known if a whole step at rest lies behind.
+        known = at(work, r.STUCK + ((slot - 1) & (CHUNK - 1)) * WIDTH) == 1.0
+        rest = abs(at(work, r.BIT_TORQUE))
+        share, early = time_release(static, kinetic, holding, reduced.gain, rest)
+        released.set(pick(loose, pick(known, share, 0.0), 0.0))
+        push.set(push.get() + pick(loose, pick(known, early, 0.0), 0.0))
     right = push.get()
-    # The law as a straight line from its last torque and slope: Newton's first guess, off
-    # by its curvature over one step. A bit set in motion has no last slope.
-    fall = pick(own, -half * at(work, r.SLOPE), 0.0)
-    last = abs(at(work, r.BIT_SPEED))
-    flat = right - half * previous
-    guess = most(flat + fall * (flat + fall * (flat - last) - last), 0.0)
-    u, slope = solve_inclusion(law, load, half, right, guess, at(work, r.SLOPE))
 
-    sticks = (holding <= static) & ~own
-    speed = pick(sticks, 0.0, sign * u)
-    # The slip torque at the new speed follows from the equation that u solves.
-    slip = 2.0 * (right - u) * reduced.per_gain
+    # The law as a straight line from its last torque and slope: Newton's first guess, off by its
+    # curvature over one step. A bit set in motion has no last slope.
+    fall = pick(own, -half * at(work, r.SLOPE), 0.0)
+    flat = right - before
+    guess = most(flat + fall * (flat + fall * (flat - last) - last), 0.0)
+    u, slope = solve_inclusion(law, load, half, right, guess)
+
+    sticks = holds <= static
     # A bit that breaks loose keeps the share that `time_release` found.
-    stuck = Variable(pick(loose, released.get(), pick(sticks, 1.0, 0.0)))
-    stops = sticks & ~was_stuck
+    stuck = Variable(pick(sticks, 1.0, released.get()))
+    stops = pick(direction == 0.0, math.inf, holds) <= static
     with when(any_of(stops)):
-        past_zero = direction * (free - half * before) - half * kinetic
         # The bit is followed in a straight line from its speed before through zero.
+        past_zero = ahead - start
         stuck.set(pick(stops, past_zero / (past_zero - last), stuck.get()))
         put(work, r.STICKS, at(work, r.STICKS) + stops)
+    speed = pick(sticks, 0.0, signed(u, turns))
     return Outcome(
         speed,
-        pick(sticks, 0.0, sign),
-        pick(sticks, 0.0, sign * slip),
+        pick(sticks, 0.0, signed(each(1.0), turns)),
+        # The slip torque at the new speed follows from the equation that u solves.
+        pick(sticks, 0.0, 2.0 * (right - u) * reduced.per_gain),
         slope,
         (free - speed) * reduced.per_gain,
-        pick(was_stuck & sticks, holding, -1.0),
         stuck.get(),
     )
 
 
-def time_release(static: Any, kinetic: Any, holding: Any, gain: Any, last: Any) -> Any:
+def time_release(static: Any, kinetic: Any, holding: Any, gain: Any, last: Any) -> tuple[Any, Any]:
     """Date the moment a stuck bit breaks loose, and give it no friction torque before it.
 
     The torque that would hold it rises along the line through the holding torques of this step
@@ -116,27 +132,35 @@ def time_release(static: Any, kinetic: Any, holding: Any, gain: Any, last: Any) 
     """
     rise = holding - last
     held = 0.5 + (static - holding) / rise
-    early = gain * (0.5 * rise * held * held - held * (static - kinetic))
-    # Without a step wholly at rest behind it, nothing is known of the rise.
-    known = last >= 0.0
-    return pick(known, held, 0.0), pick(known, early, 0.0)
+    return held, gain * (0.5 * rise * held * held - held * (static - kinetic))
 
 
-def solve_inclusion(
-    law: Any, load: Any, half: Any, right: Any, guess: Any, slope_before: Any
-) -> Any:
-    """Newton's method on u + half T(u) = right, u >= 0; the root and the slope there."""
-    root, slope, is_open = Variable(guess), Variable(slope_before), Variable(everywhere())
-    with loop(NEWTON_LIMIT) as iterations:
-        u = root.get()
+def solve_inclusion(law: Any, load: Any, half: Any, right: Any, guess: Any) -> tuple[Any, Any]:
+    """Newton's method on u + half T(u) = right, u >= 0; the root and the slope there.
+
+    The first step is the last one but for bits that have just begun to turn, or long steps.
+    """
+
+    def improved(u: Any) -> tuple[Any, Any]:
         torque, falls = contact(law, load, u, exp)
-        new = most(u + (right - u - half * torque) * one_over_one_plus(half * falls), 0.0)
-        far = abs(new - u) > NEWTON_STEP * (1.0 + u)
-        root.set(pick(is_open.get(), new, u))
-        slope.set(pick(is_open.get(), falls, slope.get()))
-        is_open.set(is_open.get() & far)
-        with when(~any_of(is_open.get())):
-            iterations.leave()
+        left = right - u - half * torque
+        return most(u + left * one_over_one_plus(half * falls), 0.0), falls
+
+    def is_far(new: Any, u: Any) -> Any:
+        return abs(new - u) > NEWTON_STEP * (1.0 + u)
+
+    new, falls = improved(guess)
+    root, slope = Variable(new), Variable(falls)
+    with when(any_of(is_far(new, guess))):
+        is_open = Variable(is_far(new, guess))
+        with loop(NEWTON_LIMIT) as iterations:
+            u = root.get()
+            new, falls = improved(u)
+            root.set(pick(is_open.get(), new, u))
+            slope.set(pick(is_open.get(), falls, slope.get()))
+            is_open.set(is_open.get() & is_far(new, u))
+            with when(~any_of(is_open.get())):
+                iterations.leave()
     return root.get(), slope.get()
 
 
@@ -152,37 +176,33 @@ def one_over_one_plus(d: Any) -> Any:
     return product + product * (square * square)
 
 
-def meet_rock(friction: Any, weight: Any, reduced: Any, work: Any) -> Any:
+def meet_rock(
+    friction: Any, weight: Any, program: Any, reduced: Any, work: Any, slot: Any
+) -> Outcome:
     """The `Outcome` of a step from what string and drive leave free."""
-    if friction.set_valued:
-        return stick_or_slip(friction, weight, reduced, work)
-    return _creep(friction, weight, reduced, work)
+    law, load = rock(friction, weight, program, work), acting(weight, work)
+    if law.set_valued:
+        return stick_or_slip(law, load, reduced, work, slot)
+    return _creep(law, load, reduced, work)
 
 
-def _creep(friction: Any, weight: Any, reduced: Any, work: Any) -> Any:
+def _creep(law: Any, load: Any, reduced: Any, work: Any) -> Outcome:
     """The step of a smooth law: w + theta gain T(w) = free - (1 - theta) gain T(before).
 
     The mean torque is the trapezoid's, theta = 1/2, while the bit's own time constant under the
     rock is longer than half a step. A law that is steep at rest makes it shorter; theta then
     grows to 1 - 1/z, z = gain x slope, so that a creeping bit relaxes and does not ring.
     """
-    law, load = rock(friction, weight, work), acting(weight, work)
     free, gain = reduced.free, reduced.gain
     steep = gain * at(work, r.SLOPE)
     theta = pick(steep > 2.0, 1.0 - 1.0 / steep, 0.5)
-    right = free - (1.0 - theta) * gain * at(work, r.KINETIC)
+    before = at(work, r.DIRECTION) * at(work, r.KINETIC)
+    right = free - (1.0 - theta) * gain * before
     sign = pick(right >= 0.0, 1.0, -1.0)
     u = _safeguarded_newton(law, load, theta * gain, sign * right, sign * at(work, r.BIT_SPEED))
     torque, slope = contact(law, load, u, exp)
-    return Outcome(
-        sign * u,
-        sign,
-        sign * torque,
-        slope,
-        (free - sign * u) * reduced.per_gain,
-        each(-1.0),
-        each(0.0),
-    )
+    mean = (free - sign * u) * reduced.per_gain
+    return Outcome(sign * u, sign, torque, slope, mean, each(0.0))
 
 
 def _safeguarded_newton(law: Any, load: Any, share: Any, right: Any, last: Any) -> Any:
@@ -210,13 +230,13 @@ def _safeguarded_newton(law: Any, load: Any, share: Any, right: Any, last: Any) 
 
 
 class HeldRock(NamedTuple):
-    """`OverWeight` at the weights of one step."""
+    """A law that decays exponentially with speed, at the weights of one step."""
 
     rest: Any  # static torque under the mean weight of the step (N m)
     # torque at high speed, and what the static torque is above it, at the end of the step (N m)
     level: Any
     spread: Any
-    decay: Any  # decay with speed (s/rad)
+    grows: Any  # minus the decay with speed (s/rad)
 
     @property
     def set_valued(self) -> bool:
@@ -233,38 +253,30 @@ class HeldRock(NamedTuple):
 
     def torque_and_slope(self, weight: Any, speed: Any, exp: Exp) -> tuple[Any, Any]:
         """Torque (N m) and slope (N m s/rad) at `speed` >= 0 (rad/s)."""
-        falling = self.spread * exp(-self.decay * speed)
-        return self.level + falling, -self.decay * falling
+        falling = self.spread * exp(self.grows * speed)
+        return self.level + falling, self.grows * falling
 
 
-def _is_held(friction: Any, weight: Any) -> bool:
-    return isinstance(friction, OverWeight) and has_memory(weight)
+def _is_held(friction: Any, weight: Any, program: Any) -> bool:
+    """Whether a law is looked up before each step, or once if its weight stays."""
+    known = has_memory(weight) or stays(weight, program)
+    return known and isinstance(friction, (NavarroLopezSuarez, OverWeight))
 
 
-def rock(friction: Any, weight: Any, work: Any) -> Any:
+def rock(friction: Any, weight: Any, program: Any, work: Any) -> Any:
     """The bit-rock law that the lanes meet in this step."""
-    if _is_held(friction, weight):
-        return HeldRock(
-            at(work, r.HELD_REST),
-            at(work, r.HELD_LEVEL),
-            at(work, r.HELD_SPREAD),
-            at(work, r.HELD_DECAY),
-        )
+    if _is_held(friction, weight, program):
+        return law_at(HeldRock(*HeldRock._fields), work, r.HELD)
     return law_at(friction, work, r.FRICTION)
 
 
-def hold_rock(friction: Any, weight: Any, work: Any) -> None:
-    """Look the table up at the weights of this step, where they are numbers."""
-    if _is_held(friction, weight):
-        return _look_up(friction, work)
-    return None
-
-
-def _look_up(friction: Any, work: Any) -> None:
-    law = law_at(friction, work, r.FRICTION)
-    _, rest, _ = law.held(at(work, r.REST_LOAD))
-    level, static, decay = law.held(at(work, r.HOISTED))
-    put(work, r.HELD_REST, rest)
-    put(work, r.HELD_LEVEL, level)
-    put(work, r.HELD_SPREAD, static - level)
-    put(work, r.HELD_DECAY, decay)
+def hold_rock(friction: Any, weight: Any, program: Any, work: Any, begins: bool = False) -> None:
+    """Look the law up at the weights of this step, where they are numbers."""
+    if _is_held(friction, weight, program) and (begins or not stays(weight, program)):
+        law = law_at(friction, work, r.FRICTION)
+        end = acting(weight, work).weight(0.0)
+        _, rest, _ = law.held(at(work, r.REST_LOAD))
+        level, static, decay = law.held(end)
+        held = HeldRock(rest, level, static - level, -decay)
+        for k, number in enumerate(held):
+            put(work, r.HELD + k * WIDTH, number)

@@ -7,11 +7,31 @@ of the compiled code (see `vectors.py`).
 """
 
 import os
+import platform
 
+from llvmlite.binding import get_host_cpu_features
+from numba.core import config
+
+
+def _machine() -> tuple[int, int, bool]:
+    """Of the machine that is compiled for: doubles in a register, lanes in a pass, fused sums."""
+    given = config.CPU_FEATURES
+    features = get_host_cpu_features().flatten() if given is None else given
+    if platform.machine() in ("arm64", "aarch64"):
+        return 2, 8, True
+    if "+avx512f" in features:
+        return 8, 16, True
+    return (4, 8, "+fma" in features) if "+avx" in features else (2, 4, False)
+
+
+REGISTER, PASS, FUSES = _machine()
 WIDTH = int(os.environ.get("DRILLCTL_BLOCK_WIDTH", "16"))
-"""Lanes in a block: two of the widest vector registers, so that one waits while the other works,
-and the state of thirty modes stays in the first cache. A matter of speed alone: no result depends
-on it, to the last bit."""
+"""Lanes in a block: with AVX2 two passes, so that the processor begins one while the inclusion of
+the other still takes its time."""
+PASS = min(PASS, WIDTH)
+"""Lanes that take a step together: two registers a row, so that one waits while the other works,
+and the sums over the modes find registers; four of the thirty-two small ones of ARM. Like `WIDTH` a
+matter of speed alone: no result depends on them, to the last bit."""
 
 _taken = 0
 
@@ -40,7 +60,7 @@ TABLE_LOW = _next()  # range of the friction table, N
 TABLE_HIGH = _next()
 
 # A drive with its string. Ideal: torque of a step = LEVEL + BACK angle + FORTH free angle.
-LINE_LEVEL = _next()  # N m
+LINE_LEVEL = _next()  # net of DRAG, N m
 LINE_BACK = _next()  # N m/rad
 LINE_FORTH = _next()  # N m/rad
 SHRINK = _next()  # of a real drive that nothing limits: what its own slopes leave of its torque
@@ -51,17 +71,13 @@ PER_GAIN = _next()  # 1 / GAIN
 # State between steps.
 ANGLE = _next()  # top-drive angle in the frame, rad
 BIT_SPEED = _next()  # rad/s, absolute
-KINETIC = _next()  # friction torque at that speed, signed, N m
+KINETIC = _next()  # friction torque at that speed against it, N m
 SLOPE = _next()  # slope of the friction there, N m s/rad
 DIRECTION = _next()  # +1, -1 turning; 0 stuck
-HOLDING = _next()  # mean torque that held the bit in the last step, N m; -1 if none
 LOAD = _next()  # weight on the bit, N
 REST_LOAD = _next()  # weight on it were it at rest, on the mean over the step, N
 REST_END = _next()  # the same at its end
-HELD_REST = _next()  # friction over a table at the weights of this step, `held_rock.HeldRock`
-HELD_LEVEL = _next()
-HELD_SPREAD = _next()
-HELD_DECAY = _next()
+HELD = _next(4)  # `rock_step.HeldRock` at the weights of this step, or of all
 
 # Torques of the step just taken, applied to the string by the next pass.
 TOP_TORQUE = _next()  # net of DRAG, N m
@@ -106,9 +122,30 @@ WINDOW_COUNT = _next()
 SEEN_TOP = _next()  # top speed in the frame, rad/s
 SEEN_TWIST = _next()  # bit angle in the frame, rad
 
+# What is measured of the last steps, signal after signal, step after step.
+CHUNK = 16
+"""Steps from one look at measures to the next: a power of two that fits the first cache."""
+SPEED_LAST = _next()  # bit speed as they began, rad/s
+SPEEDS = _next(CHUNK)  # at their ends, rad/s
+BIT_TORQUES = _next(CHUNK)  # mean, N m
+TOP_TORQUES = _next(CHUNK)  # mean, net of DRAG, N m
+PIPE_TORQUES = _next(CHUNK)  # as they began, without PIPE_OFFSET, N m
+STUCK = _next(CHUNK)  # share of the step that the bit was stuck
+WEIGHTS = _next(
+    -(-CHUNK // WIDTH)
+)  # half the seconds of each step that count for J1, a number each
+# Extremes, net of DRAG and without PIPE_OFFSET, N m
+TOP_LOW = _next()
+TOP_HIGH = _next()
+PIPE_LOW = _next()
+PIPE_HIGH = _next()
+BACKWARDS = _next()  # what a bit that turns backwards drills beyond what it turns, rad
+
+PIPE = _next()  # pipe torque as the step began, without PIPE_OFFSET, N m
+
 # Measures, in the order in which they leave the kernel.
 J1 = _next()
-STUCK_TIME = _next()
+STUCK_TIME = _next()  # in steps until the end
 STICKS = _next()
 LATE_LOW = _next()
 LATE_HIGH = _next()

@@ -116,45 +116,72 @@ class Swing(NamedTuple):
     pipe: Any  # pipe torque at its beginning (N m)
 
 
-def _by_modes(string: Any, state: Any, work: Any, tracks_top: bool) -> Swing:
+_READ = {
+    UndampedString: {
+        "kappa": 1, "ratio": 1, "push": 2, "pipe": 1, "bit_speed": 2, "top_speed": 2,
+    },
+    BlockString: {"free": 4, "push": 4, "pipe": 2, "top_speed": 2},
+}  # fmt: skip
+"""What a pass reads of each mode or block, in this order, and how many numbers that is."""
+MOST_READ = 12  # numbers of a mode or a block, at most
+
+
+def load_string(string: Any, room: Any) -> None:
+    """Put what a pass reads into a flat array, side by side: one address leads to all of it."""
+    if isinstance(string, DenseString):
+        return
+    with loop(string.push.shape[0]) as parts:
+        i, place = parts.index, parts.index * MOST_READ
+        for name, count in _READ[type(string)].items():
+            numbers = getattr(string, name)
+            for k in range(count):
+                room[place] = numbers[i] if count == 1 else numbers[i, k]
+                place = place + 1
+
+
+def _by_modes(string: Any, room: Any, state: Any, work: Any, tracks_top: bool) -> Swing:
     top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
-    top_angle, bit_speed, top_speed = (Variable(each(0.0)) for _ in range(3))
+    # Two sums of the bit speed: neither waits for the other.
+    top_angle, bit_speed, bit_speed_too, top_speed = (Variable(each(0.0)) for _ in range(4))
     pipe = Variable(fma(string.pipe_by_top, top, string.pipe_by_bit * bit))
     with loop(string.kappa.shape[0]) as modes:
-        mode = modes.index
-        at_x = 2 * mode * WIDTH
+        read = room[modes.index * MOST_READ :]
+        kappa, ratio, push_x, push_y, pipe_x, bit_x, bit_y, top_x, top_y = (
+            read[k] for k in range(9)
+        )
+        at_x = 2 * modes.index * WIDTH
         at_y = at_x + WIDTH
-        force = top - string.ratio[mode] * bit
-        x = fma(string.push[mode, 0], force, at(state, at_x))
-        y = fma(string.push[mode, 1], force, at(state, at_y))
-        pipe.set(fma(string.pipe[mode], x, pipe.get()))
-        y = y - string.kappa[mode] * x
+        force = top - ratio * bit
+        x = fma(push_x, force, at(state, at_x))
+        y = fma(push_y, force, at(state, at_y))
+        pipe.set(fma(pipe_x, x, pipe.get()))
+        y = y - kappa * x
         x = x + y
         put(state, at_x, x)
         put(state, at_y, y)
         top_angle.set(top_angle.get() + x)
-        partly = fma(string.bit_speed[mode, 0], x, bit_speed.get())
-        bit_speed.set(fma(string.bit_speed[mode, 1], y, partly))
+        bit_speed.set(fma(bit_x, x, bit_speed.get()))
+        bit_speed_too.set(fma(bit_y, y, bit_speed_too.get()))
         if tracks_top:
-            partly = fma(string.top_speed[mode, 0], x, top_speed.get())
-            top_speed.set(fma(string.top_speed[mode, 1], y, partly))
-    return Swing(top_angle.get(), bit_speed.get(), top_speed.get(), pipe.get())
+            top_speed.set(fma(top_y, y, fma(top_x, x, top_speed.get())))
+    speed = bit_speed.get() + bit_speed_too.get()
+    return Swing(top_angle.get(), speed, top_speed.get(), pipe.get())
 
 
-def _by_blocks(string: Any, state: Any, work: Any, tracks_top: bool) -> Swing:
+def _by_blocks(string: Any, room: Any, state: Any, work: Any, tracks_top: bool) -> Swing:
     top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
     top_angle, bit_speed, top_speed = (Variable(each(0.0)) for _ in range(3))
     pipe = Variable(fma(string.pipe_by_top, top, string.pipe_by_bit * bit))
     with loop(string.free.shape[0]) as blocks:
-        block = blocks.index
-        a11, a12, a21, a22 = (string.free[block, k] for k in range(4))
-        b11, b12, b21, b22 = (string.push[block, k] for k in range(4))
-        at_x = 2 * block * WIDTH
+        read = room[blocks.index * MOST_READ :]
+        a11, a12, a21, a22, b11, b12, b21, b22, pipe_x, pipe_y, top_x, top_y = (
+            read[k] for k in range(12)
+        )
+        at_x = 2 * blocks.index * WIDTH
         at_y = at_x + WIDTH
         x = fma(b12, bit, fma(b11, top, at(state, at_x)))
         y = fma(b22, bit, fma(b21, top, at(state, at_y)))
-        partly = fma(string.pipe[block, 0], x, pipe.get())
-        pipe.set(fma(string.pipe[block, 1], y, partly))
+        pipe.set(fma(pipe_y, y, fma(pipe_x, x, pipe.get())))
         x_free = fma(a12, y, a11 * x)
         y_free = fma(a22, y, a21 * x)
         put(state, at_x, x_free)
@@ -162,12 +189,11 @@ def _by_blocks(string: Any, state: Any, work: Any, tracks_top: bool) -> Swing:
         top_angle.set(top_angle.get() + x_free)
         bit_speed.set(bit_speed.get() + y_free)
         if tracks_top:
-            partly = fma(string.top_speed[block, 0], x_free, top_speed.get())
-            top_speed.set(fma(string.top_speed[block, 1], y_free, partly))
+            top_speed.set(fma(top_y, y_free, fma(top_x, x_free, top_speed.get())))
     return Swing(top_angle.get(), bit_speed.get(), top_speed.get(), pipe.get())
 
 
-def _by_matrix(string: Any, state: Any, work: Any) -> Swing:
+def _by_matrix(string: Any, room: Any, state: Any, work: Any, tracks_top: bool) -> Swing:
     states = string.free.shape[0]
     complete = states * WIDTH
     top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
@@ -192,16 +218,20 @@ def _by_matrix(string: Any, state: Any, work: Any) -> Swing:
     return Swing(top_angle.get(), bit_speed.get(), top_speed.get(), pipe.get())
 
 
-def complete_and_propagate(string: Any, drive: Any, observer: Any, state: Any, work: Any) -> Any:
+def complete_and_propagate(
+    string: Any, drive: Any, observer: Any, room: Any, state: Any, work: Any
+) -> Swing:
     """Add the held torques to `state`, read the pipe torque, propagate freely; a `Swing`.
 
     `state` comes as the free part of z and leaves as the free part of the next z: flat, state
-    after state, `WIDTH` lanes each; its second half is scratch of the dense form.
+    after state, `WIDTH` lanes each; its second half is scratch of the dense form. `room`: what
+    `load_string` has left.
     """
-    if isinstance(string, DenseString):
-        return _by_matrix(string, state, work)
-    step = _by_modes if isinstance(string, UndampedString) else _by_blocks
-    return step(string, state, work, asks_for_top(drive, observer))
+    step = _PASSES[type(string)]
+    return step(string, room, state, work, asks_for_top(drive, observer))
+
+
+_PASSES = {UndampedString: _by_modes, BlockString: _by_blocks, DenseString: _by_matrix}
 
 
 def look(string: Any, state: Any, work: Any) -> tuple[Any, Any]:

@@ -9,7 +9,7 @@ They are ordinary Python, called once for each combination of laws with values t
 numbers to come: every operation on them emits its instruction. Numba takes what was emitted as one
 of its own functions (`emitted`), optimises it and keeps it on disk. Which law is at work is thus an
 ordinary question of Python, and compiling costs what LLVM takes for it: a compiler that has to find
-out the types of a thousand calls took five times as long.
+out the types of a thousand calls took eight times as long.
 
 What a lane does must not depend on its company. There is no branch on the value of a row: a
 comparison gives a `Mask`, and `pick` takes from two rows by it. Python's numbers mix with rows;
@@ -28,15 +28,9 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.rows import FUSES, WIDTH
 
 DOUBLE, INTEGER, TRUTH = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
-ROW, MASK, WHOLE = (ir.VectorType(kind, WIDTH) for kind in (DOUBLE, TRUTH, INTEGER))
-
-FUSED = ("contract",)
-"""A product and a sum become one operation, rounded once. All lanes share it: unlike in a loop
-that a compiler splits into vectors and a remainder, no lane is fused otherwise than its neighbour.
-No other liberty is taken: sums keep their order, and tests for NaN stay."""
 
 DOUBLE_BYTES = 8
 
@@ -46,11 +40,32 @@ class _Here:
 
     context: Any = None
     builder: Any = None
+    lanes = WIDTH
 
 
 def builder() -> Any:
     """LLVM's builder at the place that is being emitted."""
     return _Here.builder
+
+
+def lanes() -> int:
+    """Lanes of a row at the place that is being emitted."""
+    return _Here.lanes
+
+
+@contextmanager
+def rows_of(count: int) -> Iterator[None]:
+    """Let rows have fewer lanes: what keeps many of them finds a register for each."""
+    was, _Here.lanes = _Here.lanes, count
+    try:
+        yield
+    finally:
+        _Here.lanes = was
+
+
+def vector(kind: Any = DOUBLE) -> Any:
+    """LLVM's type of a row of numbers, or of something else."""
+    return ir.VectorType(kind, _Here.lanes)
 
 
 def emitted(function: Callable[..., None]) -> Any:
@@ -150,16 +165,30 @@ class Value:
 
 
 class Row(Value):
-    """A double a lane."""
+    """A double a lane.
+
+    A product knows its factors, and a sum with it is emitted as one operation, rounded once. Left
+    to LLVM, what is fused would depend on which branches it keeps, and that on the block width. No
+    other liberty is taken: sums keep their order, and tests for NaN stay.
+    """
+
+    def __init__(
+        self, value: Any, factors: tuple[Row, Row] | None = None, uniform: bool = False
+    ) -> None:
+        super().__init__(value)
+        self.factors, self.uniform = factors, uniform
 
     def __neg__(self) -> Row:
-        return Row(builder().fneg(self.ir))
+        negative = Row(builder().fneg(self.ir))
+        if self.factors is not None:
+            negative.factors = (-self.factors[0], self.factors[1])
+        return negative
 
     def __abs__(self) -> Row:
         """The sign bit cleared."""
-        without = ir.Constant(WHOLE, [2**63 - 1] * WIDTH)
-        bits = builder().bitcast(self.ir, WHOLE)
-        return Row(builder().bitcast(builder().and_(bits, without), ROW))
+        without = splat(ir.Constant(INTEGER, 2**63 - 1))
+        bits = builder().bitcast(self.ir, without.type)
+        return Row(builder().bitcast(builder().and_(bits, without), self.ir.type))
 
 
 class Truths(Value):
@@ -200,18 +229,21 @@ class Integer(Value):
         return Integer(builder().sdiv(self.ir, as_integer(other).ir))
 
 
-def splat(value: Any, vector: Any = ROW) -> Any:
+def splat(value: Any) -> Any:
     """The same value in every lane."""
+    kind = vector(value.type)
     if isinstance(value, ir.Constant):
-        return ir.Constant(vector, [value.constant] * WIDTH)
-    nothing = ir.Constant(vector, ir.Undefined)
-    first = builder().insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
-    places = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+        return ir.Constant(kind, [value.constant] * lanes())
+    nothing, whole = ir.Constant(kind, ir.Undefined), ir.IntType(32)
+    first = builder().insert_element(nothing, value, ir.Constant(whole, 0))
+    places = ir.Constant(vector(whole), [0] * lanes())
     return builder().shuffle_vector(first, nothing, places)
 
 
 def as_integer(value: Any) -> Integer:
-    """A whole number of Python's, or one that is known later."""
+    """A whole number of Python's, or one that is known later; what is left of a double."""
+    if isinstance(value, Number):
+        return Integer(builder().fptosi(value.ir, INTEGER))
     return value if isinstance(value, Integer) else Integer(ir.Constant(INTEGER, int(value)))
 
 
@@ -230,7 +262,7 @@ def each(value: Any) -> Row:
         return value
     if isinstance(value, Mask):
         return Row(builder().select(value.ir, splat(as_number(1).ir), splat(as_number(0).ir)))
-    return Row(splat(as_number(value).ir))
+    return Row(splat(as_number(value).ir), uniform=True)
 
 
 def _alike(x: Any, y: Any) -> tuple[Any, Any]:
@@ -249,8 +281,27 @@ def _arithmetic(name: str, x: Any, y: Any) -> Any:
             x, y = as_number(x), as_number(y)
         else:
             return Integer(getattr(builder(), name)(x.ir, y.ir))
-    flags = FUSED if isinstance(x, Row) else ()
-    return type(x)(getattr(builder(), "f" + name)(x.ir, y.ir, flags=flags))
+    if isinstance(x, Row) and name in ("add", "sub"):
+        if y.factors is not None:
+            a, b = y.factors if name == "add" else (-y.factors[0], y.factors[1])
+            return multiplied(a, b, x)
+        if x.factors is not None:
+            return multiplied(*x.factors, y if name == "add" else -y)
+    result = type(x)(getattr(builder(), "f" + name)(x.ir, y.ir))
+    if isinstance(x, Row) and name == "mul":
+        # The sign is that of the first: free in a row, not in one number for all lanes.
+        result.factors = (y, x) if x.uniform else (x, y)
+    return result
+
+
+def multiplied(a: Row, b: Row, c: Row) -> Row:
+    """A * b + c, rounded once if the machine can do that."""
+    if not FUSES:  # it would call a function for each lane
+        return Row(builder().fadd(builder().fmul(a.ir, b.ir), c.ir))
+    kind, values = ir.FunctionType(vector(), [vector()] * 3), (a.ir, b.ir, c.ir)
+    name = f"llvm.fma.v{lanes()}f64"
+    called = cgutils.get_or_insert_function(builder().module, kind, name)
+    return Row(builder().call(called, values))
 
 
 def _product(x: Any, y: Any) -> Any:
@@ -293,7 +344,7 @@ class Array:
         """An element, a part along the first axis, or one of those as an array."""
         if isinstance(place, slice):
             begin = as_integer(0 if place.start is None else place.start)
-            end = self.shape[0] if place.stop is None else as_integer(place.stop)
+            end = as_integer(self.shape[0] if place.stop is None else place.stop)
             return Array(self.address(begin), (end - begin,), self.whole)
         if isinstance(place, tuple) and len(place) > 1:
             return self[place[0]][place[1:]]
@@ -312,7 +363,7 @@ class Array:
 
 
 def _rows_address(array: Array, place: Any) -> Any:
-    return builder().bitcast(array.address(place), ROW.as_pointer())
+    return builder().bitcast(array.address(place), vector().as_pointer())
 
 
 def at(work: Array, place: Any) -> Row:

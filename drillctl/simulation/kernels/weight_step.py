@@ -24,7 +24,7 @@ from drillctl.simulation.kernels.arithmetic import (
 )
 from drillctl.simulation.kernels.observer_step import move_observer, read_observer, start_observer
 from drillctl.simulation.kernels.rows import WIDTH
-from drillctl.simulation.kernels.vectors import at, loop, pick, put, when
+from drillctl.simulation.kernels.vectors import Array, at, loop, pick, put, when
 
 # The laws' own equations; they read numbers that the laws' steps have too.
 _asked: Any = RealWeight.command
@@ -104,6 +104,10 @@ class Memory(NamedTuple):
     # shape (states x WIDTH,): States of the observer, and room for them
     estimate: Any
     moved: Any
+
+    def part(self, first: Any) -> Memory:
+        """The same from a lane on."""
+        return Memory(*(Array(rows.address(first), rows.shape) for rows in self))
 
 
 def has_memory(weight: Any) -> bool:
