@@ -7,9 +7,10 @@ from typing import Any
 from benchmarks.peers.cvode import TITLE as CVODE
 from benchmarks.peers.cvode_library import TITLE as CVODE_LIBRARY
 from benchmarks.peers.engine import HEADLINE, ONE_CORE
+from benchmarks.peers.reference_rows import COMPILED, PLAIN
 from benchmarks.peers.scipy_events import LSODA
 
-LSODA_BAR, CVODE_BAR = 20_000.0, 1_000.0
+LSODA_BAR, CVODE_BAR, REFERENCE_BAR = 20_000.0, 1_000.0, 60.0
 LANES_BAR, ELEMENTS_BAR = 0.03, 1.25
 """Largest distance of the slope over lanes from 1, and largest ratio of costs over elements."""
 
@@ -74,6 +75,9 @@ def bars(found: dict[str, Any]) -> list[dict[str, Any]]:
             ratio = None if name is None else rows[name][key] / rows[ours][key]
             what = f"times faster than {name or start}, {how}"
             result.append(_bar(what, ratio, f">= {bar:,.0f}", lambda v, bar=bar: v >= bar))
+    reference = None if COMPILED not in rows else rows[PLAIN]["core_s"] / rows[COMPILED]["core_s"]
+    what = f"times faster than {PLAIN}, reference solver, core for core"
+    result.append(_bar(what, reference, f">= {REFERENCE_BAR:g}", lambda v: v >= REFERENCE_BAR))
     lanes, elements = found["scaling"]["lanes"], found["scaling"]["elements"]
     for prefix, time in (("", "time on the clock"), ("core_", "processor time")):
         slope = f"slope of log {time} over log lanes, to {max(lanes['sizes']):,}"

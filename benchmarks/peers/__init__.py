@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from benchmarks.job import Array, Job
 
 MODULES = (
-    "engine", "scipy_events", "cvode", "cvode_library", "numpy_lanes", "diffrax_lanes",
-    "python_control",
+    "engine", "reference_rows", "scipy_events", "cvode", "cvode_library", "numpy_lanes",
+    "diffrax_lanes", "python_control",
 )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ integrator in every norm and margin.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -40,8 +41,9 @@ class StateMatrices(NamedTuple):
     d: Array  # shape (outputs, inputs): Feedthrough
 
 
+@lru_cache(maxsize=4)  # by the string itself: loops of many gains share one
 def plant_matrices(string: Drillstring) -> StateMatrices:
-    """State matrices of the string without control.
+    """State matrices of the string without control; not to be written to.
 
     With B the signed incidence of nodes and elements (1 above, -1 below) and k the element
     stiffnesses, the stiffness matrix is B k B^T, so that M u'' + C u' + K u = F reads
@@ -60,7 +62,10 @@ def plant_matrices(string: Drillstring) -> StateMatrices:
     a[elements:] = accelerations[:, :-2]
     b = np.zeros((elements + nodes, 2))
     b[elements:] = accelerations[:, -2:]
-    return StateMatrices(a, b, _plant_outputs(string), np.zeros((len(OUTPUTS), 2)))
+    made = StateMatrices(a, b, _plant_outputs(string), np.zeros((len(OUTPUTS), 2)))
+    for matrix in made:
+        matrix.setflags(write=False)
+    return made
 
 
 def _plant_outputs(string: Drillstring) -> Array:

@@ -1,12 +1,12 @@
 """Nonlinear simulation of the closed loop with set-valued friction.
 
-- `reference.py`: adaptive integration with located events; `system.py`, `phases.py`: its
-  equations; `laws_in_time.py`: laws with a memory in them; `printed.py`: the paper's own three
-  branches; `run.py`: signals and measures.
+- `reference.py`: adaptive steps with located events; compiled: `reference_rates.py` its equations,
+  `reference_steps.py`, `reference_stiff.py` its steps, `reference_run.py` its phases and events,
+  `law_calls.py` the laws; `run.py`: signals and measures.
 - `batch.py`: thousands of lanes at a fixed step; `lanes.py`: what a lane is and how it starts;
   `propagator.py`: the exact step of the string; `step_laws.py`: laws with a memory for it;
   `kernels/`: compiled loops and nothing else; `scheme.py`: step and modes.
-- `measures.py`: what both measure; `limit_cycle/`: periodic motions.
+- `measures.py`: what both measure; `limit_cycle/`: periodic motions, on `phases.py`.
 """
 
 from __future__ import annotations
