@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol
 
 
 class Progress(Protocol):
@@ -51,3 +53,23 @@ class Within:
 
 
 SILENT = Silent()
+
+
+@contextmanager
+def reporting_compilation(progress: Progress) -> Iterator[None]:
+    """Report the first compilation by numba while the block runs; what lies on disk is silent."""
+    from numba.core import event
+
+    class Listener(event.Listener):
+        begun = False
+
+        def on_start(self, event: Any) -> None:
+            if not self.begun:
+                self.begun = True
+                progress.begin("compiling the solver, once per machine", 1)
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        yield

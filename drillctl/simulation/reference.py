@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.linear.observer import observer_of
-from drillctl.progress import SILENT, Progress
+from drillctl.progress import SILENT, Progress, reporting_compilation
 from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import RealDrive, SampledDrive
@@ -177,7 +177,8 @@ def solve(
     stiff: bool | None = None,
 ) -> Motion:
     """Simulate a design with located events; `stiff` overrules what its string would take."""
-    return _run(design, numbers_of(design), tolerance, progress, stiff)
+    with reporting_compilation(progress):
+        return _run(design, numbers_of(design), tolerance, progress, stiff)
 
 
 def solve_whole(design: Design, tolerance: float = 1e-8) -> Motion:
@@ -197,8 +198,8 @@ def _run(
     work, method = r.work_for(len(state)), r.method_for(stiff, design.string.nodes, len(state))
     clock = _clock(design, numbers, tolerance)
     r.begin(rig, clock, work, state)
+    shown, ended = 0, r.advance(rig, method, clock, work, numbers.sums, state, 0)
     progress.begin("simulated seconds", math.ceil(clock.duration))
-    shown, ended = 0, r.MORE
     while ended == r.MORE:
         clock = _with_room(numbers, clock)
         ended = r.advance(rig, method, clock, work, numbers.sums, state, STEPS)

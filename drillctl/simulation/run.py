@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
+from drillctl.progress import SILENT, Progress
 from drillctl.simulation import measures as m
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, stuck_between
 from drillctl.store.codec import label
@@ -62,6 +63,7 @@ class Simulation(Result):
     measures: m.Measures = label(means="over the whole run")
     status: str = label(means="one of `measures.STATUSES`")
     engine: str = label(means="`reference` or `batch`")
+    method: str | None = label(means="steps of the reference solver: DOP853 or Rodas5P")
     step: float | None = label(unit="s", means="fixed step of the batch engine")
     modes: int | None = label(means="modes that the batch engine carried")
     energy: EnergyAudit | None = label(means="energy balance of the reference solver")
@@ -78,6 +80,7 @@ class Simulation(Result):
             "measures": self.measures.as_dict(),
             "status": self.status,
             "engine": self.engine,
+            "method": self.method,
             "step": self.step,
             "modes": self.modes,
             "energy": None if self.energy is None else self.energy.summary(),
@@ -115,8 +118,8 @@ def sample(motion: Motion, interval: float = 0.01) -> Simulation:
         measured.settling_time_wide,
     )
     return Simulation(
-        design, time, signals, motion.events, measured, status, "reference", None, None,
-        motion.energy,
+        design, time, signals, motion.events, measured, status, "reference",
+        motion.method, None, None, motion.energy,
     )  # fmt: skip
 
 
@@ -246,6 +249,7 @@ def simulate(
     design: Design,
     engine: Literal["reference", "batch"] | None = None,
     interval: float = 0.01,
+    progress: Progress = SILENT,
     **values: Any,
 ) -> Simulation:
     """Simulate a design.
@@ -258,6 +262,8 @@ def simulate(
         By default the design's `simulation.engine`, and the reference solver if it has none.
     interval : float
         Sampling interval of the signals (s).
+    progress : Progress
+        Of the reference solver: simulated seconds.
     **values
         Dotted path to value, laid over the design first.
 
@@ -278,7 +284,7 @@ def simulate(
     if engine == "reference":
         from drillctl.simulation.reference import solve
 
-        return sample(solve(design), interval)
+        return sample(solve(design, progress=progress), interval)
     return _by_batch(design, interval)
 
 
@@ -299,6 +305,7 @@ def _by_batch(design: Design, interval: float) -> Simulation:
         measures=measures_of(batch, 0),
         status=m.STATUSES[batch.status[0]],
         engine="batch",
+        method=None,
         step=scheme.step,
         modes=scheme.modes,
         energy=None,

@@ -24,8 +24,7 @@ def computed(design: Design, run: Run) -> Simulation:
     """The run, by the design's engine."""
     from drillctl.simulation import simulate
 
-    run.progress.begin("simulating", 1)
-    return simulate(design, interval=run.options.get("interval", 0.01))
+    return simulate(design, interval=run.options.get("interval", 0.01), progress=run.progress)
 
 
 def tables(result: Simulation) -> Iterator[Table]:
@@ -46,7 +45,7 @@ def tables(result: Simulation) -> Iterator[Table]:
     if result.step is not None:
         engine = f"{engine} engine, step {result.step * 1e3:g} ms, {result.modes} modes"
     else:
-        engine = f"{engine} solver"
+        engine = f"{engine} solver, {result.method}"
     columns = (Column("measure"), Column("value"), Column("unit", hidden=True))
     yield Table("measures", f"one run ({engine})", columns, rows)
     if result.energy is not None:
