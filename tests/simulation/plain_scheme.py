@@ -31,8 +31,9 @@ def plain_run(string, modes, step, steps, kp, ki, a1, a2, beta, weight, omega, f
     z = np.outer(whole, np.full_like(kp, first - omega))
     angle, w, direction = np.zeros_like(kp), np.full_like(kp, first), np.ones_like(kp)
     falling = np.full_like(kp, rise[1] * np.exp(-beta * first))
-    torque, falls, held = rise[0] + falling, -beta * falling, np.full_like(kp, -1.0)
+    torque, held = rise[0] + falling, np.full_like(kp, -1.0)
     j1, stuck = np.zeros_like(kp), np.zeros_like(kp)
+    once, twice = w, w  # one and two steps ago
     for _ in range(steps):
         swing = free_step @ z
         alone = ((kp / step - ki / 2) * angle - slope * (angle_of @ swing)) * shrink
@@ -47,8 +48,10 @@ def plain_run(string, modes, step, steps, kp, ki, a1, a2, beta, weight, omega, f
         with np.errstate(all="ignore"):
             part = np.where(loose & (held >= 0), 0.5 + (static - holding) / (holding - held), 0)
         right = right + gain / 2 * np.where(part == 0, 0, (holding - held) * part**2)
-        u, falls = newton(right, gain / 2, rise, beta, before, falls * own, np.abs(w))
         sticks = ~own & (holding <= static)
+        foreseen = np.maximum(direction * (3 * (w - once) + twice), 0)
+        u = newton(right, gain / 2, rise, beta, foreseen, sticks)
+        once, twice = w, once
         past = direction * (free - gain / 2 * torque) - gain / 2 * static
         with np.errstate(all="ignore"):
             stopped = past / (past - np.abs(w))
@@ -68,17 +71,19 @@ def plain_run(string, modes, step, steps, kp, ki, a1, a2, beta, weight, omega, f
     return j1, stuck
 
 
-def newton(right, half, rise, beta, before, fall, last):
-    """The root u >= 0 of u + half T(u) = right, and the slope of T there, by the engine's rule."""
-    fall, flat = -half * fall, right - half * before
-    u = np.maximum(flat + fall * (flat + fall * (flat - last) - last), 0)
-    slope, is_open = np.zeros_like(u), np.ones(u.shape, bool)
+def newton(right, half, rise, beta, u, sticks):
+    """The root u >= 0 of u + half T(u) = right from a speed nearby, by the engine's rule."""
+    falling = rise[1] * np.exp(-beta * u)
+    inverse = 1 / (1 - half * beta * falling)
+    step = (right - u - half * (rise[0] + falling)) * inverse
+    is_open = np.where(sticks, 0, np.abs(step**3 * beta)) > (1e-3 * (1 + u)) ** 2
+    u = np.maximum(u + step - half / 2 * beta**2 * falling * inverse * step**2, 0)
     while is_open.any():
         falling = rise[1] * np.exp(-beta * u)
         new = np.maximum(
             u + (right - u - half * (rise[0] + falling)) / (1 - half * beta * falling), 0
         )
         far = np.abs(new - u) > 1e-3 * (1 + u)
-        u, slope = np.where(is_open, new, u), np.where(is_open, -beta * falling, slope)
+        u = np.where(is_open, new, u)
         is_open &= far
-    return u, slope
+    return u

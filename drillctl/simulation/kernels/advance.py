@@ -48,7 +48,7 @@ from drillctl.simulation.kernels.measure_step import (
     note,
 )
 from drillctl.simulation.kernels.program_step import advance_program, begin_program
-from drillctl.simulation.kernels.rock_step import hold_rock, meet_rock
+from drillctl.simulation.kernels.rock_step import foresee, hold_rock, meet_rock
 from drillctl.simulation.kernels.rows import CHUNK, PASS, WIDTH
 from drillctl.simulation.kernels.string_step import complete_and_propagate, load_string, look
 from drillctl.simulation.kernels.vectors import (
@@ -114,6 +114,8 @@ def _load(
 def _begin_rock(friction: Any, weight: Any, program: Any, work: Any) -> None:
     """What bit and rock are to each other at time zero."""
     speed = at(work, r.BIT_SPEED)
+    put(work, r.SPEED_BEFORE, speed)
+    put(work, r.SPEED_BEFORE_THAT, speed)
     load = acting(weight, work)
     at_rest = load.weight(0.0 * speed)
     put(work, r.REST_LOAD, at_rest)
@@ -176,6 +178,8 @@ def _conclude(string: Any, drive: Any, observer: Any, swing: Any, reduced: Any, 
     angle = fma(string.angle_by_top, net_torque, swing.top_angle)
     put(work, r.ANGLE, fma(-string.angle_by_bit, outcome.torque, angle))
     move_top(drive, observer, string, swing, work)
+    put(work, r.SPEED_BEFORE_THAT, at(work, r.SPEED_BEFORE))
+    put(work, r.SPEED_BEFORE, at(work, r.BIT_SPEED))
     put(work, r.BIT_SPEED, outcome.speed)
     put(work, r.DIRECTION, outcome.direction)
     put(work, r.KINETIC, outcome.kinetic)
@@ -212,6 +216,7 @@ def _step(
     advance_program(program, friction, weight, work, first, n * step, step)
     with when(now.traced):
         _look_around(string, state, work)
+    foreseen = foresee(friction, weight, program, work)
     swing = complete_and_propagate(string, drive, observer, room, state, work)
     put(work, r.PIPE, swing.pipe)
     with when(now.traced):
@@ -222,7 +227,7 @@ def _step(
         hold_rock(friction, weight, program, work)
         was = Before(at(work, r.BIT_SPEED), at(work, r.TOP_SPEED), at(work, r.LOAD))
         reduced = eliminate(drive, program, string, swing, work, rate)
-        outcome = meet_rock(friction, weight, program, reduced, work, now.slot)
+        outcome = meet_rock(friction, weight, program, reduced, foreseen, work, now.slot)
         _conclude(string, drive, observer, swing, reduced, outcome, work)
         move_load(weight, program, work)
         follow_drive(drive, work, was.top_speed, rate)

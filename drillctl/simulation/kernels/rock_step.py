@@ -24,6 +24,7 @@ are the torques and the decay that follow from it: they are looked up once a ste
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from drillctl.rig.bit_rock import NavarroLopezSuarez, OverWeight, contact
@@ -63,7 +64,9 @@ class Outcome(NamedTuple):
     stuck: Any  # share of the step spent stuck
 
 
-def stick_or_slip(law: Any, load: Any, reduced: Any, work: Any, slot: Any) -> Outcome:
+def stick_or_slip(
+    law: Any, load: Any, reduced: Any, foreseen: Any, work: Any, slot: Any
+) -> Outcome:
     """The `Outcome` of a step under a set-valued law.
 
     A mask that lives on beyond a branch has no register of its own; hence the infinite torques,
@@ -93,12 +96,15 @@ def stick_or_slip(law: Any, load: Any, reduced: Any, work: Any, slot: Any) -> Ou
         push.set(push.get() + pick(loose, pick(known, early, 0.0), 0.0))
     right = push.get()
 
-    # The law as a straight line from its last torque and slope: Newton's first guess, off by its
-    # curvature over one step. A bit set in motion has no last slope.
-    fall = pick(own, -half * at(work, r.SLOPE), 0.0)
-    flat = right - before
-    guess = most(flat + fall * (flat + fall * (flat - last) - last), 0.0)
-    u, slope = solve_inclusion(law, load, half, right, guess)
+    if foreseen is None:
+        # The law as a straight line from its last torque and slope: Newton's first guess, off by
+        # its curvature over one step. A bit set in motion has no last slope.
+        fall = pick(own, -half * at(work, r.SLOPE), 0.0)
+        flat = right - before
+        guess = most(flat + fall * (flat + fall * (flat - last) - last), 0.0)
+        u, slope = solve_inclusion(law, load, half, right, guess)
+    else:
+        u, slope = solve_near(law, load, half, right, foreseen, holds <= static)
 
     sticks = holds <= static
     # A bit that breaks loose keeps the share that `time_release` found.
@@ -140,28 +146,73 @@ def solve_inclusion(law: Any, load: Any, half: Any, right: Any, guess: Any) -> t
 
     The first step is the last one but for bits that have just begun to turn, or long steps.
     """
+    new, falls = _improved(law, load, half, right, guess)
+    return _go_on(law, load, half, right, new, falls, lambda: _is_far(new, guess))
 
-    def improved(u: Any) -> tuple[Any, Any]:
-        torque, falls = contact(law, load, u, exp)
-        left = right - u - half * torque
-        return most(u + left * one_over_one_plus(half * falls), 0.0), falls
 
-    def is_far(new: Any, u: Any) -> Any:
-        return abs(new - u) > NEWTON_STEP * (1.0 + u)
+def _improved(law: Any, load: Any, half: Any, right: Any, u: Any) -> tuple[Any, Any]:
+    torque, falls = contact(law, load, u, exp)
+    left = right - u - half * torque
+    return most(u + left * one_over_one_plus(half * falls), 0.0), falls
 
-    new, falls = improved(guess)
-    root, slope = Variable(new), Variable(falls)
-    with when(any_of(is_far(new, guess))):
-        is_open = Variable(is_far(new, guess))
+
+def _is_far(new: Any, u: Any) -> Any:
+    return abs(new - u) > NEWTON_STEP * (1.0 + u)
+
+
+def _go_on(
+    law: Any, load: Any, half: Any, right: Any, first: Any, falls: Any, far: Callable[[], Any]
+) -> tuple[Any, Any]:
+    """Newton's method for those lanes that are still far from their root."""
+    root, slope = Variable(first), Variable(falls)
+    with when(any_of(far())):
+        is_open = Variable(far())
         with loop(NEWTON_LIMIT) as iterations:
             u = root.get()
-            new, falls = improved(u)
+            new, falls = _improved(law, load, half, right, u)
             root.set(pick(is_open.get(), new, u))
             slope.set(pick(is_open.get(), falls, slope.get()))
-            is_open.set(is_open.get() & is_far(new, u))
+            is_open.set(is_open.get() & _is_far(new, u))
             with when(~any_of(is_open.get())):
                 iterations.leave()
     return root.get(), slope.get()
+
+
+def foresee(friction: Any, weight: Any, program: Any, work: Any) -> Any:
+    """Bit speed to which the last three lead, and what the torque decays to there; or None.
+
+    A law that is an exponential, with numbers that stay, is worked out there while the modes are
+    still being added up; with its curvature known as well, that is near enough.
+    """
+    if not (_is_held(friction, weight, program) and stays(weight, program)):
+        return None
+    law, last = rock(friction, weight, program, work), at(work, r.BIT_SPEED)
+    speed = 3.0 * (last - at(work, r.SPEED_BEFORE)) + at(work, r.SPEED_BEFORE_THAT)
+    u = most(at(work, r.DIRECTION) * speed, 0.0)
+    return u, law.spread * exp(law.grows * u)
+
+
+def solve_near(
+    law: Any, load: Any, half: Any, right: Any, foreseen: Any, sticks: Any
+) -> tuple[Any, Any]:
+    """The root of u + half T(u) = right from the law at a speed nearby; lanes that stick aside.
+
+    Newton's step, less what the law's curvature makes of it. What is left is of third order, that
+    step's cube times half/6 times a third derivative that is `grows` times the second: no more than
+    Newton's method leaves by its own rule if step^3 grows <= NEWTON_STEP^2.
+    """
+    u, falling = foreseen
+    falls = law.grows * falling
+    inverse = one_over_one_plus(half * falls)
+    step = (right - u - half * (law.level + falling)) * inverse
+    curved = 0.5 * half * law.grows * falls * inverse
+    new = most(u + (step - curved * step * step), 0.0)
+    close = NEWTON_STEP * (1.0 + u)
+
+    def far() -> Any:
+        return pick(sticks, 0.0, abs(step * step * step * law.grows)) > close * close
+
+    return _go_on(law, load, half, right, new, falls, far)
 
 
 def one_over_one_plus(d: Any) -> Any:
@@ -177,12 +228,12 @@ def one_over_one_plus(d: Any) -> Any:
 
 
 def meet_rock(
-    friction: Any, weight: Any, program: Any, reduced: Any, work: Any, slot: Any
+    friction: Any, weight: Any, program: Any, reduced: Any, foreseen: Any, work: Any, slot: Any
 ) -> Outcome:
     """The `Outcome` of a step from what string and drive leave free."""
     law, load = rock(friction, weight, program, work), acting(weight, work)
     if law.set_valued:
-        return stick_or_slip(law, load, reduced, work, slot)
+        return stick_or_slip(law, load, reduced, foreseen, work, slot)
     return _creep(law, load, reduced, work)
 
 

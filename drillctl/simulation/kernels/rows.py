@@ -71,6 +71,8 @@ PER_GAIN = _next()  # 1 / GAIN
 # State between steps.
 ANGLE = _next()  # top-drive angle in the frame, rad
 BIT_SPEED = _next()  # rad/s, absolute
+SPEED_BEFORE = _next()  # one step earlier
+SPEED_BEFORE_THAT = _next()  # two steps
 KINETIC = _next()  # friction torque at that speed against it, N m
 SLOPE = _next()  # slope of the friction there, N m s/rad
 DIRECTION = _next()  # +1, -1 turning; 0 stuck
