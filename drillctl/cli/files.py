@@ -42,9 +42,14 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
 
     loaded_design = loaded(design, sets)
     if json:
-        console.emit(to_tree(loaded_design.tables))
+        mesh = [one.summary() for one in loaded_design.mesh]
+        console.emit(to_tree(loaded_design.tables) | {"mesh": mesh})
     else:
         console.line(to_toml(loaded_design).rstrip())
+        console.line("\n# Elements of the sections:")
+        for one in loaded_design.mesh:
+            count = f"{one.elements} of {one.length:.4g} m, " if one.length > 0.0 else ""
+            console.line(f"# {one.name}: {count}{one.said}")
 
 
 def validate(

@@ -16,6 +16,7 @@ from drillctl.design.validation import validated
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.drillstring.mesh import MeshedSection
 from drillctl.rig.program import Program
 from drillctl.rig.top_drive import PI, ConstantTorque, TopDriveLaw
 from drillctl.rig.top_drive.law import top_drive
@@ -94,6 +95,11 @@ class Design:
     def string(self) -> Drillstring:
         """The assembled drillstring."""
         return parts.drillstring(self.tables)
+
+    @property
+    def mesh(self) -> tuple[MeshedSection, ...]:
+        """Elements of each section, given or chosen, and which pieces were lumped."""
+        return parts.mesh(self.tables, self.string)
 
     @cached_property
     def bit_rock(self) -> BitRockLaw:

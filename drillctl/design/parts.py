@@ -9,7 +9,16 @@ from drillctl.design.tables import DesignTables, SectionTable
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.law import changed_rock, form_of, friction_laws
-from drillctl.rig.drillstring import GRADES, PIPES, Drillstring, Section, assemble, polar_moment
+from drillctl.rig.drillstring import (
+    GRADES,
+    PIPES,
+    Drillstring,
+    Parts,
+    Section,
+    assemble,
+    polar_moment,
+)
+from drillctl.rig.drillstring.mesh import MeshedSection, meshed, what_was_done
 from drillctl.rig.drillstring.section import torsional_yield
 from drillctl.rig.program import STILL, Program, Ramp
 from drillctl.rig.top_drive.ideal import ConstantTorqueTable
@@ -18,7 +27,6 @@ from drillctl.rig.weight_on_bit.law import HEAVIEST, WeightLaw, weight_laws
 STEEL_SHEAR_MODULUS = 79.3e9  # shear modulus (Pa) where a design gives none: drill-pipe steel
 STEEL_DENSITY = 7850.0  # density (kg/m3) where a design gives none
 STEEL_POISSON_RATIO = 0.3  # poisson's ratio where a design gives Young's modulus alone
-ELEMENT_LENGTH = 100.0  # longest element (m) where a design does not say how many
 MOST_ELEMENTS = 10_000
 """Elements of a whole string: some metres each; beyond, matrices outgrow the memory."""
 
@@ -29,10 +37,33 @@ _assembled = lru_cache(maxsize=4)(assemble)
 
 def drillstring(tables: DesignTables) -> Drillstring:
     """Assemble the string of a design."""
-    table = tables.drillstring
     refuse_impossible_string(tables)
-    return _assembled(
-        tuple(section(s) for s in table.sections),
+    made = _parts(tables)
+    sections = meshed(made, _free(tables))
+    count = sum(one.elements for one in sections)
+    if count > MOST_ELEMENTS:
+        raise InputError(
+            f"{count} elements in all; allowed are {MOST_ELEMENTS}", "drillstring.sections"
+        )
+    return _assembled(**(vars(made) | {"sections": sections}))
+
+
+def mesh(tables: DesignTables, string: Drillstring) -> tuple[MeshedSection, ...]:
+    """How many elements each section has, and which pieces were lumped."""
+    names = (s.name for s in tables.drillstring.sections)
+    return what_was_done(string.parts.sections, names, _free(tables))
+
+
+def _free(tables: DesignTables) -> tuple[bool, ...]:
+    """Whether the elements of each section are to be chosen."""
+    return tuple(s.elements is None and s.stiffness is None for s in tables.drillstring.sections)
+
+
+def _parts(tables: DesignTables) -> Parts:
+    """Sections as they stand, each of one element where the design does not say how many."""
+    table = tables.drillstring
+    return Parts(
+        sections=tuple(section(s) for s in table.sections),
         top_inertia=tables.top_drive.inertia,
         bit_inertia=tables.bha.inertia,
         top_damping=tables.top_drive.damping,
@@ -43,7 +74,7 @@ def drillstring(tables: DesignTables) -> Drillstring:
 
 
 def section(table: SectionTable) -> Section:
-    """The physical section that a table describes."""
+    """The physical section that a table describes; of one element where it does not say."""
     if table.stiffness is not None:
         return Section(
             name=table.name,
@@ -59,7 +90,7 @@ def section(table: SectionTable) -> Section:
     density = STEEL_DENSITY if table.density is None else table.density
     return Section(
         name=table.name,
-        elements=table.elements or math.ceil(table.length / ELEMENT_LENGTH),
+        elements=table.elements or 1,
         stiffness=shear_modulus(table) * moment / table.length,
         inertia=density * moment * table.length * table.tool_joint_factor,
         length=table.length,

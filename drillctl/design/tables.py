@@ -46,7 +46,12 @@ class OperatingPoint(Table):
 
 
 class SectionTable(Table):
-    """A section: a pipe by API name, or geometry, or polar moment, or a lumped spring."""
+    """A section: a pipe by API name, or geometry, or polar moment, or a lumped spring.
+
+    Without `elements` they are chosen: the first five frequencies of the string, top free and
+    held, are those of the exact line to 0.3 %, and short pieces are lumped into neighbours that
+    name no elements either.
+    """
 
     name: str
     elements: q.Count | None = None

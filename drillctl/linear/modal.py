@@ -169,11 +169,14 @@ class Modes(Result):
         -------
         dict
             `free_free` and `fixed_top`, each a list of `{"frequency_hz", "damping_ratio"}`,
-            with `"overdamped": True` on real poles alone.
+            with `"overdamped": True` on real poles alone; `mesh`, the elements of each section
+            of a design.
         """
+        mesh = () if self.design is None else self.design.mesh
         return {
             "free_free": [_entry(mode) for mode in self.free_free],
             "fixed_top": [_entry(mode) for mode in self.fixed_top],
+            "mesh": [one.summary() for one in mesh],
         }
 
     def derived(self) -> dict[str, Any]:

@@ -113,7 +113,7 @@ def test_modes_json(call):
     code, out, err = call("modes", DESIGN, "--json", "--count", "4")
     found = parsed(out)
     assert code == 0
-    assert set(found) == {"free_free", "fixed_top"}
+    assert set(found) == {"free_free", "fixed_top", "mesh"}
     assert [len(found[k]) for k in found] == [4, 4]
     rigid, first = found["free_free"][:2]
     assert rigid == {"frequency_hz": 0.0, "damping_ratio": None}

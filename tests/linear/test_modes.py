@@ -321,7 +321,7 @@ def test_shapes_are_normalised_with_the_bit_positive(design):
 def test_summary_is_strict_json_as_agreed():
     summary = of("navarro-lopez-2dof").summary()
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
-    assert set(summary) == {"free_free", "fixed_top"}
+    assert set(summary) == {"free_free", "fixed_top", "mesh"}
     rigid, speed, elastic = summary["free_free"]
     assert rigid == {"frequency_hz": 0.0, "damping_ratio": None}
     assert speed["overdamped"] is True

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure as Drawn
 from matplotlib.patches import Polygon, Rectangle
 
 from drillctl.design import Design
+from drillctl.design.parts import section
 from drillctl.design.tables import SectionTable
 from drillctl.plots import style
 from drillctl.reporting.blocks import Block, Figure, Table, Text, Words
@@ -129,7 +130,6 @@ def _ends(ax: Axes, design: Design, words: Words) -> None:
 def build(gathered: Gathered) -> tuple[Block, ...]:
     """Drawing, sections, bodies, source."""
     design, words = gathered.design, gathered.words
-    parts = design.string.parts.sections
     tables = design.tables.drillstring.sections
     rows = tuple(
         (
@@ -137,9 +137,9 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
             words.quantity(table.length, "m") if table.length else NOTHING,
             words.diameter(_diameters(table)[0]), words.diameter(_diameters(table)[1]),
             f"{number(part.stiffness)}", f"{number(part.inertia + part.end_inertia)}",
-            str(part.elements),
+            made.said if made.lumped_into else str(made.elements),
         )
-        for table, part in zip(tables, parts, strict=True)
+        for table, part, made in zip(tables, map(section, tables), design.mesh, strict=True)
     )  # fmt: skip
     heads = (
         "section", "given as", "length", "outer diameter", "inner diameter",

@@ -10,6 +10,7 @@ of elements and for the continuum alike. Losses are left out: these are undamped
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Literal
@@ -30,7 +31,12 @@ BISECTIONS = 80  # halvings of a bracket: the last bit of a double
 
 
 def natural_frequencies(
-    parts: Parts, model: Model, count: int, top_held: bool = False, bit_held: bool = False
+    parts: Parts,
+    model: Model,
+    count: int,
+    top_held: bool = False,
+    bit_held: bool = False,
+    bisections: int = BISECTIONS,
 ) -> Array:
     """Undamped natural frequencies, lowest first."""
     still = _Lossless(parts, model, top_held, bit_held)
@@ -42,13 +48,20 @@ def natural_frequencies(
     total = min(count, int(still.below(np.array([high]))[0]))
     number = np.arange(total)
     lower, upper = np.zeros(total), np.full(total, high)
-    for _ in range(BISECTIONS):
+    for _ in range(bisections):
         middle = 0.5 * (lower + upper)
         under = still.below(middle) > number
         upper = np.where(under, middle, upper)
         lower = np.where(under, lower, middle)
     rigid = not (top_held or bit_held)
     return np.where(rigid & (number == 0), 0.0, upper)
+
+
+def frequency_counter(
+    parts: Parts, model: Model, top_held: bool = False, bit_held: bool = False
+) -> Callable[[Array], Counts]:
+    """How many natural frequencies lie below each frequency (rad/s, more than zero)."""
+    return _Lossless(parts, model, top_held, bit_held).below
 
 
 class _Lossless:

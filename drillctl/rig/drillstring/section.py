@@ -54,6 +54,8 @@ class Section:
         Damping to ground, spread evenly over the length (N m s/rad).
     yield_torque : float
         Torque at which the pipe body begins to yield (N m); infinite when unknown.
+    lumped : tuple of str
+        Names of short pieces that it holds as well.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Section:
     mass_damping: float = 0.0
     drag: float = 0.0
     yield_torque: float = math.inf
+    lumped: tuple[str, ...] = ()
 
     @property
     def impedance(self) -> float:

@@ -28,7 +28,7 @@ def computed(design: Design, run: Run) -> Modes:
 
 
 def tables(result: Modes) -> Iterator[Table]:
-    """Frequencies and damping ratios, the two end conditions side by side."""
+    """Frequencies and damping ratios, the two end conditions side by side; the elements."""
     columns = [Column("mode")]
     for name, head in (("free_free", "top free"), ("fixed_top", "top held")):
         columns.append(Column(f"{name}_frequency", f"{head}: frequency", "Hz", digits=6))
@@ -39,6 +39,13 @@ def tables(result: Modes) -> Iterator[Table]:
         for order in range(most)
     ]
     yield Table("modes", "natural frequencies of the string", tuple(columns), rows)
+    if result.design is not None:
+        heads = (
+            Column("section"), Column("elements"), Column("element_length", "of", "m"),
+            Column("choice", "how"),
+        )  # fmt: skip
+        cells = [[x.name, x.elements, x.length, x.said] for x in result.design.mesh]
+        yield Table("mesh", "elements of the string", heads, cells)
 
 
 def _cells(result: tuple[Any, ...], order: int) -> list[Any]:
@@ -98,7 +105,8 @@ STUDY = Study(
     remarks=remarks,
     recipes=(Recipe("modes", "the modes", order=0),),
     sections=(
-        Section("modes", "Modes of the string", ("modes",), order=30, shows=("modes", "bode"),
+        Section("modes", "Modes of the string", ("modes",), order=30,
+                shows=("modes", "mesh", "bode"),
                 text=STICK_SLIP),
     ),
 )  # fmt: skip

@@ -113,7 +113,7 @@ def _finer_mesh(parts: int) -> Callable[[Requested], Design]:
         return design.replace({
             f"drillstring.sections.{table.name}.elements": parts * counts[table.name]
             for table in design.tables.drillstring.sections
-            if table.stiffness is None
+            if table.stiffness is None and table.name in counts  # not lumped into a neighbour
         })  # fmt: skip
 
     return variant
