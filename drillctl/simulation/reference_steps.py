@@ -9,7 +9,10 @@
 
 from __future__ import annotations
 
+import json
 import math
+from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,26 +53,27 @@ class Dense(NamedTuple):
     by_step: bool  # whether the stages are rates, to be multiplied with the step
 
 
-def tableau() -> Tableau:
-    """The coefficients as SciPy holds them."""
-    from scipy.integrate import DOP853
+@cache
+def _published() -> dict[str, Any]:
+    """The coefficients of DOP853; a file, as SciPy's own integrators take long to import."""
+    path = Path(__file__).with_name("dop853.json")
+    return dict(json.loads(path.read_text(encoding="utf-8")))
 
-    a = np.zeros((DENSE_STAGES, DENSE_STAGES))
-    a[:STAGES, :STAGES] = DOP853.A
-    a[STAGES, :STAGES] = DOP853.B
-    a[STAGES + 1 :] = DOP853.A_EXTRA
-    errors = np.zeros((2, DENSE_STAGES))
-    errors[0, : STAGES + 1], errors[1, : STAGES + 1] = DOP853.E5, DOP853.E3
-    c = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
-    return Tableau(*_without_zeros(a), c, *_without_zeros(errors))
+
+def tableau() -> Tableau:
+    """The weights of the stages and of the error estimates."""
+    numbers = _published()
+    a, errors = np.zeros((DENSE_STAGES, DENSE_STAGES)), np.zeros((2, DENSE_STAGES))
+    for k, row in enumerate(numbers["a"]):
+        a[k, : len(row)] = row
+    errors[:, : STAGES + 1] = numbers["fifth"], numbers["third"]
+    return Tableau(*_without_zeros(a), np.array(numbers["c"]), *_without_zeros(errors))
 
 
 def explicit_dense_output() -> Dense:
-    """The dense output as SciPy holds it."""
-    from scipy.integrate import DOP853
-
+    """The dense output of order 7."""
     weights = np.zeros((6, DENSE_STAGES))
-    weights[0, 0], weights[1, [0, STAGES]], weights[2:] = 1.0, -1.0, DOP853.D
+    weights[0, 0], weights[1, [0, STAGES]], weights[2:] = 1.0, -1.0, _published()["dense"]
     return Dense(weights, np.array([-1.0, 2.0, 0.0, 0.0, 0.0, 0.0]), by_step=True)
 
 

@@ -3,6 +3,7 @@
 import numba
 import numpy as np
 import pytest
+from scipy.integrate import DOP853
 
 import drillctl
 from benchmarks.peers.reference import solver as peer
@@ -10,6 +11,7 @@ from drillctl.design import Design
 from drillctl.simulation import reference_run as run
 from drillctl.simulation.reference import numbers_of, solve, solve_whole
 from drillctl.simulation.reference_rates import rates_of, slip_torque
+from drillctl.simulation.reference_steps import explicit_dense_output, tableau
 from drillctl.simulation.reference_stiff import change_with_time, linearise, stiff_step
 from drillctl.simulation.run import sample
 
@@ -130,6 +132,20 @@ def test_the_peer_in_plain_python_agrees(name):
     ]
     for value, other in zip(motion.torques(times)[:3], np.array(torques).T, strict=True):
         assert value == pytest.approx(other, rel=1e-6, abs=1e-2)
+
+
+def test_coefficients_are_those_of_scipy():
+    made, dense = tableau(), explicit_dense_output()
+    a = np.zeros((16, 16))
+    np.put_along_axis(a, made.of, made.a, axis=1)
+    assert np.array_equal(a[:12, :12], DOP853.A)
+    assert np.array_equal(a[12, :12], DOP853.B)
+    assert np.array_equal(a[13:], DOP853.A_EXTRA)
+    assert np.array_equal(made.c, [*DOP853.C, 1.0, *DOP853.C_EXTRA])
+    errors = np.zeros((2, 16))
+    np.put_along_axis(errors, made.errors_of, made.errors, axis=1)
+    assert np.array_equal(errors[:, :13], [DOP853.E5, DOP853.E3])
+    assert np.array_equal(dense.weights[2:], DOP853.D)
 
 
 STIFF = {"drillstring.sections.pipe.stiffness_damping": "1e-3 s", "simulation.duration": "15 s"}
