@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,10 +135,8 @@ def _parts(geometry: Any) -> list[Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep(Result):
+class Sweep(Result, kind="map"):
     """Measures over a grid of parameters."""
-
-    kind: ClassVar[str] = "map"
 
     design: Design = label(means="what was varied")
     axes: tuple[Axis, ...] = label(means="parameters and their values")

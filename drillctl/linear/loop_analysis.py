@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ WEIGHTS = np.geomspace(1e-3, 20.0, 201)
 
 
 @dataclass(frozen=True, eq=False)
-class LoopAnalysis(Result):
+class LoopAnalysis(Result, kind="loop"):
     """Poles, margins and critical operating points of one design.
 
     Whether the equilibrium is stable is not read from the poles: of an undamped string the
@@ -41,8 +41,6 @@ class LoopAnalysis(Result):
     is not stable even without slope, infinite where it tolerates any. The critical weight lies
     within the friction table unless the design allows more.
     """
-
-    kind: ClassVar[str] = "loop"
 
     design: Design = label(means="the rig")
     operating_point: OperatingPoint = label(means="steady drilling about which the loop is linear")

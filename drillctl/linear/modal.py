@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -144,14 +144,12 @@ class Mode:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes(Result):
+class Modes(Result, kind="modes"):
     """Modes of a string with its top free and with its top held.
 
     With both ends free, inertias of top drive and BHA included, the rigid body comes first, then
     by rising frequency. All depths of a lumped string are zero.
     """
-
-    kind: ClassVar[str] = "modes"
 
     free_free: tuple[Mode, ...] = label(over="free_free_mode", means="both ends free")
     fixed_top: tuple[Mode, ...] = label(over="fixed_top_mode", means="the top drive held still")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,10 +49,8 @@ def _meaning(signal: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Simulation(Result):
+class Simulation(Result, kind="simulate"):
     """One run: its signals, events, measures and energy balance."""
-
-    kind: ClassVar[str] = "simulate"
 
     design: Design = label(means="what was simulated")
     time: Array = label("time", unit="s", name="time", means="sampling times")

@@ -20,9 +20,11 @@ class Result:
 
     kind: ClassVar[str]  # name of the study that computes it, which is its command
 
-    def __init_subclass__(cls) -> None:
-        """Document its fields."""
-        super().__init_subclass__()
+    def __init_subclass__(cls, kind: str = "", **options: Any) -> None:
+        """Document its fields; `kind` names its study."""
+        super().__init_subclass__(**options)
+        if kind:
+            cls.kind = kind
         documented(cls)
 
     if TYPE_CHECKING:

@@ -2,9 +2,10 @@
 
 A study is a package below `drillctl.studies`, named in `drillctl.registry.STUDIES`. Its
 `__init__.py` holds `STUDY = Study(...)` and imports nothing heavy: what computes or draws is
-imported inside the functions that it names. From this object follow the command with its options
-and help, the folder of a run and its resumption, tables on the terminal and as CSV, pictures,
-the JSON summary, `drillctl.open`, `drillctl.NAME` and the section of the report.
+imported inside its functions, which the object knows by their names. From this object follow the
+command with its options and help, the folder of a run and its resumption, tables on the terminal
+and as CSV, pictures, the JSON summary, `drillctl.open`, `drillctl.NAME` and the section of the
+report.
 
 Usual files of a package: `__init__.py` with `STUDY` and the functions that it names, `compute.py`
 with the result class and the computation, `settings.py` with the keys of the design file. Orders
@@ -18,6 +19,7 @@ sections summary 0, rig 10, operating point 20, modes 30, loop 40, map 50, respo
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -158,6 +160,13 @@ class Section:
     build: Callable[[Any], tuple[Any, ...]] | None = None
 
 
+FUNCTIONS = (
+    "tables", "pictures", "remarks", "checks", "notes", "summary", "files", "failure", "growing",
+    "check",
+)  # fmt: skip
+"""Of a study, by which its module may name them."""
+
+
 def _none(*values: Any) -> tuple[()]:
     return ()
 
@@ -170,10 +179,12 @@ def _nothing(*values: Any) -> None:
 class Study:
     """One study.
 
-    `compute` takes a design and a `Run` and returns a `store.result.Result`, whose class names
-    the study in `kind`; by default it is `call`, with the options of the command by their names
-    and `progress`. The other functions take that result; `tables`, `pictures` and
-    `remarks` give what people see, `notes` what deserves attention on stderr.
+    Its functions are those of its `module` with the name of a field, and `computed` there is
+    `compute`: it takes a design and a `Run` and returns a `store.result.Result`, whose class names
+    the study in `kind`. Without it `call` is called, with the options of the command by their
+    names and `progress`; by default that is the function called `python` in `compute.py` of the
+    package. The other functions take that result; `tables`, `pictures` and `remarks` give what
+    people see, `notes` what deserves attention on stderr.
     """
 
     name: str
@@ -199,6 +210,17 @@ class Study:
     recipes: tuple[Recipe, ...] = ()
     sections: tuple[Section, ...] = ()
     system: Literal["si", "field"] = "si"  # units that people read unless they ask for others
+    module: str = ""
+
+    def __post_init__(self) -> None:
+        """Take functions from the module."""
+        given = vars(sys.modules[self.module]) if self.module else {}
+        results = {name: given[name] for name in FUNCTIONS if name in given}
+        results |= {"compute": given["computed"]} if "computed" in given else {}
+        if self.module and self.python and not self.call:
+            results["call"] = f"{self.module}.compute:{self.python}"
+        for name, value in results.items():
+            object.__setattr__(self, name, value)
 
     def settings(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """What a result depends on beside its design."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,10 +35,8 @@ TOLERANCE = 1e-8  # of the reference solver in the long simulation
 
 
 @dataclass(frozen=True, eq=False)
-class LimitCycle(Result):
+class LimitCycle(Result, kind="cycle"):
     """What a design does in the long run, by three methods."""
-
-    kind: ClassVar[str] = "cycle"
 
     design: Design = label(means="what was computed")
     status: str = label(means="one of `returns.STATUSES`")

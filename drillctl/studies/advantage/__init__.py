@@ -217,15 +217,11 @@ def not_applicable(request: Requested) -> str:
 
 
 STUDY = Study(
+    module=__name__,
     name="advantage",
     help="Tune PI with constant and with following weight; compare",
     group="Decide",
     python="advantage",
-    call="drillctl.studies.advantage.compute:advantage",
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
-    check=check,
     recipes=(
         Recipe("advantage", "the advantage of dynamic weight on bit", not_applicable, order=120),
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,13 +43,11 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Advantage(Result):
+class Advantage(Result, kind="advantage"):
     """PI against PI with a weight that follows the bit speed, each at its own robust optimum.
 
     Its design's `[advantage]` and `[tune]` say what was compared and to what end.
     """
-
-    kind: ClassVar[str] = "advantage"
 
     design: Design = label(means="what was compared")
     cases: tuple[Case, ...] = label(

@@ -161,6 +161,7 @@ def not_applicable(request: Requested) -> str:
 
 
 STUDY = Study(
+    module=__name__,
     name="compare",
     help="Compare cases at the same draws",
     group="Decide",
@@ -177,12 +178,6 @@ STUDY = Study(
     ),
     axes=True,
     python="compare",
-    call="drillctl.studies.compare.compute:compare",
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
-    notes=notes,
-    check=check,
     recipes=(Recipe("compare", "the comparison", not_applicable, order=100),),
     sections=(Section("comparison", "Comparison of cases", ("compare",), order=100),),
 )

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -203,10 +203,8 @@ class ComparedCase(Runs):
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Result):
+class Comparison(Result, kind="compare"):
     """Cases at the same starts and the same draws."""
-
-    kind: ClassVar[str] = "compare"
 
     design: Design = label(means="whose cases they are; of cases given one by one the first")
     cases: tuple[ComparedCase, ...] = label(over="case", flat=True, means="the baseline first")

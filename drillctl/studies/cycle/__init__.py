@@ -69,13 +69,10 @@ def remarks(result: LimitCycle, system: units.System) -> Iterator[str]:
 
 
 STUDY = Study(
+    module=__name__,
     name="cycle",
     help="Find the limit cycle of stick-slip, stable or not",
     group="Simulate",
-    compute=computed,
     python="limit_cycle",
     call="drillctl.simulation.limit_cycle:limit_cycle",
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
 )

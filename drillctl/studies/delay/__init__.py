@@ -87,14 +87,10 @@ def check(design: Design) -> None:
 
 
 STUDY = Study(
+    module=__name__,
     name="delay",
     help="Show what delay does to a weight that follows bit speed",
     group="Decide",
     options=(DRAWS, SEED),
     python="weight_delay",
-    call="drillctl.studies.delay.compute:weight_delay",
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
-    check=check,
 )

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,14 +116,12 @@ def lasting(shares: Sequence[float], enough: float = ENOUGH) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class WeightDelay(Result, Runs):
+class WeightDelay(Result, Runs, kind="delay"):
     """A weight on bit that follows the bit speed, over gains and delays, at the same draws.
 
     Its design's `[weight_delay]` holds gains, delays and law, its `[uncertainty]` number and seed
     of the draws. It is itself the runs of all gains and delays: `at(i, k)` gives those of one.
     """
-
-    kind: ClassVar[str] = "delay"
 
     measures: dict[str, Array] = label(
         "gain", "delay", "realization", unit=lambda name: MEASURES[name].unit,

@@ -152,19 +152,14 @@ def checks(result: Doctor) -> Iterator[Check]:
 
 
 STUDY = Study(
+    module=__name__,
     name="doctor",
     help="Explain step, modes, errors and speed of the engine",
     group="Describe a rig",
-    compute=computed,
     options=(
         Option("audit", int, "Audit this many lanes with the reference solver", default=4, least=0),
     ),
     axes=True,
     python="doctor",
-    call="drillctl.studies.doctor.compute:doctor",
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
-    checks=checks,
     recipes=(Recipe("doctor", "the errors of the batch engine", options={"audit": 0}, order=130),),
 )

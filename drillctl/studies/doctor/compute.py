@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numba
 import numpy as np
@@ -63,15 +63,13 @@ REPEATS = 3  # runs of which the fastest counts: what others take of the machine
 
 
 @dataclass(frozen=True, eq=False)
-class Doctor(Result):
+class Doctor(Result, kind="doctor"):
     """What the batch engine does with a design, on a sample of the cells of its map.
 
     The sample is the design alone where the default map does not fit it. `scheme` holds step,
     modes and the reasons for them, of the string with the shortest step if axes change the
     string.
     """
-
-    kind: ClassVar[str] = "doctor"
 
     design: Design = label(means="that was examined")
     axes: tuple[Axis, ...] = label(means="of the map that the sample is from")

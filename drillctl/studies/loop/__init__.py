@@ -124,19 +124,14 @@ def files(result: LoopAnalysis, folder: Path) -> None:
 
 
 STUDY = Study(
+    module=__name__,
     name="loop",
     help="Analyse stability and margins, map the slope margin",
     group="Analyse the loop",
-    compute=computed,
     options=(Option("no_map", bool, "Leave out the map over the axes of [map]", False),),
     axes=True,
     python="loop",
     call="drillctl.linear.loop_analysis:loop",
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
-    notes=notes,
-    files=files,
     recipes=(Recipe("loop", "the loop", options={"no_map": True}, order=10),),
     sections=(
         Section(

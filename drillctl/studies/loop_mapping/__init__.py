@@ -64,15 +64,13 @@ def slope_margin(result: LoopMap, system: units.System) -> Figure:
 
 
 STUDY = Study(
+    module=__name__,
     name="loop-map",
     help="Map quantities of the loop over two parameters",
     group="Analyse the loop",
-    compute=computed,
     options=(Option("quantities", tuple, "Map these quantities; all by default"),),
     axes=True,
     command=False,
-    tables=tables,
-    pictures=pictures,
     recipes=(
         Recipe("slope-margin", "the slope margin over the map", over_two_axes,
                options={"quantities": ("slope_margin",)}, order=80),

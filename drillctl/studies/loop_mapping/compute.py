@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,14 +42,12 @@ QUANTITIES = {
 
 
 @dataclass(frozen=True, eq=False)
-class LoopMap(Result):
+class LoopMap(Result, kind="loop-map"):
     """Quantities of the loop over a grid of parameters.
 
     `low_damping` is negative where one of these modes grows; `peak_sensitivity` is NaN where the
     loop is not stable, and all are where there is no steady drilling.
     """
-
-    kind: ClassVar[str] = "loop-map"
 
     design: Design = label(means="what was varied")
     axes: tuple[Axis, ...] = label(means="parameters and their values")

@@ -131,10 +131,10 @@ def check(design: Design) -> None:
 
 
 STUDY = Study(
+    module=__name__,
     name="map",
     help="Map J1 over parameters, with regions and an audit",
     group="Simulate",
-    compute=computed,
     options=(
         Option(
             "audit", int, "Audit this many cells with the reference solver", sets="map.audit_cells"
@@ -147,13 +147,6 @@ STUDY = Study(
     python="stability_map",
     call="drillctl.ensemble.sweeps:stability_map",
     resumes=True,
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
-    checks=checks,
-    notes=notes,
-    files=files,
-    check=check,
     recipes=(Recipe("map", "the J1 map", mapped_in_batch, order=40),),
     sections=(
         Section("map", "J1 over the map", ("map", "cells"), order=50,

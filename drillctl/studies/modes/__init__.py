@@ -93,16 +93,13 @@ def remarks(result: Modes, system: units.System) -> Iterator[str]:
 
 
 STUDY = Study(
+    module=__name__,
     name="modes",
     help="Compute natural frequencies, damping and mode shapes",
     group="Analyse the loop",
-    compute=computed,
     options=(Option("count", int, "Compute this many modes of each end condition", 10),),
     python="modes",
     call="drillctl.linear.modal:modes",
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
     recipes=(Recipe("modes", "the modes", order=0),),
     sections=(
         Section("modes", "Modes of the string", ("modes",), order=30,

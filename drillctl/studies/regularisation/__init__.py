@@ -45,12 +45,10 @@ def pictures(result: Regularisation) -> Iterator[Picture]:
 
 
 STUDY = Study(
+    module=__name__,
     name="regularisation",
     help="Compare the map with the map under smoothed friction",
     group="Simulate",
     axes=True,
     python="regularisation",
-    call="drillctl.studies.regularisation.compute:regularisation",
-    tables=tables,
-    pictures=pictures,
 )

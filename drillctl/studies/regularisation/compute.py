@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -24,10 +24,8 @@ WIDTH_PATH = "bit_rock.regularised_over"
 
 
 @dataclass(frozen=True, eq=False)
-class Regularisation(Result):
+class Regularisation(Result, kind="regularisation"):
     """A map with set-valued friction beside the same map with smoothed friction."""
-
-    kind: ClassVar[str] = "regularisation"
 
     design: Design = label(means="the rig, its friction set-valued")
     axes: tuple[Axis, ...] = label(means="of the map")

@@ -160,10 +160,10 @@ def _recipes() -> Iterator[Recipe]:
 
 
 STUDY = Study(
+    module=__name__,
     name="simulate",
     help="Simulate one run: time response, measures, energy",
     group="Simulate",
-    compute=computed,
     options=(
         Option(
             "engine", Literal["reference", "batch"], "Locate events, or take fixed steps",
@@ -172,9 +172,5 @@ STUDY = Study(
     ),
     python="simulate",
     call="drillctl.simulation:simulate",
-    tables=tables,
-    pictures=pictures,
-    checks=checks,
-    summary=summary,
     recipes=tuple(_recipes()),
 )  # fmt: skip

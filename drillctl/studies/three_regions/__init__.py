@@ -89,16 +89,12 @@ def not_applicable(request: Requested) -> str:
 
 
 STUDY = Study(
+    module=__name__,
     name="regions",
     help="Map local stability, J1 under a level and attraction",
     group="Analyse the loop",
-    compute=computed,
     axes=True,
     python="three_regions",
-    call="drillctl.studies.three_regions.compute:three_regions",
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
     recipes=(Recipe("regions", "the three regions", not_applicable, order=85),),
     sections=(Section("regions", "Three regions", ("regions",), order=65),),
 )

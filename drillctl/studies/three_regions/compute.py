@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import time
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -155,15 +155,13 @@ MASKS = (
 
 
 @dataclass(frozen=True, eq=False)
-class ThreeRegions(Result):
+class ThreeRegions(Result, kind="regions"):
     """Local stability, J1 and attraction over one grid.
 
     With integral action the operating speed is the set speed; a drive without it has the
     equilibrium nearest to the set speed, be it stable or not, and starts wound up with its top
     at this speed.
     """
-
-    kind: ClassVar[str] = "regions"
 
     design: Design = label(means="what was varied")
     axes: tuple[Axis, ...] = label(means="parameters and their values")

@@ -245,10 +245,10 @@ def not_applicable(request: Requested) -> str:
 
 
 STUDY = Study(
+    module=__name__,
     name="tune",
     help="Search robust gains and certify them at fresh draws",
     group="Decide",
-    compute=computed,
     options=(
         Option("realizations", int, "Search at this many draws", sets="tune.realizations"),
         Option("seed", int, "Search with this seed", sets="tune.seed"),
@@ -259,15 +259,6 @@ STUDY = Study(
         Option("exhaustive", bool, "Run a grid of 41 x 41 gains as well", default=False),
     ),
     python="tune",
-    call="drillctl.studies.tune.compute:tune",
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
-    checks=checks,
-    notes=notes,
-    files=files,
-    failure=failure,
-    check=check,
     recipes=(Recipe("tune", "the tuning of the gains", not_applicable, order=110),),
     sections=(Section("tuning", "Tuned gains and their certificate", ("tune",), order=90),),
 )  # fmt: skip

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -29,10 +29,8 @@ from drillctl.studies.tune.tuned import Tuned, by_path, tuned_parameters
 
 
 @dataclass(frozen=True, eq=False)
-class Tune(Result):
+class Tune(Result, kind="tune"):
     """Gains with their certificate."""
-
-    kind: ClassVar[str] = "tune"
 
     design: Design = label(means="as it was given")
     tuning: Tuning = label(means="gains of the search, at its own realizations")

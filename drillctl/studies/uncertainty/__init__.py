@@ -307,10 +307,10 @@ def no_indices(design: Design) -> str:
 
 
 STUDY = Study(
+    module=__name__,
     name="uncertainty",
     help="Map J1 over draws: regions by probability, best cells",
     group="Decide",
-    compute=computed,
     options=(
         Option("realizations", int, "Use this many draws; more than before extend a run",
                sets="uncertainty.realizations"),
@@ -331,16 +331,7 @@ STUDY = Study(
     ),
     axes=True,
     python="uncertainty",
-    call="drillctl.studies.uncertainty.compute:uncertainty",
     resumes=True,
-    tables=tables,
-    pictures=pictures,
-    remarks=remarks,
-    checks=checks,
-    notes=notes,
-    files=files,
-    growing=growing,
-    check=check,
     recipes=(
         Recipe("setting", "the draws at the current setting", in_batch, at_setting,
                compute=setting, summary=setting_summary, says=setting_remark, order=30),

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,10 +133,8 @@ def look(
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty(Result):
+class Uncertainty(Result, kind="uncertainty"):
     """J1 over a map at every realization of what is uncertain."""
-
-    kind: ClassVar[str] = "uncertainty"
 
     design: Design = label(means="with what is uncertain, named or by default")
     axes: tuple[Axis, ...] = label(means="of the map")
