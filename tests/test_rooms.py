@@ -13,7 +13,7 @@ PACKAGE = Path(drillctl.__file__).parent
 
 # From the ground up. `drillctl/__init__.py` is under all of them: it looks names up when they are
 # asked for, and imports nothing.
-GROUND = ("units", "errors", "progress", "provenance", "registry", "catalog")
+GROUND = ("arrays", "units", "errors", "progress", "provenance", "registry", "catalog")
 ROOMS = (
     "drillctl", "ground", "rig", "design", "store", "linear", "simulation", "ensemble", "plots",
     "studies", "reporting", "cli", "__main__",

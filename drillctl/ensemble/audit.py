@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from drillctl.arrays import Array, Index
 from drillctl.design import Design
 from drillctl.ensemble.grid import Axis, cell_design, shape_of
 from drillctl.errors import SimulationError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.codec import Array, Index, label
+from drillctl.store.codec import label
 
 SEED = 20121  # seed of the choice of cells: the same map is audited at the same cells
 WORST_ALLOWED = 1e-2  # relative difference in J1 above which the verdict is `check`

@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array, Index, Mask
 from drillctl.simulation.measures import MEASURES, STATUSES, status_counts
-from drillctl.store.codec import Array, Index, Mask, label
+from drillctl.store.codec import label
 from drillctl.store.tables import Estimate, open_estimate
 
 Interval = tuple[float, float]

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array, Index
 from drillctl.design import Design
 from drillctl.ensemble.cases import Runs, resampled_draws
 from drillctl.ensemble.grid import SHARED
@@ -28,7 +29,6 @@ from drillctl.rig.weight_on_bit import AlarmWeight, ConstantWeight
 from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
-from drillctl.store.codec import Array, Index
 
 
 @dataclass(frozen=True, eq=False)

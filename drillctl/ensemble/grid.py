@@ -20,13 +20,14 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array, Index
 from drillctl.design import Design, parameter
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
 from drillctl.rig.top_drive.law import tracking
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.simulation.measures import BATCH_MEASURES
-from drillctl.store.codec import Array, Index, documented, label
+from drillctl.store.codec import documented, label
 from drillctl.store.tables import texts
 
 SHARED = (

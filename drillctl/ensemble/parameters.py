@@ -24,12 +24,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from drillctl.arrays import Array
 from drillctl.design import Design, Parameter, parameter
 from drillctl.design.tables import DistributionTable
 from drillctl.design.uncertain_tables import UncertaintyTable
 from drillctl.errors import InputError, nearest
 from drillctl.rig.bit_rock.law import friction_laws
-from drillctl.store.codec import Array, documented, label
+from drillctl.store.codec import documented, label
 
 _PER_COUNTER = 4  # numbers that Philox makes of one state of its counter
 _BITS = 30  # of a Sobol point; of more, SciPy does not skip any

@@ -27,8 +27,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array, Index, Mask
 from drillctl.ensemble.cases import CONFIDENCE, Interval, share_intervals
-from drillctl.store.codec import Array, Index, Mask
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array, Index, Mask
 from drillctl.design import Design
 from drillctl.design.tables import SimulationTable
 from drillctl.design.validation import validated
@@ -32,7 +33,6 @@ from drillctl.ensemble.running import Block, Pieces, Run, Strings, collect, load
 from drillctl.errors import InputError
 from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
-from drillctl.store.codec import Array, Index, Mask
 
 LANES = 2**17  # lanes of a block: some seconds' work at most
 MOST = 4096  # realizations of a block at most

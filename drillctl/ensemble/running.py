@@ -32,13 +32,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array, Index, Mask
 from drillctl.errors import InputError, SimulationError
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.batch import Prepared, run_batch, warm_up
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
-from drillctl.store.codec import Array, Index, Mask
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.ensemble.grid import shape_of
 from drillctl.ensemble.running import Block, Blocks, Job, Make, Pieces, Scheme
 from drillctl.errors import StoreError
@@ -25,7 +26,7 @@ from drillctl.simulation.batch import Prepared
 from drillctl.simulation.measures import MEASURES, STATUSES
 from drillctl.simulation.propagator import StringStep
 from drillctl.simulation.scheme import Scheme as StringScheme
-from drillctl.store.codec import Array, stored_name
+from drillctl.store.codec import stored_name
 from drillctl.store.json_files import picked
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array, Index, Mask
 from drillctl.design import Design
 from drillctl.ensemble import audit as auditing
 from drillctl.ensemble.grid import (
@@ -46,7 +47,7 @@ from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.simulation.batch import CHUNK, Prepared, prepare
 from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES, status_counts
-from drillctl.store.codec import Array, Index, Mask, documented, label
+from drillctl.store.codec import documented, label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 from drillctl.store.tables import texts, write_columns

@@ -21,9 +21,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from drillctl import units
+from drillctl.arrays import Array, ComplexArray, Mask
 from drillctl.design import Design, parameter
 from drillctl.errors import InputError
 from drillctl.linear.ends import BitSide, Ends, Route, ends_of, telling_grid, weight_path
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     import shapely
     import xarray
 
-Array = NDArray[np.float64]
 
 FINEST = 1.0 / 800.0  # longest piece of a curve, over the window
 CLOSE = 1e-3
@@ -180,13 +180,13 @@ def _branches(ends: Ends, slope: float, window: Window) -> tuple[Branch, ...]:
     return tuple(Branch(omega[run], kp[run], ki[run]) for run in _runs(short))
 
 
-def _touches(x: Array) -> NDArray[np.bool_]:
+def _touches(x: Array) -> Mask:
     """Whether the span of neighbouring values meets 0 to 1; never where one is not finite."""
     low, high = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
     return np.asarray((low <= 1.0) & (high >= 0.0))
 
 
-def _runs(linked: NDArray[np.bool_]) -> list[slice]:
+def _runs(linked: Mask) -> list[slice]:
     """Slices of the points that are linked to their next one after another."""
     edges = np.diff(np.concatenate([[False], linked, [False]]).astype(int))
     begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
@@ -226,9 +226,6 @@ def _region(
     stable = margin > slope
     whole = shapely.unary_union([face for face, kept in zip(faces, stable, strict=True) if kept])
     return shapely.MultiPolygon([p for p in shapely.get_parts(whole) if p.area > 0.0])
-
-
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.errors import InputError, nearest
 from drillctl.linear.modal import Expansion
@@ -30,9 +30,6 @@ from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.drillstring import Drillstring, Parts
 from drillctl.rig.drillstring.frequencies import Model, natural_frequencies
 from drillctl.rig.weight_on_bit import FollowingSpeed, RealWeight
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 WAVE_MODES = 40  # modes of a continuum that are computed; there are infinitely many
 BETWEEN = 24  # frequencies between two neighbouring natural frequencies

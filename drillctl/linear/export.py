@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.loop_model import closed_loop, with_slope
@@ -27,7 +28,6 @@ from drillctl.rig.weight_on_bit import PATHS
 if TYPE_CHECKING:
     import control
 
-Array = NDArray[np.float64]
 
 WIDTH = 0.05  # speed (rad/s) over which the regularised friction changes sign
 

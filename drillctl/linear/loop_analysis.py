@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import BitSide, ends_of, weight_path
@@ -21,9 +21,6 @@ from drillctl.linear.slope_margin import slope_margin
 from drillctl.rig.weight_on_bit import PATHS
 from drillctl.store.codec import label
 from drillctl.store.result import Result
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 ROUNDING = 1e-11  # real part of a pole over the largest pole that is rounding
 SPEEDS = np.geomspace(1e-3, 20.0, 401)

@@ -27,17 +27,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray
 from drillctl.linear.ends import BitSide, Ends, telling_grid
 from drillctl.linear.slope_margin import Crossings
 from drillctl.rig.top_drive import TopDriveLaw
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 CLUSTER = np.geomspace(0.03, 1e7, 90)
 """Distances from a pole at which a response is computed, over that of the pole from the axis."""
@@ -249,7 +246,7 @@ def whole_crossings(ends: Ends, drive: TopDriveLaw, bit: BitSide) -> Crossings:
 def weight_delay_margin(ends: Ends, drive: TopDriveLaw, bit: BitSide) -> tuple[float, float | None]:
     """Longest further delay of a moving weight that a stable loop bears."""
 
-    def both(omega: Array) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    def both(omega: Array) -> tuple[ComplexArray, NDArray[np.complex128]]:
         s = 1j * omega
         given = drive.impedance(s)
         return (

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from drillctl.arrays import Array, ComplexArray, Index
 from drillctl.design import Design
 from drillctl.linear.ends import BitSide, WeightPath
 from drillctl.linear.state_space import (
@@ -34,8 +35,6 @@ from drillctl.rig.top_drive.real_drive import MEMORY, respond
 if TYPE_CHECKING:
     import control
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 PADE = 6  # order of the rational function that stands for the delay of a weight path
 HELD_PADE = 3  # the same for the mean delay of a sampled controller, which is short
@@ -280,7 +279,7 @@ def many_loop_poles(
     per_slope = -np.outer(two.b[:, 1], two.c[1])
     base = still - per_ki
 
-    def solve(part: NDArray[np.int64]) -> ComplexArray:
+    def solve(part: Index) -> ComplexArray:
         k, i, d = (x[part, None, None] for x in (kp, ki, slope))
         poles = np.linalg.eigvals(base + k * per_kp + i * per_ki + d * per_slope)
         order = np.argsort(np.abs(poles), axis=1, kind="stable")

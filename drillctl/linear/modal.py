@@ -17,17 +17,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.transmission import EndMobility, FromMobility
 from drillctl.rig.drillstring import Drillstring
 from drillctl.store.codec import label
 from drillctl.store.result import Result
-
-Array = NDArray[np.float64]
-Shape = NDArray[np.complex128]
 
 DIAGONAL = 1e-10
 """Largest off-diagonal entry of a modal damping matrix taken as rounding, over the largest."""
@@ -37,7 +34,7 @@ class Pole(NamedTuple):
     """One pole in the upper half plane, the real axis included."""
 
     value: complex  # of the pole (rad/s)
-    shape: Shape  # shape (nodes,): Angles of the nodes, to a complex factor
+    shape: ComplexArray  # shape (nodes,): Angles of the nodes, to a complex factor
 
 
 def free_free_poles(string: Drillstring) -> list[Pole]:
@@ -266,8 +263,6 @@ def _entry(mode: Mode) -> dict[str, Any]:
     }
     return entry | {"overdamped": True} if mode.overdamped else entry
 
-
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 CHUNK = 256  # frequencies solved at a time where the modes are coupled
 

@@ -7,13 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.rig.drillstring import Drillstring
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complexfloating]
 
 MODES = 4
 """Elastic modes that the observer follows, or all there are: the travel of a wave through the

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import contact
 from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
-
-Array = NDArray[np.float64]
 
 FASTEST = 1e4  # highest speed of the scan (rad/s)
 SCAN = 4000  # speeds at which the balance is evaluated before its zeros are located

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from drillctl.arrays import Array, ComplexArray
 from drillctl.errors import InputError, nearest
 from drillctl.linear.ends import Route, WeightPath, ends_of
 from drillctl.linear.state_space import INPUTS, LOOP_OUTPUTS, OUTPUTS
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
     from drillctl.design import Design
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 Loop = Literal["plant", "open_loop", "closed_loop"]
 
 LOOPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {

@@ -17,16 +17,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from drillctl.arrays import Array, ComplexArray, Index
 from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, telling_grid
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 CHUNK = 256  # gain pairs computed together: their signs on the grid fit the second-level cache
 CANDIDATES = 5
@@ -182,7 +179,7 @@ class _Search:
         drive = np.asarray(kp) - 1j * np.asarray(ki) / omega
         return self.ends.bit_impedance(1j * omega, drive)
 
-    def brackets(self, gains: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def brackets(self, gains: Array) -> tuple[Index, Index]:
         """Pairs of gains and places on the grid after which the reactance changes sign."""
         signs = _features(gains) @ self.product.imag > 0.0
         pair, place = np.nonzero(signs[:, 1:] != signs[:, :-1])
@@ -190,9 +187,7 @@ class _Search:
         zero = signs[pair, place + 1] | (gains[pair, 0] > 0.0) | self.lossy
         return pair[zero], place[zero]
 
-    def lowest(
-        self, gains: Array, pair: NDArray[np.int64], place: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def lowest(self, gains: Array, pair: Index, place: Index) -> tuple[Index, Index]:
         """Of each pair's brackets the `CANDIDATES` of least resistance, as seen on the grid."""
         features = _features(gains)[pair]
         left, right = self._at(features, place), self._at(features, place + 1)
@@ -207,11 +202,11 @@ class _Search:
         kept = (rank < self.candidates) | (place == lowest[pair])
         return pair[kept], place[kept]
 
-    def _at(self, features: Array, place: NDArray[np.int64]) -> ComplexArray:
+    def _at(self, features: Array, place: Index) -> ComplexArray:
         product = np.einsum("pf,fp->p", features, self.product[:, place])
         return np.asarray(product / np.einsum("pf,fp->p", features, self.norm[:, place]))
 
-    def refined(self, place: NDArray[np.int64], gains: Array) -> Array:
+    def refined(self, place: Index, gains: Array) -> Array:
         """Frequencies (rad/s) within brackets at which the reactance is zero."""
         from scipy.optimize import elementwise
 

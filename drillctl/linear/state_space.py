@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.errors import InputError
 from drillctl.rig.drillstring import Drillstring
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from drillctl.design import Design
 
-Array = NDArray[np.float64]
 
 INPUTS = ("top_torque", "bit_torque")  # inputs of the plant (N m); positive bit torque brakes
 OUTPUTS = ("top_speed", "bit_speed", "pipe_torque", "twist")

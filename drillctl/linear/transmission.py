@@ -24,13 +24,10 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray
 from drillctl.rig.drillstring import Drillstring, Parts, Section
 from drillctl.rig.drillstring.frequencies import Model
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 
 class Line(NamedTuple):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.linear.response import FREQUENCIES, refuse_frequencies
 from drillctl.rig.drillstring import Drillstring
@@ -34,9 +35,6 @@ __all__ = [
     "torsional_rectification",
     "z_torque",
 ]
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 
 @dataclass(frozen=True, eq=False)

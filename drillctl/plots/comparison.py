@@ -12,9 +12,9 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import parameter
 from drillctl.ensemble.cases import mean_interval
 from drillctl.errors import InputError, shown
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from drillctl.ensemble.grid import Axis
     from drillctl.studies.compare.compute import ComparedCase, Comparison
 
-Array = NDArray[np.float64]
 
 UNBEATEN = "unbeaten in both"  # legend of the cases that no other beats
 NO_DRAWS = "Each case at its own values, without draws."

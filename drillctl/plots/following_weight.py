@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.plots import style
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from drillctl.studies.advantage.sweeps import DelayLine
     from drillctl.studies.delay.compute import DelayedBenefit, WeightDelay
 
-Array = NDArray[np.float64]
 
 BAND = 0.18  # how much of its colour fills an interval
 MARKS = "osD^vP"  # of gains and policies, with the colours

@@ -17,9 +17,9 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array, ComplexArray
 from drillctl.errors import InputError
 from drillctl.linear.boundary import GainBoundary, RootLocus
 from drillctl.linear.tuning import DriveImpedance
@@ -88,8 +88,6 @@ def _mark(above: Axes, below: Axes, marks: Mapping[str, float] | Sequence[float]
             fontsize=style.SMALL, va="bottom",
         )  # fmt: skip
 
-
-Array = NDArray[np.float64]
 
 GAINS = ("controller.kp", "controller.ki")
 GAIN_UNITS = {"controller.kp": "N*m*s/rad", "controller.ki": "N*m/rad"}
@@ -207,8 +205,6 @@ def shown_gains(kp: Any, ki: Any, system: units.System) -> tuple[Any, Any]:
         units.displayed(ki, GAIN_UNITS["controller.ki"], system)[0],
     )
 
-
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 LINE_APART = 0.035  # least distance between two lines of text, over the height of the window
 LEAST_REACH = 0.02

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import parameter
 from drillctl.errors import InputError, nearest
 from drillctl.linear.boundary import GainBoundary
@@ -23,7 +23,6 @@ from drillctl.plots.style import colours
 if TYPE_CHECKING:
     from drillctl.studies.loop_mapping.compute import LoopMap
 
-Array = NDArray[np.float64]
 
 EMPTY = "#D9D9D9"
 """Cells without a value."""

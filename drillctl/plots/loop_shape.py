@@ -29,6 +29,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray, Mask
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import LoopAnalysis
 from drillctl.linear.loop_model import loop_poles
@@ -36,9 +37,6 @@ from drillctl.linear.response import FrequencyResponse, frequency_response
 from drillctl.plots import style
 from drillctl.plots.loop_gains import GREY
 from drillctl.plots.plant import hertz
-
-Array = NDArray[np.floating[Any]]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 SHADE = "#F3C9A5"
 """Disk of the disk margin: what L may not enter."""
@@ -255,7 +253,9 @@ def _arrows(ax: Axes, frequency: Array, loop: ComplexArray) -> None:
         )  # fmt: skip
 
 
-def _curve(ax: Axes, frequency: Array, loop: ComplexArray, x: Array, y: Array) -> None:
+def _curve(
+    ax: Axes, frequency: Array, loop: ComplexArray, x: NDArray[Any], y: NDArray[Any]
+) -> None:
     """L over rising frequency, thin where its many high modes lie on each other."""
     near = float(frequency[np.argmin(np.abs(1.0 + loop))])
     last = int(np.searchsorted(frequency, LOW * near, side="right"))
@@ -283,7 +283,7 @@ def _on_chart(loop: ComplexArray) -> tuple[Array, Array]:
     return angle, decibel
 
 
-def _outside(frequency: Array, loop: ComplexArray, within: NDArray[np.bool_]) -> str:
+def _outside(frequency: Array, loop: ComplexArray, within: Mask) -> str:
     """How often and how far the curve leaves the picture."""
     if within.all():
         return ""

@@ -16,17 +16,15 @@ from matplotlib.ticker import (
     MultipleLocator,
     NullFormatter,
 )
-from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.modal import Mode, Modes
 from drillctl.linear.response import FrequencyResponse
 from drillctl.plots import style
 from drillctl.rig.bit_rock import BitRockLaw
-
-Array = NDArray[np.float64]
 
 SHOWN = 4  # modes drawn of each boundary condition: more cannot be distinguished
 
@@ -61,7 +59,7 @@ def mode_shapes(
     return figure
 
 
-def _places(result: Modes, system: units.System) -> tuple[NDArray[np.float64], str]:
+def _places(result: Modes, system: units.System) -> tuple[Array, str]:
     """Where the nodes are drawn, and the label of that axis."""
     if result.node_depth[-1] > 0.0:
         depth, unit = units.displayed(result.node_depth, "m", system)
@@ -69,7 +67,7 @@ def _places(result: Modes, system: units.System) -> tuple[NDArray[np.float64], s
     return np.arange(len(result.node_depth), dtype=float), "node, 0 = top drive"
 
 
-def _draw(left: Axes, right: Axes, mode: Mode, place: NDArray[np.float64], number: int) -> None:
+def _draw(left: Axes, right: Axes, mode: Mode, place: Array, number: int) -> None:
     left.plot(mode.shape, place, **style.look(number))
     # Torque is constant along an element: steps, and no more smoothness than there is.
     right.stairs(
@@ -217,7 +215,7 @@ def spoken(name: str) -> str:
     return name.replace("_", " ")
 
 
-def unbroken(response: NDArray[np.complexfloating[Any, Any]]) -> NDArray[np.float64]:
+def unbroken(response: ComplexArray) -> Array:
     """Phase (deg) with a gap where it leaves at one edge and comes back at the other."""
     phase = np.degrees(np.angle(response))
     wraps = np.flatnonzero(np.abs(np.diff(phase)) > 270.0) + 1

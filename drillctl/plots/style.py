@@ -20,9 +20,9 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.errors import InputError
 
 if TYPE_CHECKING:
@@ -148,9 +148,6 @@ def _figure_of(ax: Axes) -> Figure:
     return owner
 
 
-Array = NDArray[np.float64]
-
-
 def colours(low: float, high: float) -> Colormap:
     """A part of viridis: 0.2 to 1 under black lines, 0 to 0.88 for lines on white."""
     from matplotlib import colormaps
@@ -202,8 +199,8 @@ class Plane(NamedTuple):
     figure: Figure  # the whole picture
     ax: Axes  # labelled and titled
     # values of the parameters in the units people read
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Array
+    y: Array
 
 
 def plane(result: Any, ax: Axes | None, height: float, system: units.System, what: str) -> Plane:
@@ -235,7 +232,7 @@ def axis_label(axis: Axis, system: units.System) -> tuple[np.ndarray, str]:
 
 
 def named_values(
-    path: str, unit: str, values: NDArray[np.float64], system: units.System
+    path: str, unit: str, values: Array, system: units.System
 ) -> tuple[np.ndarray, str]:
     """Values of a parameter in the units people read, and the label of their axis."""
     from drillctl.ensemble.grid import Axis

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.plots import style
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def tune_neighbourhood(result: Tune, ax: Axes | None = None, system: units.Syste
 
 
 def _map(
-    result: Tune, figure: Figure, ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64],
+    result: Tune, figure: Figure, ax: Axes, x: Array, y: Array,
     name: str,
 ) -> None:  # fmt: skip
     shares = result.certificate.neighbourhood.probability

@@ -17,13 +17,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.ensemble.probability import INNER, MEDIAN, OUTER, needed
 from drillctl.errors import InputError
 from drillctl.plots import style
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from drillctl.studies import Uncertainty
 
 
@@ -262,7 +261,7 @@ def region_error(
 
 def _panels(
     result: Uncertainty, ax: Sequence[Axes] | None, system: units.System
-) -> tuple[Figure, list[Axes], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Figure, list[Axes], Array, Array]:
     if len(result.axes) != 2:
         raise InputError(f"a map shows 2 parameters, the result has {len(result.axes)}")
     figure, panels = style.panels_or_new(ax, len(result.levels), (4.2, 3.6), (1.0, 0.8))
@@ -286,9 +285,9 @@ def border(probability: float, total: int) -> float:
 
 def _bands(
     panel: Axes,
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    probability: NDArray[np.float64],
+    x: Array,
+    y: Array,
+    probability: Array,
     total: int,
 ) -> None:
     for bound, colour in SHADES.items():
@@ -299,9 +298,9 @@ def _bands(
 
 def _outline(
     panel: Axes,
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    j1: NDArray[np.float64],
+    x: Array,
+    y: Array,
+    j1: Array,
     level: float,
     colour: str,
     width: float,
@@ -310,7 +309,7 @@ def _outline(
         panel.contour(x, y, j1.T, levels=[level], colors=[colour], linewidths=width)
 
 
-def _shown_regions(j1: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+def _shown_regions(j1: Array, level: float) -> Array:
     """J1 of a draw for its outline; a cell that failed is far above any level."""
     return np.nan_to_num(j1, nan=10.0 * level)
 

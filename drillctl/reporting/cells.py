@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl import store, units
+from drillctl.arrays import Array, Index
 from drillctl.design import Design, parameter
 from drillctl.ensemble.grid import Axis, groups, shape_of
 from drillctl.progress import Progress
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from drillctl.reporting.gather import Gathered
     from drillctl.studies import Sweep
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 FILE = "cells.json"
 MOST = 200  # most cells with stored time responses

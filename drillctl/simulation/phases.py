@@ -14,11 +14,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.rig.drillstring import Drillstring
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

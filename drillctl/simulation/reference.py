@@ -15,6 +15,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array, Index
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.linear.observer import observer_of
@@ -24,8 +25,6 @@ from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight, ObservedWeight
 from drillctl.simulation.lanes import start
-
-Array = NDArray[np.float64]
 
 STEPS = 5_000  # steps from one look at an interruption to the next: some milliseconds
 ROOM = 1 << 13  # steps that a tape has room for at first
@@ -77,7 +76,7 @@ class Numbers(NamedTuple):
 
     rig: Any  # one record of `reference_rates.RIG`
     arrays: dict[str, Array]  # what it points to, by the name of the address
-    kept: NDArray[np.int64]  # states that are kept of each step
+    kept: Index  # states that are kept of each step
     sums: Any  # two sums of states, of a bit that is held and of one that is not
     # accelerations of the top by load (rad/s2) and by bit torque, held and free; reaction by load
     # (N m) and per top torque

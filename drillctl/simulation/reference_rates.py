@@ -19,14 +19,12 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.rig.program import Ramp
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.top_drive.real_drive import MEMORY, SAMPLED_MEMORY, respond, respond_held, sample
 from drillctl.simulation.law_calls import call, from_numbers, jitted, on_disk, version
-
-Array = NDArray[np.float64]
 
 compiled = numba.njit(error_model="numpy", fastmath={"contract"}, nogil=True)
 """Decorator of what is part of the solver: products and sums may be fused, nothing else."""

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array, Index
 from drillctl.simulation.reference_rates import (
     BEGIN,
     FIRST,
@@ -25,8 +25,6 @@ from drillctl.simulation.reference_rates import (
     compiled,
     rates_of,
 )
-
-Array = NDArray[np.float64]
 
 STAGES, DENSE_STAGES = 12, 16
 TOGETHER = 4  # stages that a sum takes in at once
@@ -77,7 +75,7 @@ def explicit_dense_output() -> Dense:
     return Dense(weights, np.array([-1.0, 2.0, 0.0, 0.0, 0.0, 0.0]), by_step=True)
 
 
-def _without_zeros(weights: Array) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+def _without_zeros(weights: Array) -> tuple[Array, Index, Index]:
     """Weights that are not zero, the columns they stand in, how many with zeros to fill up."""
     first = np.argsort(weights == 0.0, axis=1, kind="stable")
     count = np.count_nonzero(weights, axis=1)

@@ -15,8 +15,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.simulation.reference_rates import (
     DAMPING,
     FREE_TOP,
@@ -35,8 +35,6 @@ from drillctl.simulation.reference_rates import (
     weight_rates,
 )
 from drillctl.simulation.reference_steps import DENSE_STAGES, Dense
-
-Array = NDArray[np.float64]
 
 STAGES = 8
 GAMMA = 0.21193756319429014

@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation import measures as m
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, stuck_between
 from drillctl.store.codec import label
 from drillctl.store.result import Result
-
-Array = NDArray[np.float64]
 
 FINE = 0.01  # interval (s) on which what is not located is measured, whatever the signals' own
 FEWEST_SAMPLES = 500  # fewest intervals in a run for that; it is finer in a short run

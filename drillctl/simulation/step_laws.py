@@ -7,15 +7,12 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.linear.observer import Observer
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
 from drillctl.simulation.lanes import Start
-
-Array = NDArray[np.float64]
-
 
 INSTANT = 700.0  # exponent of a hoist without lag: nothing is left
 

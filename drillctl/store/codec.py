@@ -35,9 +35,6 @@ from drillctl.store.json_files import read_json, write_json
 if TYPE_CHECKING:
     import xarray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Index = NDArray[np.int64]
 Dataclass = TypeVar("Dataclass", bound=type)
 
 

@@ -18,8 +18,7 @@ from drillctl import units
 from drillctl.store.json_files import write_text
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from drillctl.arrays import Array
 
 NOTHING = "–"  # shown in place of a missing number
 GAIN_OF_WEIGHT = "N*s/rad"  # of a weight on bit per bit speed: read in the unit of the weight
@@ -168,7 +167,7 @@ def write_csv(table: Table, folder: Path) -> None:
     write_text(folder / f"{table.name}.csv", text.getvalue())
 
 
-def texts(values: NDArray[np.float64]) -> list[str]:
+def texts(values: Array) -> list[str]:
     """Numbers in full, as Python writes them; what is undefined is an empty field.
 
     Most of the time of a large table goes into these texts: each different number has one.

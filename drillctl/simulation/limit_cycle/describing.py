@@ -29,16 +29,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq, root
 
+from drillctl.arrays import Array, Mask
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, ends_of
 from drillctl.linear.operating_point import equilibria
 from drillctl.linear.slope_margin import crossings
-
-Array = NDArray[np.float64]
 
 MODES = 3  # lowest crossings that are looked at, unless asked for more
 NODES = 64
@@ -254,7 +253,7 @@ class _FreeMean:
         return bool(by_mean[0] < 0.0 and total < 0.0)
 
 
-def _changes(values: Array) -> NDArray[np.bool_]:
+def _changes(values: Array) -> Mask:
     """Cells of a grid over whose corners a function changes its sign."""
     corners = np.stack([values[:-1, :-1], values[1:, :-1], values[:-1, 1:], values[1:, 1:]]) > 0.0
     return np.asarray(corners.any(axis=0) & ~corners.all(axis=0))

@@ -21,14 +21,12 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.rig.bit_rock import contact
 from drillctl.simulation.phases import slip_phase, stick_phase
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10  # relative and absolute tolerance of the integrator (rad, rad/s)
 LONGEST_STEP = 0.05  # longest step (s): a touch of zero speed shorter than that could go unseen

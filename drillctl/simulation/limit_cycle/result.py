@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.errors import InputError
@@ -24,8 +23,6 @@ from drillctl.simulation.limit_cycle.returns import Returns, judge, long_run
 from drillctl.simulation.limit_cycle.shooting import Orbit
 from drillctl.store.codec import label
 from drillctl.store.result import Result
-
-Array = NDArray[np.float64]
 
 PERIODS = 40  # length of the long simulation in expected periods
 FEWEST_PERIODS = 16

@@ -13,9 +13,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.simulation.lanes import Kind
@@ -24,8 +24,6 @@ from drillctl.simulation.limit_cycle.shooting import Orbit, find_orbit
 from drillctl.simulation.reference import Motion, solve_whole, stuck_between
 from drillctl.simulation.reference_rates import BIT_SPEED, TOP_SPEED
 from drillctl.store.codec import label
-
-Array = NDArray[np.float64]
 
 LAST = 10  # returns that are reported
 PER_CYCLE = 4  # A motion may repeat with every return, or with every second, third or fourth

@@ -17,15 +17,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.simulation.limit_cycle.describing import HarmonicCycle, mean_torque_and_slope
 from drillctl.simulation.limit_cycle.flow import Flow, Leg
 from drillctl.store.codec import label
-
-Array = NDArray[np.float64]
 
 CLOSED = 1e-9
 """An orbit is closed when no angle (rad) and no speed (rad/s) is off by more after a period."""
@@ -68,7 +66,7 @@ class Orbit:
     min_bit_speed: float
     mean_bit_speed: float
     stuck_time: float
-    multipliers: NDArray[np.complex128] = label("number", name="multiplier")
+    multipliers: ComplexArray = label("number", name="multiplier")
     residual: float = label()
     iterations: int = label()
     point: Array = label("coordinate", unit="rad, rad/s", name="orbit_point")
@@ -248,7 +246,7 @@ def _orbit(place: _Place, steps: int) -> Orbit:
     )
 
 
-def _multipliers(matrix: Array) -> NDArray[np.complex128]:
+def _multipliers(matrix: Array) -> ComplexArray:
     values = np.linalg.eigvals(matrix).astype(complex)
     others = np.delete(values, np.argmin(np.abs(values - 1.0)))
     return np.asarray(others[np.argsort(-np.abs(others), kind="stable")])

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import Design, parameter
 from drillctl.design.validation import validated
 from drillctl.ensemble.cases import Estimate, Runs, percentile_estimate
@@ -27,7 +28,7 @@ from drillctl.ensemble.draws import CommonDraws, matching_shift
 from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.progress import Progress
-from drillctl.store.codec import Array, label
+from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.studies.advantage.settings import GAIN, REAL_PATH
 from drillctl.studies.delay.compute import LAWS, following_law

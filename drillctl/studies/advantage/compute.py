@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.ensemble.cases import Estimate
@@ -38,8 +37,6 @@ from drillctl.studies.advantage.sweeps import (
     delay_curve,
     regions,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

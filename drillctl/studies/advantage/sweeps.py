@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array, Mask
 from drillctl.design import Design
 from drillctl.ensemble.cases import Crossing, percentile_estimate, resampled_crossing
 from drillctl.ensemble.draws import CommonDraws
@@ -25,7 +26,7 @@ from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.probability import INNER, OUTER, Area, Scatter, probability_map, region_areas
 from drillctl.ensemble.sweeps import sweep
 from drillctl.progress import Progress
-from drillctl.store.codec import Array, Mask, label
+from drillctl.store.codec import label
 from drillctl.store.json_files import picked, strict
 from drillctl.studies.advantage.cases import (
     DELAY,

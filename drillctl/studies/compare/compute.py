@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import Design, parameter, to_toml
 from drillctl.ensemble.cases import Estimate, Runs
 from drillctl.ensemble.draws import CommonDraws, Failures, equalising_shift, run_draws, start_up
@@ -26,7 +27,7 @@ from drillctl.ensemble.sweeps import Region, Sweep, region, sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress, Within
 from drillctl.simulation import Simulation, simulate
-from drillctl.store.codec import Array, label
+from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.ensemble.cases import (
     Crossing,
@@ -35,7 +36,7 @@ from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.store.codec import Array, label
+from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 from drillctl.studies.delay.settings import LAW, VARIED

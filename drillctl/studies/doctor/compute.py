@@ -15,6 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array, Index
 from drillctl.design import Design
 from drillctl.ensemble import audit as auditing
 from drillctl.ensemble.grid import (
@@ -36,7 +37,7 @@ from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
 from drillctl.simulation.scheme import PROMISES
-from drillctl.store.codec import Array, Index, label
+from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 from drillctl.studies.doctor.scheme import (

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from drillctl.arrays import Array
 from drillctl.design.tables import SimulationTable
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import SampledDrive
@@ -30,7 +31,7 @@ from drillctl.simulation.scheme import (
     _whole_steps,
     bit_inertia,
 )
-from drillctl.store.codec import Array, label
+from drillctl.store.codec import label
 
 SHORTENED = 1e-3
 """Share by which a step must be shorter than its bound for whole steps to be the reason."""

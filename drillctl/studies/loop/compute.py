@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl import plots
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.ensemble.grid import axes_of
 from drillctl.errors import InputError
@@ -21,7 +22,7 @@ from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.response import FrequencyResponse, frequency_response, telling_frequencies
 from drillctl.linear.tuning import drive_impedance, stick_slip_frequency
 from drillctl.progress import Progress
-from drillctl.store.codec import Array, label
+from drillctl.store.codec import label
 from drillctl.studies.base import Picture
 from drillctl.studies.loop_mapping.compute import LoopMap, loop_map
 

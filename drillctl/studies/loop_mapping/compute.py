@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray, Mask
 from drillctl.design import Design
 from drillctl.ensemble.grid import (
     Axis,
@@ -26,7 +26,7 @@ from drillctl.linear.loop_margins import peak_sensitivities
 from drillctl.linear.loop_model import many_loop_poles
 from drillctl.progress import SILENT, Progress
 from drillctl.rig.drillstring.frequencies import natural_frequencies
-from drillctl.store.codec import Array, Mask, label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 from drillctl.studies.three_regions.compute import gains_of, slopes_tolerated, steady_drilling
 
@@ -181,7 +181,7 @@ def _of_poles(group: Group, slope: Array, stable: Mask, wanted: set[str]) -> dic
     return results
 
 
-def _low_damping(group: Group, poles: NDArray[np.complexfloating[Any, Any]]) -> Array:
+def _low_damping(group: Group, poles: ComplexArray) -> Array:
     """Least damping ratio of the poles under the middle between first and second mode."""
     parts = group.design.string.parts
     held = natural_frequencies(parts, "finite-elements", 2, top_held=True)

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.design.parts import weight_moves
 from drillctl.ensemble.grid import Axis, axes_of, other_axes, span
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.codec import Array, label
+from drillctl.store.codec import label
 from drillctl.store.result import Result
 
 WIDTHS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from drillctl.arrays import Array, Mask
 from drillctl.design import Design
 from drillctl.ensemble.grid import (
     Axis,
@@ -37,7 +38,7 @@ from drillctl.progress import SILENT, Progress
 from drillctl.simulation.batch import Prepared, prepare, trace
 from drillctl.simulation.lanes import Kind, Lanes
 from drillctl.simulation.measures import NARROW_BAND, STATUSES, WINDOW
-from drillctl.store.codec import Array, Mask, label
+from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import Design, parameter
 from drillctl.ensemble.audit import Audit, choose_cells, references
 from drillctl.ensemble.cases import Interval, share_interval
@@ -33,7 +34,7 @@ from drillctl.ensemble.grid import Axis
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
-from drillctl.store.codec import Array, label
+from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.studies.tune.problem import GainProblem, GainRuns, Point, rank_weights
 from drillctl.studies.tune.tuned import Tuned

@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from drillctl.arrays import Array
 from drillctl.design import Design, load, parameter
 from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
-from drillctl.store.codec import Array, label
+from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 from drillctl.studies.tune.certificate import Certificate, FreshDraws, FreshRuns, certified

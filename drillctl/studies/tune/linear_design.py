@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import tolerated_slope
-from drillctl.store.codec import Array, documented, label
+from drillctl.store.codec import documented, label
 from drillctl.store.json_files import picked, strict
 from drillctl.studies.tune.linear_nlp import PRICE, LinearProgram
 from drillctl.studies.tune.loops import least_seen, loops_of, refuse_not_linear

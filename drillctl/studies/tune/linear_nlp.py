@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from drillctl.store.codec import Array
+from drillctl.arrays import Array
 from drillctl.studies.tune.loops import (
     TERMS,
     WITHIN,

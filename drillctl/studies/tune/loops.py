@@ -25,15 +25,14 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray, Index
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, WeightPath, ends_of, telling_grid, weight_path
 from drillctl.linear.loop_margins import TURNS
 from drillctl.linear.operating_point import at_speed
 from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
-from drillctl.store.codec import Array, Index
 from drillctl.studies.tune.tuned import (
     WEIGHT_KEYS,
     StringNumbers,
@@ -43,8 +42,6 @@ from drillctl.studies.tune.tuned import (
     middle,
     string_numbers,
 )
-
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 TERMS = 16  # terms of the power series within a circle
 WITHIN = 0.6

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from drillctl.arrays import Array, Index
 from drillctl.design import Design, parameter
 from drillctl.ensemble.draws import DrawnGroup, Failures, drawn_lanes
 from drillctl.ensemble.parameters import draw
@@ -33,7 +34,6 @@ from drillctl.errors import InputError
 from drillctl.linear.operating_point import at_speed
 from drillctl.simulation.batch import Prepared, prepare, trace
 from drillctl.simulation.lanes import Lanes
-from drillctl.store.codec import Array, Index
 from drillctl.studies.tune.loops import loops_of, refuse_not_linear
 from drillctl.studies.tune.requirements import Loops
 from drillctl.studies.tune.settings import TuneTable

@@ -8,19 +8,16 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drillctl.arrays import Array, ComplexArray
 from drillctl.linear.ends import BitSide
 from drillctl.linear.loop_analysis import ROUNDING
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.rig.drillstring.frequencies import natural_frequencies
-from drillctl.store.codec import Array
 from drillctl.studies.tune.loops import Crossing, Loop, chain, crossings_of, slope_margin_of
 from drillctl.studies.tune.settings import TuneConstraintsTable
 from drillctl.studies.tune.tuned import Tuned, by_path, put
-
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 PEAKS = 6  # peaks of a sensitivity, and delays, that are kept: the worst
 

@@ -27,10 +27,10 @@ from typing import Any
 
 import numpy as np
 
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.store.codec import Array
 from drillctl.store.json_files import picked
 from drillctl.studies.tune.linear_design import linear_design
 from drillctl.studies.tune.problem import GainProblem, Point

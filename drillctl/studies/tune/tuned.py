@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import Design, parameter, to_toml
 from drillctl.ensemble.parameters import Draws
 from drillctl.errors import InputError, nearest
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive.law import StringNumbers, drive_laws, tracking
-from drillctl.store.codec import Array
 from drillctl.store.json_files import write_json, write_text
 from drillctl.studies.tune.settings import RangeTable
 

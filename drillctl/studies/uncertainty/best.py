@@ -23,10 +23,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from drillctl.arrays import Array, Mask
 from drillctl.ensemble.cases import CONFIDENCE, mean_interval, share_interval
 from drillctl.ensemble.probability import Scatter, needed
 from drillctl.errors import InputError
-from drillctl.store.codec import Array, Mask
 
 FEWEST_BEYOND = 10.0 - 1e-9
 """Realizations that are to be expected beyond a quantile for its error to follow from them."""

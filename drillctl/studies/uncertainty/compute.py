@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.design import Design, parameter
 from drillctl.design.uncertain_tables import SensitivityTable
 from drillctl.ensemble import audit as auditing
@@ -24,7 +25,6 @@ from drillctl.ensemble.storing import Store, in_memory
 from drillctl.ensemble.sweeps import kept_measures, sweep
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
-from drillctl.store.codec import Array
 from drillctl.studies.uncertainty import sensitivity as indices
 from drillctl.studies.uncertainty.result import (
     Look,

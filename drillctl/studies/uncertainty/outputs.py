@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl import units
+from drillctl.arrays import Array
 from drillctl.ensemble.grid import over_axes
 from drillctl.ensemble.realizations import Realizations
 from drillctl.ensemble.running import Block
 from drillctl.ensemble.storing import FILES, ZarrBlocks, disk_errors
-from drillctl.store.codec import TREE, Array, encoded, stored_name
+from drillctl.store.codec import TREE, encoded, stored_name
 from drillctl.store.json_files import write_json
 from drillctl.store.tables import texts, write_columns
 

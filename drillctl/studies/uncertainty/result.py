@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
+from drillctl.arrays import Array, Mask
 from drillctl.design import Design
 from drillctl.design.uncertain_tables import UntilTable
 from drillctl.ensemble.audit import Audit, unaudited
@@ -38,7 +39,7 @@ from drillctl.ensemble.sweeps import Region, outline, region
 from drillctl.errors import InputError
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import MEASURES, STATUSES, status_counts
-from drillctl.store.codec import Array, Mask, label
+from drillctl.store.codec import label
 from drillctl.store.folder import Growing, growing_realizations
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result

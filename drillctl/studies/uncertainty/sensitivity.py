@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.ensemble.cases import CONFIDENCE
 from drillctl.ensemble.parameters import uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.simulation.measures import STATUSES
-from drillctl.store.codec import Array, label
+from drillctl.store.codec import label
 from drillctl.store.json_files import picked, strict
 from drillctl.studies.uncertainty.best import NEEDS_FULL
 
