@@ -194,14 +194,15 @@ def _run(
 
     rig, state = numbers.rig, numbers.state
     stiff = is_stiff(numbers) if stiff is None else stiff
-    work, method = r.work_for(len(state)), r.method_for(stiff, design.string.nodes, len(state))
+    work = r.work_for(len(state))
+    method, solver = r.method_for(stiff, design.string.nodes, len(state))
     clock = _clock(design, numbers, tolerance)
     r.begin(rig, clock, work, state)
-    shown, ended = 0, r.advance(rig, method, clock, work, numbers.sums, state, 0)
+    shown, ended = 0, r.advance(rig, method, solver, clock, work, numbers.sums, state, 0)
     progress.begin("simulated seconds", math.ceil(clock.duration))
     while ended == r.MORE:
         clock = _with_room(numbers, clock)
-        ended = r.advance(rig, method, clock, work, numbers.sums, state, STEPS)
+        ended = r.advance(rig, method, solver, clock, work, numbers.sums, state, STEPS)
         progress.advance(int(clock.now[r.TIME]) - shown)
         shown = int(clock.now[r.TIME])
     time, count = float(clock.now[r.TIME]), clock.count

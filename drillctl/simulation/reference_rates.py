@@ -61,7 +61,7 @@ WHOLE_NUMBERS = (
     "damped", "coupled", "full",  # damping at all; M more than a diagonal; C no band
     "drive_kind", "drive_torque", "rock_torque", "static_torque", "set_valued",
     "weight_kind", "weight",  # addresses of `law_calls` among them
-    "rates", "margin", "decision",  # addresses of functions that are compiled by themselves
+    "rates", "margin", "decision", "weighing",  # addresses of what is compiled by itself
     "bands", "full_damping", "laws", "observer", "begin", "tape",  # addresses of arrays
     "components", "steps",  # kept of each step; on the tape
 )  # fmt: skip
@@ -135,6 +135,13 @@ def memory_of_weight(rig: Any, state: Any) -> Any:
 
 
 @compiled
+def copy(to: Any, numbers: Any) -> None:
+    """Copy numbers; numba takes a tenth of the time to compile this that a slice would take."""
+    for i in range(len(to)):
+        to[i] = numbers[i]
+
+
+@compiled
 def bit_speed(rig: Any, state: Any) -> float:
     """Absolute speed of the bit (rad/s)."""
     return state[2 * rig.nodes - 1] + rig.set_speed
@@ -151,6 +158,68 @@ def pipe_torque(rig: Any, state: Any) -> float:
     """Torque of the element next to the bit (N m), its stiffness times its twist."""
     n = rig.nodes
     return band(rig, STIFFNESS)[n - 2] * (state[n - 2] - state[n - 1])
+
+
+# What is compiled by itself.
+
+
+def by_address(field: str, numbers: tuple[Any, ...], arrays: int) -> Any:
+    """A call of the function whose address a rig holds: of numbers, then of states.
+
+    What is called so is compiled once by itself, and not into each place that calls it.
+    """
+    place = dict(RIG.fields or {})[field][1]
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        whole, byte = ir.IntType(64), ir.IntType(8)
+        record = builder.bitcast(arguments[0], byte.as_pointer())
+        spot = builder.gep(record, [ir.Constant(whole, place)])
+        address = builder.load(builder.bitcast(spot, whole.as_pointer()))
+        passed = [record, *arguments[1 : 1 + len(numbers)]]
+        for kind, array in zip(
+            signature.args[1 + len(numbers) :], arguments[1 + len(numbers) :], strict=True
+        ):
+            passed.append(context.make_array(kind)(context, builder, array).data)
+        kind = ir.FunctionType(ir.DoubleType(), [value.type for value in passed])
+        return builder.call(builder.inttoptr(address, kind.as_pointer()), passed)
+
+    names = [f"a{k}" for k in range(1 + len(numbers) + arrays)]
+    scope: dict[str, Any] = {"types": types, "generate": generate, "numbers": numbers}
+    exec(
+        f"def asked(context, {', '.join(names)}):\n"
+        f"    return types.float64({names[0]}, *numbers, "
+        f"{', '.join(names[1 + len(numbers) :])}), generate",
+        scope,
+    )
+    return intrinsic(scope["asked"])
+
+
+def callable_at(function: Any, numbers: tuple[Any, ...], arrays: int) -> int:
+    """Address of a function of a rig, numbers and states, compiled by itself."""
+    record, doubles = types.CPointer(numba.from_dtype(RIG)), types.CPointer(types.float64)
+    given = [f"n{k}" for k in range(len(numbers))]
+    states = [f"s{k}" for k in range(arrays)]
+    name = f"{function.__name__.strip('_')}_{version()}"
+    scope = {"__name__": __name__, "carray": numba.carray, "function": function}
+    views = ", ".join(f"carray({state}, rig.states)" for state in states)
+    text = (
+        f"def {name}(pointer, {', '.join(given + states)}):\n"
+        f"    rig = carray(pointer, 1)[0]\n"
+        f"    return float(function(rig, {', '.join(given)}, {views}))\n"
+    )
+    exec(compile(text, __file__, "exec"), scope)
+    signature = types.float64(record, *numbers, *[doubles] * arrays)
+    made = numba.cfunc(signature, cache=True, error_model="numpy", fastmath={"contract"})
+    return _kept(made(scope[name]))
+
+
+_alive: list[Any] = []
+
+
+def _kept(function: Any) -> int:
+    """Address of a compiled function, which stays while the process lives."""
+    _alive.append(function)
+    return int(function.address)
 
 
 # The string.
@@ -334,9 +403,14 @@ def _asked(rig: Any, time: float, state: Any) -> float:
     return call(rig.weight, law(rig, WEIGHT), seen, nominal, 0.0, 0.0)
 
 
+TIME_AND_SPEED = (types.float64, types.float64)
+weight = by_address("weighing", TIME_AND_SPEED, 1)
+"""Weight on bit (N) at a time (s) and a bit speed in its own direction (rad/s), of a state."""
+
+
 @compiled
-def weight(rig: Any, time: float, state: Any, speed: float) -> float:
-    """Weight on bit (N) at a bit speed in its own direction (rad/s)."""
+def weight_in_place(rig: Any, time: float, speed: float, state: Any) -> float:
+    """What `weight` calls."""
     if rig.weight_kind == AT_ONCE:
         present = law(rig, PRESENT)
         present[0] = _nominal(rig, time)
@@ -375,9 +449,9 @@ def begin_weight(rig: Any, state: Any) -> None:
     memory[count - 2] = 1.0
     if rig.weight_kind != ALARMED:
         memory[count - 2] = _signal(rig, memory, bit_speed(rig, state))
-    begin[:] = state
+    copy(begin, state)
     memory[count - 1] = _asked(rig, 0.0, state)
-    begin[:] = state
+    copy(begin, state)
 
 
 @compiled
@@ -424,14 +498,14 @@ def friction(rig: Any, time: float, state: Any, speed: float) -> float:
 
     Continued smoothly past zero speed, so that the event can be located that ends the phase.
     """
-    load = weight(rig, time, state, speed)
+    load = weight(rig, time, speed, state)
     return call(rig.rock_torque, _rock(rig, time), load, speed, 0.0, 0.0)
 
 
 @compiled
 def static_torque(rig: Any, time: float, state: Any) -> float:
     """Largest torque on a bit at rest (N m)."""
-    load = weight(rig, time, state, 0.0)
+    load = weight(rig, time, 0.0, state)
     return call(rig.static_torque, _rock(rig, time), load, 0.0, 0.0, 0.0)
 
 
@@ -521,65 +595,6 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
     if rig.weight_states:
         weight_rates(rig, time, state, top_torque, rates)
     return bit_torque
-
-
-def by_address(field: str, numbers: tuple[Any, ...], arrays: int) -> Any:
-    """A call of the function whose address a rig holds: of numbers, then of states.
-
-    What is called so is compiled once by itself, and not into each place that calls it.
-    """
-    place = dict(RIG.fields or {})[field][1]
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        whole, byte = ir.IntType(64), ir.IntType(8)
-        record = builder.bitcast(arguments[0], byte.as_pointer())
-        spot = builder.gep(record, [ir.Constant(whole, place)])
-        address = builder.load(builder.bitcast(spot, whole.as_pointer()))
-        passed = [record, *arguments[1 : 1 + len(numbers)]]
-        for kind, array in zip(
-            signature.args[1 + len(numbers) :], arguments[1 + len(numbers) :], strict=True
-        ):
-            passed.append(context.make_array(kind)(context, builder, array).data)
-        kind = ir.FunctionType(ir.DoubleType(), [value.type for value in passed])
-        return builder.call(builder.inttoptr(address, kind.as_pointer()), passed)
-
-    names = [f"a{k}" for k in range(1 + len(numbers) + arrays)]
-    scope: dict[str, Any] = {"types": types, "generate": generate, "numbers": numbers}
-    exec(
-        f"def asked(context, {', '.join(names)}):\n"
-        f"    return types.float64({names[0]}, *numbers, "
-        f"{', '.join(names[1 + len(numbers) :])}), generate",
-        scope,
-    )
-    return intrinsic(scope["asked"])
-
-
-def callable_at(function: Any, numbers: tuple[Any, ...], arrays: int) -> int:
-    """Address of a function of a rig, numbers and states, compiled by itself."""
-    record, doubles = types.CPointer(numba.from_dtype(RIG)), types.CPointer(types.float64)
-    given = [f"n{k}" for k in range(len(numbers))]
-    states = [f"s{k}" for k in range(arrays)]
-    name = f"{function.__name__.strip('_')}_{version()}"
-    scope = {"__name__": __name__, "carray": numba.carray, "function": function}
-    views = ", ".join(f"carray({state}, rig.states)" for state in states)
-    text = (
-        f"def {name}(pointer, {', '.join(given + states)}):\n"
-        f"    rig = carray(pointer, 1)[0]\n"
-        f"    return float(function(rig, {', '.join(given)}, {views}))\n"
-    )
-    exec(compile(text, __file__, "exec"), scope)
-    signature = types.float64(record, *numbers, *[doubles] * arrays)
-    made = numba.cfunc(signature, cache=True, error_model="numpy", fastmath={"contract"})
-    return _kept(made(scope[name]))
-
-
-_alive: list[Any] = []
-
-
-def _kept(function: Any) -> int:
-    """Address of a compiled function, which stays while the process lives."""
-    _alive.append(function)
-    return int(function.address)
 
 
 TIME_AND_PHASE = (types.float64, types.int64)

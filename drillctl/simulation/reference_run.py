@@ -36,12 +36,14 @@ from drillctl.simulation.reference_rates import (
     SAMPLED,
     STUCK,
     TIME_AND_PHASE,
+    TIME_AND_SPEED,
     WINDOW,
     begin_weight,
     bit_speed,
     by_address,
     callable_at,
     compiled,
+    copy,
     friction,
     is_held,
     law,
@@ -54,6 +56,7 @@ from drillctl.simulation.reference_rates import (
     slope_on_tape,
     static_torque,
     tape_row,
+    weight_in_place,
 )
 from drillctl.simulation.reference_steps import (
     DENSE_STAGES,
@@ -172,89 +175,37 @@ def _edge_margins(
 
 
 @compiled
-def _holding(rig: Any, trial: Any, time: float, state: Any) -> float:
-    """Torque that keeps the bit at its speed (N m)."""
-    return rates_of(rig, time, STUCK, state, trial)
+def _printed_phase(rig: Any, unused: Any, time: float, phase: int, state: Any) -> int:
+    """The phase of a bit under the printed law: by its speed, and at an edge by its margins.
 
-
-@compiled
-def _within(rig: Any, trial: Any, time: float, state: Any) -> int:
-    """Equation 3 or 4: by the pipe's torque in a moment, as now it may be at its limit."""
-    rates_of(rig, time, CREEPING, state, trial)
-    for i in range(len(state)):
-        trial[i] = state[i] + AHEAD * trial[i]
-    return PUSHED if _overload(rig, time + AHEAD, trial) > 0.0 else CREEPING
-
-
-@compiled
-def _at_edge(rig: Any, trial: Any, time: float, state: Any, side: int) -> int:
-    """Phase of a bit at an edge: out of the tolerance, into it, or along the edge."""
-    holding = _holding(rig, trial, time, state)
-    outward, inward = _edge_margins(rig, time, state, side, holding)
-    if outward < 0.0:
-        return side
-    if inward < 0.0:
-        return _within(rig, trial, time, state)
-    return FORWARD_EDGE if side == 1 else BACKWARD_EDGE
-
-
-@compiled
-def _printed_phase(rig: Any, trial: Any, time: float, state: Any) -> int:
-    for side in (1, -1):
-        beyond = _beyond(rig, state, side)
-        if beyond > 0.0:
+    From an edge a bit goes to where it left it, be it by rounding alone; at an edge that it comes
+    to it stays if both margins keep it.
+    """
+    side = _side(phase) if phase >= FORWARD_EDGE else 0
+    for other in (1, -1):
+        beyond = _beyond(rig, state, other)
+        if side == 0 and beyond > 0.0:
+            return other
+        if side == 0 and beyond == 0.0:
+            side = other
+    if side != 0:
+        holding = rates_of(rig, time, STUCK, state, unused)
+        outward, inward = _edge_margins(rig, time, state, side, holding)
+        if phase >= FORWARD_EDGE:
+            if outward <= inward:
+                return side
+        elif outward < 0.0:
             return side
-        if beyond == 0.0:
-            return _at_edge(rig, trial, time, state, side)
-    return _within(rig, trial, time, state)
+        elif inward >= 0.0:
+            return FORWARD_EDGE if side == 1 else BACKWARD_EDGE
+    # Equation 3 or 4: by the pipe's torque in a moment, as now it may be at its limit.
+    rates_of(rig, time, CREEPING, state, unused)
+    for i in range(len(state)):
+        unused[i] = state[i] + AHEAD * unused[i]
+    return PUSHED if _overload(rig, time + AHEAD, unused) > 0.0 else CREEPING
 
 
 # From phase to phase.
-
-
-@compiled
-def _loose(rig: Any, trial: Any, time: float, state: Any, slack: float) -> int:
-    """The direction in which a bit at rest breaks loose, or 0 while the rock can hold it."""
-    holding = _holding(rig, trial, time, state)
-    if abs(holding) <= static_torque(rig, time, state) * slack:
-        return STUCK
-    return 1 if holding > 0.0 else -1
-
-
-@compiled
-def first_phase(rig: Any, trial: Any, time: float, state: Any) -> int:
-    """Phase at the very start; under a smooth law always +1."""
-    if rig.tolerance > 0.0:
-        return _printed_phase(rig, trial, time, state)
-    speed = bit_speed(rig, state)
-    if not rig.set_valued or speed > 0.0:
-        return 1
-    return -1 if speed < 0.0 else _loose(rig, trial, time, state, 1.0)
-
-
-@compiled
-def _next_phase(rig: Any, trial: Any, time: float, phase: int, state: Any) -> int:
-    """Phase after one that ended by itself."""
-    if phase >= FORWARD_EDGE:
-        side = _side(phase)
-        holding = _holding(rig, trial, time, state)
-        outward, inward = _edge_margins(rig, time, state, side, holding)
-        return side if outward <= inward else _within(rig, trial, time, state)
-    if rig.tolerance > 0.0:
-        return _printed_phase(rig, trial, time, state)
-    if phase == STUCK:
-        return 1 if _holding(rig, trial, time, state) > 0.0 else -1
-    return _loose(rig, trial, time, state, 1.0)
-
-
-@compiled
-def _phase_after_stop(rig: Any, trial: Any, time: float, phase: int, state: Any) -> int:
-    """Phase after a stop: a stuck bit may be loose at once, by a jump of weight or torque."""
-    if abs(phase) == 1:
-        return phase
-    if rig.tolerance > 0.0:
-        return _printed_phase(rig, trial, time, state)
-    return _loose(rig, trial, time, state, 1.0 + 1e-12)
 
 
 @compiled
@@ -346,17 +297,33 @@ def _margin(rig: Any, time: float, phase: int, which: int, torque: float, state:
 
 @compiled
 def _decide(rig: Any, time: float, phase: int, what: int, state: Any, unused: Any) -> int:
-    """What happens between two pieces; returns the phase that follows."""
-    if what == BEGIN_RUN:
-        if rig.weight_kind != AT_ONCE:
-            begin_weight(rig, state)
+    """What happens between two pieces; returns the phase that follows.
+
+    A bit that came to rest sticks if the rock can hold it. A bit that was stuck may be loose at
+    once after a stop, by a jump of weight or torque.
+    """
+    if what == BEGIN_RUN and rig.weight_kind != AT_ONCE:
+        begin_weight(rig, state)
+    if what == BY_ITSELF:
+        _put_at_end(rig, time, phase, state)
+    else:
         _stop(rig, time, state)
-        return first_phase(rig, unused, time, state)
-    if what == AT_STOP:
-        _stop(rig, time, state)
-        return _phase_after_stop(rig, unused, time, phase, state)
-    _put_at_end(rig, time, phase, state)
-    return _next_phase(rig, unused, time, phase, state)
+    if what == AT_STOP and abs(phase) == 1:
+        return phase
+    if rig.tolerance > 0.0:
+        return _printed_phase(rig, unused, time, phase if what == BY_ITSELF else 0, state)
+    speed = bit_speed(rig, state)
+    if not rig.set_valued or (what == BEGIN_RUN and speed > 0.0):
+        return 1
+    if what == BEGIN_RUN and speed < 0.0:
+        return -1
+    holding = rates_of(rig, time, STUCK, state, unused)
+    slack = 1.0 + 1e-12 if what == AT_STOP else 1.0
+    if what == BY_ITSELF and phase == STUCK:
+        slack = 0.0
+    if abs(holding) <= static_torque(rig, time, state) * slack:
+        return STUCK
+    return 1 if holding > 0.0 else -1
 
 
 BEGIN_RUN, AT_STOP, BY_ITSELF = range(3)  # what there is to decide
@@ -370,6 +337,7 @@ def addresses() -> dict[str, int]:
     """Where the functions lie that a rig is run with, by the fields of `RIG`."""
     return {
         "rates": callable_at(rates_in_place, TIME_AND_PHASE, 2),
+        "weighing": callable_at(weight_in_place, TIME_AND_SPEED, 1),
         "margin": callable_at(_margin, _MARGIN, 1),
         "decision": callable_at(_decide, _DECISION, 2),
     }
@@ -487,12 +455,12 @@ def _has_room(rig: Any, clock: Any) -> bool:
 
 @compiled
 def _trial(
-    rig: Any, method: Any, clock: Any, work: Any, state: Any, step: float, torque: float
-) -> tuple[float, float]:
+    rig: Any, method: Any, solver: Any, clock: Any, work: Any, state: Any, step: float,
+    torque: float,
+) -> tuple[float, float]:  # fmt: skip
     """One trial step: the bit torque at its end, and its error over the tolerance."""
     time, phase = clock.now[TIME], clock.count[PHASE]
-    if method.stiff:
-        solver = method.solver
+    if solver is not None:
         bit = clock.now[BIT_TORQUE]
         end = stiff_step(
             rig, method.implicit, work, solver, time, step, phase, state, (torque, bit)
@@ -503,19 +471,21 @@ def _trial(
 
 
 @compiled
-def _try_step(rig: Any, method: Any, clock: Any, work: Any, state: Any) -> tuple[float, float]:
+def _try_step(
+    rig: Any, method: Any, solver: Any, clock: Any, work: Any, state: Any
+) -> tuple[float, float]:
     """Take a step within the tolerance; its length, 0 if there is none, and the bit torque."""
     now, phase = clock.now, clock.count[PHASE]
     time, end = now[TIME], now[STOP]
     least = 10.0 * (math.nextafter(time, math.inf) - time)
     length, refused, torque = min(max(now[STEP], least), _longest(phase)), False, 0.0
     power = -1.0 / method.order
-    if method.stiff:
-        torque = linearise(rig, method.solver, time, phase, state, work.stages[0])
-        change_with_time(rig, method.solver, time, length, phase, state, work.stages[0])
+    if solver is not None:
+        torque = linearise(rig, solver, time, phase, state, work.stages[0])
+        change_with_time(rig, solver, time, length, phase, state, work.stages[0])
     while length >= least:
         step = min(length, end - time)
-        bit_torque, error = _trial(rig, method, clock, work, state, step, torque)
+        bit_torque, error = _trial(rig, method, solver, clock, work, state, step, torque)
         if error < 1.0:
             factor = LARGEST if error == 0.0 else min(LARGEST, SAFETY * error**power)
             now[STEP] = step * (min(1.0, factor) if refused else factor)
@@ -531,25 +501,26 @@ def _try_step(rig: Any, method: Any, clock: Any, work: Any, state: Any) -> tuple
 
 @compiled
 def _keep_step(
-    rig: Any, method: Any, clock: Any, work: Any, sums: Any, state: Any, step: float,
+    rig: Any, method: Any, solver: Any, clock: Any, work: Any, sums: Any, state: Any, step: float,
     torque: float,
 ) -> bool:  # fmt: skip
     """Record a step and its events, move on; whether the phase ended by itself."""
     now, phase, last = clock.now, clock.count[PHASE], 2 * rig.nodes - 1
     time = now[TIME]
-    if not method.stiff:
+    if solver is None:
         explicit_dense(rig, method.explicit, work, time, step, phase, state)
     row = tape_row(rig, rig.steps)
     summed = sums[0 if is_held(phase) else 1]
     record(method.dense, work, time, step, state, summed, clock.kept, row)
     rig.steps += 1
     values, until = work.values, 2.0
-    values[:2] = now[MARGINS : MARGINS + 2]
     values[2], values[3] = state[last], work.stages[0, last]
     for which in range(2):
+        values[which] = now[MARGINS + which]
         values[4 + which] = _margin_of(rig, time + step, phase, which, torque, work.after)
     values[6], values[7] = work.after[last], work.stages[STAGES, last]
-    now[MARGINS : MARGINS + 2] = values[4:6]
+    for which in range(2):
+        now[MARGINS + which] = values[4 + which]
     for which in range(4):
         before, after = values[which], values[4 + which]
         if not _happens(which, phase, before, after):
@@ -564,11 +535,11 @@ def _keep_step(
     if until <= 1.0:
         now[TIME] = time + until * step
         state_at(work, state, until, work.trial)
-        state[:] = work.trial
+        copy(state, work.trial)
         return True
     now[TIME] = now[STOP] if step == now[STOP] - time else time + step
-    state[:] = work.after
-    work.stages[0] = work.stages[STAGES]
+    copy(state, work.after)
+    copy(work.stages[0], work.stages[STAGES])
     now[BIT_TORQUE] = torque
     return False
 
@@ -599,7 +570,7 @@ def _note(which: int, clock: Any, row: Any, share: float) -> None:
 
 @on_disk
 def advance(
-    rigs: Any, method: Any, clock: Any, work: Any, sums: Any, state: Any, steps: int
+    rigs: Any, method: Any, solver: Any, clock: Any, work: Any, sums: Any, state: Any, steps: int
 ) -> int:
     """Advance a run by at most so many steps."""
     rig = rigs[0]
@@ -609,10 +580,10 @@ def advance(
             if now[TIME] >= clock.duration:
                 return DONE
             _begin_piece(rig, method, clock, work, state)
-        step, torque = _try_step(rig, method, clock, work, state)
+        step, torque = _try_step(rig, method, solver, clock, work, state)
         if step == 0.0:
             return TOO_SHORT
-        ended = _keep_step(rig, method, clock, work, sums, state, step, torque)
+        ended = _keep_step(rig, method, solver, clock, work, sums, state, step, torque)
         if ended or now[TIME] >= now[STOP]:
             _end_piece(rig, clock, work, state, ended)
         if not math.isfinite(state[0]) or not math.isfinite(state[2 * rig.nodes - 1]):
@@ -633,16 +604,15 @@ def work_for(size: int) -> Work:
 class Method(NamedTuple):
     """How steps are taken."""
 
-    stiff: bool
     order: float  # power of the length of a step that its error goes with
     explicit: Tableau
     implicit: StiffTableau
     dense: Dense
-    solver: StiffWork
 
 
-def method_for(stiff: bool, nodes: int, states: int) -> Method:
-    """Explicit steps, or linearly implicit ones, for a rig."""
-    dense = stiff_dense_output() if stiff else explicit_dense_output()
-    solver = stiff_work(nodes, states)
-    return Method(stiff, 5.0 if stiff else 8.0, tableau(), stiff_tableau(), dense, solver)
+def method_for(stiff: bool, nodes: int, states: int) -> tuple[Method, StiffWork | None]:
+    """Explicit steps, or linearly implicit ones with what they are solved with."""
+    if stiff:
+        method = Method(5.0, tableau(), stiff_tableau(), stiff_dense_output())
+        return method, stiff_work(nodes, states)
+    return Method(8.0, tableau(), stiff_tableau(), explicit_dense_output()), None

@@ -60,5 +60,5 @@ def torques_at(
         if held:
             rock = on_tape(row, sums + 1, share) + ends[2, 0] + ends[2, 1] * torque
         speed = 0.0 if phase == STUCK else abs(bit_speed(rig, state))
-        out[0, i], out[1, i], out[2, i] = torque, weight(rig, moment, state, speed), rock
+        out[0, i], out[1, i], out[2, i] = torque, weight(rig, moment, speed, state), rock
         out[3, i] = phase

@@ -28,6 +28,7 @@ from drillctl.simulation.reference_rates import (
     WORKS,
     band,
     compiled,
+    copy,
     drive_torque,
     is_held,
     rates_of,
@@ -167,7 +168,7 @@ def linearise(rig: Any, solver: Any, time: float, phase: int, state: Any, rates:
     first, drives = 2 * n + WORKS, rig.drive_states
     gain = band(rig, HELD_TOP if held else FREE_TOP)[0]
     moved, out = solver.moved[0], solver.moved[1]
-    moved[:] = state
+    copy(moved, state)
     solver.rates[:] = 0.0
     solver.rock[:] = 0.0
     # The torque of the drive follows from its own acceleration, or is known without it.
@@ -443,7 +444,7 @@ def stiff_step(
     for k in range(STAGES):
         u = stages[1 + k]
         if k == 0:
-            u[:] = stages[0]
+            copy(u, stages[0])
         else:
             for i in range(size):
                 work.trial[i] = state[i]

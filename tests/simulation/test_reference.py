@@ -173,25 +173,24 @@ def test_order_of_stiff_steps(figure):
         numbers = numbers_of(design)
         states = len(numbers.state)
         work = run.work_for(states)
-        method = run.method_for(True, design.string.nodes, states)
-        end = fixed_steps(numbers, method, work, step, round(0.32 / step))
+        method, solver = run.method_for(True, design.string.nodes, states)
+        end = fixed_steps(numbers, method, solver, work, step, round(0.32 / step))
         errors.append(np.abs(end[: len(due)] - due).max())
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     figure("order of the stiff steps", orders[-1])
     assert orders[-1] > 4.8  # of a string that is nearly linear it is 6
 
 
-def fixed_steps(numbers, method, work, step, count):
+def fixed_steps(numbers, method, solver, work, step, count):
     state = numbers.state.copy()
-    _steps(numbers.rig, method, work, state, step, count)
+    _steps(numbers.rig, method, solver, work, state, step, count)
     return state
 
 
 @numba.njit
-def _steps(rigs, method, work, state, step, count):
+def _steps(rigs, method, solver, work, state, step, count):
     for k in range(count):
         rates_of(rigs[0], k * step, 1, state, work.stages[0])
-        solver = method.solver
         torque = linearise(rigs[0], solver, k * step, 1, state, work.stages[0])
         change_with_time(rigs[0], solver, k * step, step, 1, state, work.stages[0])
         rock = slip_torque(rigs[0], k * step, state, 1)
