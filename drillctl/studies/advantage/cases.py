@@ -87,10 +87,8 @@ class Policies(NamedTuple):
 
 
 def policies(design: Design) -> Policies:
-    """The policies of a design's `[advantage]` table.
-
-    A gain that may only be zero is a constant weight: all three are the same then.
-    """
+    """The policies of a design's `[advantage]` table."""
+    # A gain that may only be zero is a constant weight: all three are the same then.
     if design.tables.controller.law != "pi":
         raise InputError(
             f"{design.tables.controller.law!r} is not compared here; allowed: pi",

@@ -305,11 +305,9 @@ def delay_curve(
 def _tuned_anew(
     policy: Policy, optima: Optima, draws: CommonDraws, constant: float, progress: Progress
 ) -> Points:
-    """Gains tuned at each delay of the grid, and closer where the advantage vanishes.
-
-    What is best at one delay is a start for the next. Where the grid has lost the advantage in a
-    step, the small steps into it may carry it over the end: then it is looked for in the next.
-    """
+    """Gains tuned at each delay of the grid, and closer where the advantage vanishes."""
+    # What is best at one delay is a start for the next. Where the grid has lost the advantage in a
+    # step, the small steps into it may carry it over the end: then it is looked for in the next.
     table, tune = policy.design.tables.advantage, policy.design.tables.tune
     results: dict[float, Optimum] = {}
     points: Points = {}
@@ -357,11 +355,9 @@ def _late(policy: Policy, delay: float) -> Policy:
 
 
 def _between(delays: Array, advantage: Array) -> list[float]:
-    """Delays between the two of the grid where an advantage first vanishes.
-
-    It falls off a cliff there, where draws begin to stick: a straight line over a wide step of the
-    grid would put the crossing next to its upper end, whatever the cliff is.
-    """
+    """Delays between the two of the grid where an advantage first vanishes."""
+    # It falls off a cliff there, where draws begin to stick: a straight line over a wide step of
+    # the grid would put the crossing next to its upper end, whatever the cliff is.
     over = np.flatnonzero(advantage <= 0.0)
     if not over.size or over[0] == 0:
         return []

@@ -66,12 +66,10 @@ def long_runs(group: Group) -> Prepared:
 
 
 def ends_from(kind: Kind, lanes: Lanes, operating_speed: Array, prepared: Prepared) -> Ended:
-    """Run every lane from a start and see where it ends.
-
-    A drive without any speed control has no set speed, only a frame: there the operating speed
-    takes its place, also as the speed of the top of a wound-up string. Proportional control
-    alone has a set speed that it never holds, and it cannot be moved: those lanes are traced.
-    """
+    """Run every lane from a start and see where it ends."""
+    # A drive without any speed control has no set speed, only a frame: there the operating speed
+    # takes its place, also as the speed of the top of a wound-up string. Proportional control alone
+    # has a set speed that it never holds, and it cannot be moved: those lanes are traced.
     kp, ki = gains_of(lanes)
     steady = np.isfinite(operating_speed)
     framed = steady & (kp == 0.0) & (ki == 0.0)
@@ -122,11 +120,9 @@ def steady_drilling(design: Design, axes: tuple[Axis, ...], group: Group) -> Ste
 def slopes_tolerated(
     design: Design, axes: tuple[Axis, ...], group: Group, speed: Array
 ) -> SlopeMargins:
-    """Slope margins of the cells of a group that drill steadily at `speed`, shape (lanes,).
-
-    All at once where two gains define the loop, one by one for other drives and for a weight that
-    comes late.
-    """
+    """Slope margins of the cells of a group that drill steadily at `speed`, shape (lanes,)."""
+    # All at once where two gains define the loop, one by one for other drives and for a weight that
+    # comes late.
     lanes = group.lanes
     if group.design.simple_loop:
         return slope_margins(ends_of(group.design.string), *gains_of(lanes))
@@ -202,11 +198,9 @@ class ThreeRegions(Result, kind="regions"):
 
     @property
     def bistable(self) -> Mask:
-        """Locally stable, yet sticking long after a start: two long-time answers from one rig.
-
-        A bit that turns outside the band is no proof: where damping is weak the way there
-        is longer than the horizon. Those cells are `undecided`.
-        """
+        """Locally stable, yet sticking long after a start: two long-time answers from one rig."""
+        # A bit that turns outside the band is no proof: where damping is weak the way there is
+        # longer than the horizon. Those cells are `undecided`.
         return self.locally_stable & self.sticking & ~self.failed
 
     @property

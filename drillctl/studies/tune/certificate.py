@@ -95,11 +95,9 @@ class FreshRuns:
 
 
 def fresh_design(design: Design) -> Design:
-    """The design with the draws of its certificate in place of those of the search.
-
-    They are independent draws, whatever the sampling of the search: the interval is exact for
-    these alone.
-    """
+    """The design with the draws of its certificate in place of those of the search."""
+    # They are independent draws, whatever the sampling of the search: the interval is exact for
+    # these alone.
     table = design.tables.tune
     return design.replace(
         {
@@ -362,11 +360,9 @@ class Certificate:
 
     @property
     def audit_verdict(self) -> str:
-        """`ok` if both solvers put every audited draw on the same side of the level.
-
-        `check` if they do not, or if the reference solver failed; `none` without audited draws.
-        How far two solvers are apart on a draw that sticks to the end says little here.
-        """
+        """`ok` if both solvers put every audited draw on the same side of the level."""
+        # `check` if they do not, or if the reference solver failed; `none` without audited draws.
+        # How far two solvers are apart on a draw that sticks to the end says little here.
         if not len(self.audit.cells):
             return "none"
         fine = np.isfinite(self.audit.reference).all() and self.other_side == 0

@@ -74,10 +74,8 @@ class Tune(Result, kind="tune"):
 
     @property
     def _nearer(self) -> str:
-        """The baseline that keeps the level most often, if more often than the tuned gains.
-
-        The least quantile is blind to the probability where no gains reach the level.
-        """
+        """The baseline that keeps the level most often, if more often than the tuned gains."""
+        # The least quantile is blind to the probability where no gains reach the level.
         run = [one for one in self.baselines if one.runs is not None]
         best = max(run, key=lambda one: one.runs.hits if one.runs else 0, default=None)
         if best is None or best.runs is None or best.runs.hits <= self.certificate.runs.hits:

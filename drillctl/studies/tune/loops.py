@@ -131,12 +131,10 @@ def chain_at(terms: tuple[Any, Any], u: Pair) -> Chain:
 
 
 class Pair:
-    """A complex number whose real and imaginary part are numbers or CasADi symbols.
+    """A complex number whose real and imaginary part are numbers or CasADi symbols."""
 
-    Enough arithmetic for the laws' `impedance(s)` and for `np.exp`, so that the linear design
-    calls the very functions that the rest of the package calls with arrays.
-    """
-
+    # Enough arithmetic for the laws' `impedance(s)` and for `np.exp`, so that the linear design
+    # calls the very functions that the rest of the package calls with arrays.
     __array_priority__ = 2000  # numbers of NumPy leave the operation to this class
 
     def __init__(self, re: Any, im: Any = 0.0) -> None:

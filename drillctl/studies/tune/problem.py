@@ -63,11 +63,10 @@ class Ready:
 
 
 class GainRuns:
-    """Measures of gains at the realizations of a design.
+    """Measures of gains at the realizations of a design."""
 
-    The realizations are the first of one sequence, the same for all gains: what is compared is
-    compared under the same conditions, and more of them begin with the same ones.
-    """
+    # The realizations are the first of one sequence, the same for all gains: what is compared is
+    # compared under the same conditions, and more of them begin with the same ones.
 
     def __init__(
         self, design: Design, tuned: tuple[Tuned, ...], realizations: int, seed: int
@@ -249,10 +248,8 @@ class Objective:
         return tuple(names)
 
     def value(self, measures: Mapping[str, Array], smooth: bool = False) -> Array:
-        """The objective (s), over the last axis of the measures, the realizations.
-
-        A realization without an answer has an infinite J1.
-        """
+        """The objective (s), over the last axis of the measures, the realizations."""
+        # A realization without an answer has an infinite J1.
         table = self.table
         result = self._statistic(measures["j1"], smooth)
         weights = table.weights

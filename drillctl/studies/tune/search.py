@@ -93,12 +93,10 @@ def _merit(point: Point) -> float:
 
 
 def _evolved(problem: GainProblem, points: Array) -> list[Point]:
-    """A population after some generations, the best first.
-
-    Differential evolution (Storn & Price, J. Global Optim. 11 (1997) 341-359), the variant that
-    leans to the best (current-to-best/1): a batch of trials at a time is what the engine likes,
-    and differences within a population lie along the valley that it has settled in.
-    """
+    """A population after some generations, the best first."""
+    # Differential evolution (Storn & Price, J. Global Optim. 11 (1997) 341-359), the variant that
+    # leans to the best (current-to-best/1): a batch of trials at a time is what the engine likes,
+    # and differences within a population lie along the valley that it has settled in.
     random, count = np.random.Generator(np.random.Philox(0)), min(AMONG, len(problem))
     population = problem.points(points, count)
     size, n = len(population), len(problem.tuned)

@@ -47,10 +47,8 @@ class Objective(Protocol):
 
 
 def enough(objective: Objective, count: int) -> bool:
-    """Whether so many realizations give an error by way of the influence function.
-
-    Two have a scatter; of a quantile and a tail some must be expected beyond it.
-    """
+    """Whether so many realizations give an error by way of the influence function."""
+    # Two have a scatter; of a quantile and a tail some must be expected beyond it.
     if isinstance(objective, (Quantile, TailMean)):
         return count * (1.0 - objective.probability) >= FEWEST_BEYOND
     return count > 1
@@ -85,10 +83,8 @@ class Quantile(NamedTuple):
         return ordered[needed(self.probability, len(ordered)) - 1]
 
     def influence(self, j1: Array, ordered: Array) -> Array:
-        """(p - 1[J1 <= q]) times the sparsity, a difference quotient of the order statistics.
-
-        Its width after Bofinger, Austral. J. Stat. 17 (1975) 1-7, for normal tails.
-        """
+        """(p - 1[J1 <= q]) times the sparsity, a difference quotient of the order statistics."""
+        # Its width after Bofinger, Austral. J. Stat. 17 (1975) 1-7, for normal tails.
         from scipy.stats import norm
 
         count, p = len(ordered), self.probability
@@ -101,11 +97,9 @@ class Quantile(NamedTuple):
 
 
 class TailMean(NamedTuple):
-    """The mean of J1 (s) over the worst realizations: conditional value at risk.
+    """The mean of J1 (s) over the worst realizations: conditional value at risk."""
 
-    Rockafellar & Uryasev, J. Risk 2 (2000) 21-41.
-    """
-
+    # Rockafellar & Uryasev, J. Risk 2 (2000) 21-41.
     probability: float = 0.95
 
     @property
@@ -298,10 +292,8 @@ def _interval(
 def quantile_interval(
     ordered: Array, probability: float, bound: float = np.inf
 ) -> tuple[float | None, float | None]:
-    """Interval of a quantile by order statistics, whatever the distribution.
-
-    David & Nagaraja, Order Statistics (2003), section 7.1.
-    """
+    """Interval of a quantile by order statistics, whatever the distribution."""
+    # David & Nagaraja, Order Statistics (2003), section 7.1.
     from scipy.stats import binom
 
     count, tail = len(ordered), 0.5 * (1.0 - CONFIDENCE)
