@@ -65,6 +65,29 @@ def _kernels_are_compiled_once(tmp_path_factory, worker_id):
             return compiled(signature)
 
     run.compile = compile_alone
+    _share_the_reference_solver(shared / "reference")
+
+
+def _share_the_reference_solver(lock):
+    """The same for the reference solver, before its first run."""
+    from fcntl import LOCK_EX, flock
+
+    import drillctl
+    from drillctl.progress import SILENT
+    from drillctl.simulation import reference
+
+    numbers_of = reference.numbers_of
+
+    def compiled_first(design, *kept):
+        reference.numbers_of = numbers_of
+        short = {"simulation.duration": "0.1 s", "simulation.j1_from": "0 s"}
+        paper = drillctl.load("monteiro-trindade-140kn", **short)
+        with lock.open("w") as file:
+            flock(file, LOCK_EX)
+            reference._run(paper, numbers_of(paper), 1e-4, SILENT, None)
+        return numbers_of(design, *kept)
+
+    reference.numbers_of = compiled_first
 
 
 def pytest_addoption(parser):
