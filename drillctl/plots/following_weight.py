@@ -16,7 +16,7 @@ from drillctl.plots import style
 if TYPE_CHECKING:
     from drillctl.ensemble.cases import Crossing
     from drillctl.studies.advantage import Advantage
-    from drillctl.studies.advantage.sweeps import DelayLine
+    from drillctl.studies.advantage.compute import DelayLine
     from drillctl.studies.delay.compute import DelayedBenefit, WeightDelay
 
 

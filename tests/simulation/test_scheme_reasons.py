@@ -13,8 +13,8 @@ from drillctl import catalog
 from drillctl.simulation.batch import Prepared, prepare
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.propagator import string_step
-from drillctl.studies.doctor import scheme as scheme_reasons
-from drillctl.studies.doctor.scheme import explain
+from drillctl.studies.doctor import compute as scheme_reasons
+from drillctl.studies.doctor.compute import explain
 
 PAPER = "monteiro-trindade-140kn"
 

@@ -21,7 +21,7 @@ from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed, ObservedW
 from drillctl.store.tables import NOTHING, write_csv
 from drillctl.store.tables import number as tables_number
 from drillctl.studies.advantage import STUDY
-from drillctl.studies.advantage import sweeps as delays_module
+from drillctl.studies.advantage import compute as delays_module
 from drillctl.studies.advantage.cases import (
     CONSTANT,
     DELAY,
@@ -41,8 +41,7 @@ from drillctl.studies.advantage.cases import (
     optimum_beside,
     policies,
 )
-from drillctl.studies.advantage.compute import advantage
-from drillctl.studies.advantage.sweeps import chart, delay_curve
+from drillctl.studies.advantage.compute import advantage, chart, delay_curve
 from drillctl.studies.compare.compute import compare
 from drillctl.studies.tune.search import search
 

@@ -11,7 +11,7 @@ from drillctl.ensemble import audit
 from drillctl.errors import InputError
 from drillctl.simulation.scheme import PROMISES, Promise
 from drillctl.studies.doctor import compute as examination
-from drillctl.studies.doctor.scheme import ErrorEstimate, errors_of
+from drillctl.studies.doctor.compute import ErrorEstimate, errors_of
 
 PAPER = "monteiro-trindade-140kn"
 GAINS = ("controller.kp=100:1000:9", "controller.ki=20:500:7")

@@ -1,8 +1,8 @@
 """PI against PI with a weight on bit that follows the bit speed, each at its robust optimum.
 
 - `cases.py`: policies, what of them is tuned, and their optima on equal terms, at fresh draws.
-- `sweeps.py`: areas over the gains of the drive, front and map over weights and speeds, delays of
-  the path; `compute.py`: all of it.
+- `compute.py`: areas over the gains of the drive, front and map over weights and speeds, delays of
+  the path; all of it.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from drillctl.studies.base import Picture, Recipe, Requested, Section, Study, in
 
 if TYPE_CHECKING:
     from drillctl.design import Design
-    from drillctl.studies.advantage.compute import Advantage
-    from drillctl.studies.advantage.sweeps import Chart
+    from drillctl.studies.advantage.compute import Advantage, Chart
 
 
 def tables(result: Advantage) -> Iterator[Table]:

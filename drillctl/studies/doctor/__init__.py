@@ -48,7 +48,7 @@ def tables(result: Doctor) -> Iterator[Table]:
 
 
 def _scheme(scheme: dict[str, Any]) -> Table:
-    from drillctl.studies.doctor.scheme import FORMS
+    from drillctl.studies.doctor.compute import FORMS
 
     rows = [["step", f"{1e3 * scheme['step']:.4g} ms", _why(scheme)]]
     for name, step in sorted(scheme["bounds"].items(), key=lambda bound: bound[1]):

@@ -5,10 +5,9 @@ follow from it; `settings.py`: the keys of `[tune]`.
 
 Linear design, for the largest friction-slope margin over a set of loops:
 
-- `loops.py`: the loops that gains must hold for, a string as data, crossings.
-- `requirements.py`: how far requirements are missed at given gains.
-- `linear_nlp.py`: the smooth program near given gains.
-- `linear_design.py`: starts, and the search from each.
+- `loops.py`: the loops that gains must hold for, a string as data, crossings; how far requirements
+  are missed at given gains.
+- `linear_design.py`: starts, the smooth program near given gains, and the search from each.
 
 Nonlinear design, for the least statistic of J1 over realizations:
 

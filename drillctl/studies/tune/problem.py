@@ -34,8 +34,7 @@ from drillctl.errors import InputError
 from drillctl.linear.operating_point import at_speed
 from drillctl.simulation.batch import Prepared, prepare, trace
 from drillctl.simulation.lanes import Lanes
-from drillctl.studies.tune.loops import loops_of, refuse_not_linear
-from drillctl.studies.tune.requirements import Loops
+from drillctl.studies.tune.loops import Loops, loops_of, refuse_not_linear
 from drillctl.studies.tune.settings import TuneTable
 from drillctl.studies.tune.tuned import (
     StringNumbers,

@@ -1,7 +1,7 @@
 """Stability regions under uncertainty: a map at thousands of realizations.
 
-- `compute.py`: from design to result; `result.py`: `Uncertainty`, and how many realizations are
-  enough; `outputs.py`: what is written.
+- `compute.py`: from design to result, and what is drawn on the way; `result.py`: `Uncertainty`, and
+  how many realizations are enough.
 - `best.py`: best cells by several objectives, and those that are no worse beyond doubt;
   `sensitivity.py`: Sobol indices.
 """
@@ -40,8 +40,7 @@ def computed(design: Design, run: Run) -> Uncertainty:
     """The regions, from the blocks that the folder may hold, here or on a cluster."""
     from drillctl.ensemble.running import Cluster, connect
     from drillctl.ensemble.storing import Folder
-    from drillctl.studies.uncertainty.compute import uncertainty
-    from drillctl.studies.uncertainty.outputs import Interim
+    from drillctl.studies.uncertainty.compute import Interim, uncertainty
 
     given: dict[str, Any] = {"progress": run.progress}
     interim = None
@@ -230,7 +229,7 @@ def notes(result: Uncertainty) -> Iterator[str]:
 
 def files(result: Uncertainty, folder: Path) -> None:
     """Cells, draws and contours."""
-    from drillctl.studies.uncertainty.outputs import write_columns_of
+    from drillctl.studies.uncertainty.compute import write_columns_of
 
     write_columns_of(result, folder)
 

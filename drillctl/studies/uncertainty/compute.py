@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from drillctl.design import Design, parameter
 from drillctl.design.uncertain_tables import SensitivityTable
 from drillctl.ensemble import audit as auditing
 from drillctl.ensemble.draws import Failures, beyond_the_table, by_reason
-from drillctl.ensemble.grid import Axis, cell_design, refuse_more_bytes, shape_of
+from drillctl.ensemble.grid import Axis, cell_design, over_axes, refuse_more_bytes, shape_of
 from drillctl.ensemble.parameters import drawing, sampling_of
 from drillctl.ensemble.probability import Scatter
 from drillctl.ensemble.realizations import Realizations
@@ -25,6 +26,7 @@ from drillctl.ensemble.storing import Store, in_memory
 from drillctl.ensemble.sweeps import kept_measures, sweep
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
+from drillctl.store.tables import texts, write_columns
 from drillctl.studies.uncertainty import sensitivity as indices
 from drillctl.studies.uncertainty.result import (
     Look,
@@ -284,3 +286,53 @@ def _cells(design: Design, axes: tuple[Axis, ...], table: SensitivityTable) -> d
             f"{a.path} {a.values[k]:g} {a.unit}".rstrip() for a, k in zip(axes, place, strict=True)
         )
     return results
+
+
+class Interim:
+    """Pictures of what is finished, from time to time."""
+
+    def __init__(self, every: float, path: Path, system: units.System) -> None:
+        self._every, self._path, self._system = every, path, system
+        self._next = time.monotonic() + every
+
+    def __call__(self, so_far: Callable[[], Uncertainty | None]) -> None:
+        """Draw what is finished if it is time."""
+        if time.monotonic() < self._next:
+            return
+        from drillctl import plots
+
+        result = so_far()
+        if result is not None and len(result.axes) == 2:
+            part = self._path.with_suffix(".part.png")
+            plots.probability_map(result, system=self._system).savefig(part)
+            part.replace(self._path)
+        self._next = time.monotonic() + self._every
+
+
+def write_columns_of(result: Uncertainty, folder: Path) -> None:
+    """Write what has many rows (SI): `cells.csv`, `draws.csv`, and `contours.csv` on request."""
+    columns: dict[str, Array] = {}
+    for level, one in result.maps.items():
+        name = f"probability_{level:g}"
+        columns[name] = one.probability
+        columns[f"{name}_low"], columns[f"{name}_high"] = one.interval
+    columns |= {f"j1_{name}": values for name, values in result.known.items()}
+    columns["nominal_j1"] = result.nominal
+    cells = over_axes(result.axes) | {name: texts(v) for name, v in columns.items()}
+    write_columns(folder / "cells.csv", cells)
+    write_columns(folder / "draws.csv", {path: texts(v) for path, v in result.drawn.items()})
+    if result.design.tables.uncertainty.contours:
+        heads = ["level", "realization", "polygon", "ring", *(a.path for a in result.axes)]
+        rows = [[f"{one}" for one in row] for row in _contours(result)]
+        columns_ = zip(*rows, strict=True) if rows else [[] for _ in heads]
+        write_columns(folder / "contours.csv", dict(zip(heads, columns_, strict=True)))
+
+
+def _contours(result: Uncertainty) -> Iterator[tuple[Any, ...]]:
+    for level in result.levels:
+        for number in range(result.realizations):
+            outline = result.contours(level, number)
+            for k, polygon in enumerate(outline.geoms):
+                for ring, line in enumerate((polygon.exterior, *polygon.interiors)):
+                    for x, y in line.coords:
+                        yield level, number, k, ring, x, y

@@ -8,7 +8,7 @@ import drillctl
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_analysis import tolerated_slope
 from drillctl.linear.slope_margin import slope_margin
-from drillctl.studies.tune.linear_nlp import circle_data, constants_of, point_functions
+from drillctl.studies.tune.linear_design import circle_data, constants_of, point_functions
 from drillctl.studies.tune.loops import (
     TERMS,
     WITHIN,
