@@ -112,6 +112,15 @@ class Design:
         return top_drive(self.tables.controller, lambda: self.string)
 
     @cached_property
+    def linear_drive(self) -> TopDriveLaw:
+        """Top-drive law within its limits, which is what a linear loop is closed with."""
+        table = self.tables.controller
+        free = table.drive.unlimited
+        if free == table.drive:
+            return self.top_drive
+        return top_drive(table.model_copy(update={"drive": free}), lambda: self.string)
+
+    @cached_property
     def weight_on_bit(self) -> WeightLaw:
         """Weight-on-bit law."""
         return parts.weight_on_bit(self.tables)
@@ -139,8 +148,8 @@ class Design:
 
     @property
     def simple_drive(self) -> bool:
-        """Whether the drive is ideal: two gains, or a constant torque, describe it."""
-        return isinstance(self.top_drive, (PI, ConstantTorque))
+        """Whether two gains, or a constant torque, describe the drive within its limits."""
+        return isinstance(self.linear_drive, (PI, ConstantTorque))
 
     @property
     def simple_loop(self) -> bool:

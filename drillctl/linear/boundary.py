@@ -298,7 +298,7 @@ def _lowest(design: Design, count: int) -> ComplexArray:
     point = operating_point(design)
     at_once = not isinstance(design.weight_on_bit, PATHS)
     if design.simple_loop:
-        return loop_poles(design.string, *design.top_drive.gains(), point.slope)[:count]
+        return loop_poles(design.string, *design.linear_drive.gains(), point.slope)[:count]
     path = None if at_once else weight_path(design, point.speed)
     return model_poles(design, BitSide(point.slope, path))[:count]
 

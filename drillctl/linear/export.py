@@ -42,14 +42,16 @@ def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearI
     """
     import control
 
-    if not design.simple_drive or isinstance(design.weight_on_bit, PATHS):
+    # A limited drive would be integrated without its limits.
+    ideal = design.top_drive is design.linear_drive and design.simple_drive
+    if not ideal or isinstance(design.weight_on_bit, PATHS):
         raise InputError(
             "takes an ideal drive and a weight that acts at once; use drillctl.simulate", "law"
         )
     if not (0.0 < width < np.inf):
         raise InputError(f"must be more than 0 rad/s, got {width:g}", "width")
     matrices = plant_matrices(design.string)
-    drive, friction = design.top_drive, design.bit_rock
+    drive, friction = design.linear_drive, design.bit_rock
     strings = len(matrices.a)
     top, bit = matrices.c[0], matrices.c[1]
     _, ki = drive.gains()
@@ -122,8 +124,8 @@ def _content(design: Design) -> dict[str, Any]:
         **systems,
         "string": string_matrices,
         "slope": slope,
-        "kp": float(design.top_drive.gains()[0]),
-        "ki": float(design.top_drive.gains()[1]),
+        "kp": float(design.linear_drive.gains()[0]),
+        "ki": float(design.linear_drive.gains()[1]),
         "design": design.name,
     }
 
@@ -134,7 +136,7 @@ Row = tuple[StateMatrices, list[str], tuple[str, ...], tuple[str, ...]]
 
 def _of_gains(design: Design) -> dict[str, Row]:
     """Loops of a drive that two gains tell."""
-    kp, ki = design.top_drive.gains()
+    kp, ki = design.linear_drive.gains()
     states = state_names(design.string.nodes, ki)
     opened = open_loop_matrices(design.string, kp, ki)
     closed = closed_loop_matrices(design.string, kp, ki)

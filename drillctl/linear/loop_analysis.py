@@ -136,7 +136,7 @@ def loop(design: Design) -> LoopAnalysis:
     tolerated, omega = tolerated_slope(design, point.speed)
     # Two gains describe the drive, and a weight that acts at once is in the slope already.
     simple = design.simple_loop
-    gains = design.top_drive.gains()
+    gains = design.linear_drive.gains()
     poles = loop_poles(design.string, *gains, point.slope) if simple else model_poles(design, bit)
     stable = bool(point.slope < tolerated)
     return LoopAnalysis(
@@ -147,7 +147,7 @@ def loop(design: Design) -> LoopAnalysis:
         slope_margin=tolerated,
         deciding_frequency_hz=omega / (2.0 * math.pi),
         continuum_slope_margin=_continuum(design, *gains) if simple else None,
-        margins=margins(ends, design.top_drive, bit, poles) if stable else None,
+        margins=margins(ends, design.linear_drive, bit, poles) if stable else None,
         weight_delay_margin=_delay_margin(design, point) if stable else None,
         critical_speed=critical_speed(design, tolerated) if simple else None,
         critical_weight_on_bit=critical_weight_on_bit(design, tolerated) if simple else None,
@@ -165,13 +165,13 @@ def tolerated_slope(design: Design, speed: float) -> tuple[float, float]:
     ends = ends_of(design.string)
     at_once = not isinstance(design.weight_on_bit, PATHS)
     if design.simple_loop:
-        return slope_margin(ends, *design.top_drive.gains())
+        return slope_margin(ends, *design.linear_drive.gains())
     # A weight that moves at once is in the slope, not in the margin.
     bit = BitSide(0.0, None if at_once else weight_path(design, speed))
     poles = model_poles(design, bit)
     if poles.real.max() >= ROUNDING * np.abs(poles).max():
         return math.nan, math.nan
-    result = whole_crossings(ends, design.top_drive, bit)
+    result = whole_crossings(ends, design.linear_drive, bit)
     over = np.flatnonzero(result.slope > 0.0)
     if len(over) == 0:
         return math.inf, math.nan
@@ -186,7 +186,7 @@ def _delay_margin(design: Design, point: OperatingPoint) -> float | None:
     held = point.slope
     if design.weight_on_bit.moves:  # its part in the slope is the path's here
         held += path.gain
-    return weight_delay_margin(ends_of(design.string), design.top_drive, BitSide(held, path))[0]
+    return weight_delay_margin(ends_of(design.string), design.linear_drive, BitSide(held, path))[0]
 
 
 def _continuum(design: Design, kp: float, ki: float) -> float | None:
@@ -255,7 +255,7 @@ def _weights(design: Design, nominal: float) -> Array:
 
 
 def _margin(design: Design) -> float:
-    return slope_margin(ends_of(design.string), *design.top_drive.gains())[0]
+    return slope_margin(ends_of(design.string), *design.linear_drive.gains())[0]
 
 
 def _nearest_zero(function: Callable[[float], float], points: Array, about: float) -> float | None:

@@ -76,7 +76,7 @@ def pade(delay: float, order: int) -> Delay:
 
 
 class _Drive:
-    """A drive without its limits: torque and rates from its states, linear."""
+    """A drive inside its limits: torque and rates from its states, linear."""
 
     def __init__(self, law: Any, gain: float) -> None:
         self.gain = gain
@@ -84,8 +84,7 @@ class _Drive:
         kp, ki = law.gains()
         if isinstance(law, RealDrive):
             numbers = {name: getattr(law, name) for name in RealDrive._fields}
-            free = {"least": -math.inf, "most": math.inf, "power": math.inf, "rate": math.inf}
-            self.law = RealDrive(**(numbers | free | {"feedforward": 0.0, "tracking": 0.0}))
+            self.law = RealDrive(**(numbers | {"feedforward": 0.0, "tracking": 0.0}))
             if isinstance(law, SampledDrive):
                 self.held = pade((0.5 + law.late) * law.period, HELD_PADE)
         else:
@@ -164,7 +163,7 @@ def loop_model(design: Design, bit: BitSide) -> StateMatrices:
     plant = plant_matrices(design.string)
     size = len(plant.a)
     top, bit_row = plant.c[0], plant.c[1]
-    drive = _Drive(design.top_drive, float(top @ plant.b[:, 0]))
+    drive = _Drive(design.linear_drive, float(top @ plant.b[:, 0]))
     weight = _Weight(bit.path)
     ends = np.cumsum([size, drive.states, weight.states])
 
@@ -225,7 +224,7 @@ def closed_loop(design: Design) -> control.StateSpace:
     inputs = ("set_speed", "bit_torque")
     if not design.simple_drive:
         return _whole_loop(design)
-    kp, ki = design.top_drive.gains()
+    kp, ki = design.linear_drive.gains()
     return named(
         closed_loop_matrices(design.string, kp, ki),
         "closed_loop",

@@ -57,7 +57,7 @@ def operating_point(design: Design) -> OperatingPoint:
         raise InputError(
             "no speed at which the torque of the drive equals that of rock and drag", "controller"
         )
-    if not any(design.top_drive.gains()):  # no set speed to be near to
+    if not any(design.linear_drive.gains()):  # no set speed to be near to
         return result[-1]
     return min(result, key=lambda point: abs(point.speed - design.speed))
 
@@ -71,7 +71,7 @@ def equilibria(design: Design) -> tuple[OperatingPoint, ...]:
         Rig and control. With integral action the set speed alone is steady, however much
         torque that takes.
     """
-    _, ki = design.top_drive.gains()
+    _, ki = design.linear_drive.gains()
     if ki != 0.0:
         return (at_speed(design, design.speed),)
     speeds = _speeds(design)
@@ -154,7 +154,7 @@ def _surplus(design: Design, speed: float | Array) -> Any:
     """Torque (N m) that drive gives beyond what rock and drag take at a steady speed."""
     drag = float(design.string.ground_damping.sum()) * speed
     rock, _ = rock_at(design.bit_rock, design.weight_on_bit, speed)
-    return design.top_drive.torque(0.0, speed - design.speed) - drag - rock
+    return design.linear_drive.torque(0.0, speed - design.speed) - drag - rock
 
 
 def _zero(design: Design, low: float, high: float) -> float:

@@ -194,7 +194,7 @@ def frequency_response(
     if loop != "plant":
         if isinstance(subject, Drillstring):
             raise InputError(f"a bare string has no {loop}; give a design", "loop")
-        drive = drive + subject.top_drive.impedance(s)
+        drive = drive + subject.linear_drive.impedance(s)
     closed = drive if loop == "closed_loop" else 0.0
     at_bit = -slope + 0.0 * s
     if path is not None:

@@ -146,7 +146,7 @@ def open_loop(design: Design) -> control.StateSpace:
             "closed_loop",
             "controller",
         )
-    kp, ki = design.top_drive.gains()
+    kp, ki = design.linear_drive.gains()
     inputs = ("speed_error", "bit_torque")
     return named(
         open_loop_matrices(design.string, kp, ki),

@@ -103,11 +103,11 @@ def drive_impedance(
     refuse_frequencies(frequency)
     s = 2j * math.pi * frequency
     parts = design.string.parts
-    impedance = design.top_drive.impedance(s) + s * parts.top_inertia + parts.top_damping
+    impedance = design.linear_drive.impedance(s) + s * parts.top_inertia + parts.top_damping
     if label is None:
         label = design.tables.controller.law
         if design.simple_drive:
-            kp, ki = design.top_drive.gains()
+            kp, ki = design.linear_drive.gains()
             label += f", Kp {kp:.4g}, Ki {ki:.4g}"
     return DriveImpedance(frequency, impedance, pipe_impedance(design.string), label)
 

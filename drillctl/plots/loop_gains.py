@@ -125,7 +125,7 @@ def gain_boundary(
     _coloured(figure, ax, first, system)
     for number, other in enumerate(boundaries[1:]):
         _dashed(ax, other, number, system)
-    own = first.design.top_drive.gains()
+    own = first.design.linear_drive.gains()
     kp, ki = shown_gains(own[0], own[1], system)
     if kp > 0.0 or ki > 0.0:
         ax.plot(kp, ki, "D", **DIAMOND, label="gains of the design")

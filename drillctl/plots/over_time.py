@@ -72,7 +72,7 @@ def _title(run: Simulation, paths: Sequence[str]) -> str:
     if paths:
         numbers = ", ".join(_named(run, path) for path in paths)
     elif run.design.simple_drive:
-        law = run.design.top_drive
+        law = run.design.linear_drive
         numbers = ", ".join(f"{k} {v:g}" for k, v in law._asdict().items())  # type: ignore[attr-defined]
     else:
         numbers = run.design.tables.controller.law

@@ -15,11 +15,14 @@ from drillctl import units
 from drillctl.errors import InputError
 from drillctl.linear import critical_speed, critical_weight_on_bit, loop, operating_point
 from drillctl.linear.ends import ends_of
+from drillctl.linear.export import nonlinear_system
 from drillctl.linear.loop_margins import disk_gain_and_phase, pole_grid
 from drillctl.linear.loop_model import loop_poles, many_loop_poles, with_slope
 from drillctl.linear.slope_margin import slope_margin
 from drillctl.linear.state_space import open_loop_matrices
 from drillctl.studies import Axis, loop_map
+from drillctl.studies.loop import STUDY
+from drillctl.studies.loop.compute import loop_pictures
 
 HOLDS = (
     (
@@ -238,3 +241,43 @@ def test_a_sensitivity_is_never_under_one():
     assert found.stable.all()
     assert np.isfinite(found.values["peak_sensitivity"]).all()
     assert found.values["peak_sensitivity"].min() >= 1.0
+
+
+LIMITS = {
+    "torque_limit": "40 kN*m", "minimum_torque": "-10 kN*m", "power_limit": "700 kW",
+    "torque_rate_limit": "20 kN*m/s", "anti_windup": "none", "tracking_time": "2 s",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("gains", [(625.0, 125.0), (150.0, 100.0)], ids=["stable", "unstable"])
+def test_limits_leave_the_linear_loop_alone(gains):
+    """Every figure, the boundary and the pictures of a drive inside its limits are the ideal's."""
+    ideal = loop(paper(*gains))
+    limited = loop(paper(*gains, **{f"controller.drive.{k}": v for k, v in LIMITS.items()}))
+    assert limited.summary() == ideal.summary()
+    np.testing.assert_array_equal(limited.poles, ideal.poles)
+    names = [[one.name for one in loop_pictures(result)] for result in (ideal, limited)]
+    assert names[0] == names[1]
+    assert {"boundary", "root-locus"} < set(names[1])
+
+
+def test_lags_stay_in_the_linear_loop_of_a_limited_drive():
+    lag = {"controller.drive.lag": "30 ms"}
+    limits = {"controller.drive.torque_limit": "40 kN*m", "controller.drive.power_limit": "700 kW"}
+    alone, both = loop(paper(1500.0, **lag)), loop(paper(1500.0, **lag, **limits))
+    assert both.summary() == alone.summary()
+    assert both.slope_margin != loop(paper(1500.0)).slope_margin
+
+
+def test_a_lag_that_only_the_limit_of_the_rate_brings_is_said():
+    limited = {"controller.drive.torque_rate_limit": "20 kN*m/s"}
+    (said,) = STUDY.remarks(loop(paper(**limited)), "si")
+    assert "lag of 10 ms" in said
+    own = limited | {"controller.drive.lag": "10 ms"}
+    assert not any("lag" in one for one in STUDY.remarks(loop(paper(**own)), "si"))
+
+
+def test_a_limited_drive_is_not_integrated_without_its_limits():
+    design = paper(**{"controller.drive.torque_limit": "40 kN*m"})
+    with pytest.raises(InputError, match="takes an ideal drive"):
+        nonlinear_system(design)

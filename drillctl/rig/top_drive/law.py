@@ -74,6 +74,23 @@ class DriveTable(Table):
         lags = (self.sampling_period, self.lag, self.encoder_lag, self.torque_lag)
         return all(limit is None for limit in limits) and not any(lags)
 
+    @property
+    def unlimited(self) -> DriveTable:
+        """The drive inside its limits: those of torque, power and rate, and the way back to them.
+
+        The 10 ms with which a rate-limited motor follows at least belong to that limit.
+        """
+        return self.model_copy(
+            update={
+                "torque_limit": None,
+                "minimum_torque": None,
+                "power_limit": None,
+                "torque_rate_limit": None,
+                "anti_windup": "back-calculation",
+                "tracking_time": None,
+            }
+        )
+
 
 class Controller(NamedTuple):
     """Numbers of a speed controller before the drive around it; see `RealDrive`."""

@@ -95,9 +95,18 @@ def pictures(result: LoopAnalysis) -> Iterator[Picture]:
 
 
 def remarks(result: LoopAnalysis, system: units.System) -> Iterator[str]:
-    """Why there may be no margins."""
+    """Why there may be no margins; what a limit of the rate brings that is not in the loop."""
+    from drillctl.rig.top_drive.law import SHORTEST_LAG
+
     if result.margins is None:
         yield "The loop is not stable: it has no margins at the top torque."
+    drive = result.design.tables.controller.drive
+    if drive.torque_rate_limit is not None and drive.lag < SHORTEST_LAG:
+        lag = f"{SHORTEST_LAG * 1e3:g} ms"
+        yield (
+            "The loop is that of a drive inside its limits. In a run the limit of the torque's "
+            f"rate comes with a lag of {lag}; set controller.drive.lag to count it here."
+        )
 
 
 def notes(result: LoopAnalysis) -> Iterator[str]:

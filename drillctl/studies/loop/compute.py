@@ -84,7 +84,7 @@ def loop_pictures(result: LoopAnalysis) -> Iterator[Picture]:
         "Bode plot of the mobility at bit and top; sharp peaks of the string alone are flattened "
         "in the loop near its first mode.", lambda system: _mobility(design),
     )  # fmt: skip
-    if any(design.top_drive.gains()):
+    if any(design.linear_drive.gains()):
         if bit.path is None or bit.path.observer is None:
             yield from _of_loop(result)
         if design.simple_drive and bit.path is None:
@@ -185,7 +185,7 @@ def _over_gains(design: Design, slope: float) -> Iterator[Picture]:
         paper=True,
     )  # fmt: skip
     if not large(design) and design.tables.controller.law == "pi":
-        kp, _ = design.top_drive.gains()
+        kp, _ = design.linear_drive.gains()
         values = np.linspace(0.25, 2.0, 141) * (kp or 500.0)
         yield Picture(
             "root-locus", "Poles of the loop as the proportional gain grows.",
@@ -198,6 +198,6 @@ def _over_gains(design: Design, slope: float) -> Iterator[Picture]:
 
 def _window(design: Design) -> Window:
     """Gains to look at: the usual ones, or so many that the design's own lie well inside."""
-    kp, ki = design.top_drive.gains()
+    kp, ki = design.linear_drive.gains()
     (p0, p1), (i0, i1) = WINDOW
     return (p0, max(p1, 1.6 * kp)), (i0, max(i1, 1.6 * ki))

@@ -283,7 +283,7 @@ def kind_of(loop: Loop, tuned: tuple[Tuned, ...]) -> tuple[Any, ...]:
     """What loops have in common that share their functions."""
     values = {t.path: 1.0 for t in tuned}
     fixed = drive_numbers(loop.design, values, loop.string)
-    law: Any = loop.design.top_drive
+    law: Any = loop.design.linear_drive
     # The anti-windup plays no part in a linear loop.
     kept = tuple(v for k, v in law._asdict().items() if k not in {*fixed, "tracking"})
     side = loop.weight

@@ -225,7 +225,7 @@ class Loop:
 
     def drive(self, values: Mapping[str, Any], s: Any) -> Any:
         """Impedance of the drive (N m s/rad) at `s`, with tuned values by path."""
-        law: Any = self.design.top_drive
+        law: Any = self.design.linear_drive
         numbers = drive_numbers(self.design, values, self.string)
         law = law._replace(**{k: v for k, v in numbers.items() if k in law._fields})
         return law.impedance(s)
@@ -514,7 +514,7 @@ class Loops:
         """Poles of a loop with the slope of the rock (1/s)."""
         variant = put(loop.design, self.tuned, values)
         if variant.simple_drive and loop.weight is None:
-            return loop_poles(variant.string, *variant.top_drive.gains(), loop.slope)
+            return loop_poles(variant.string, *variant.linear_drive.gains(), loop.slope)
         return model_poles(variant, BitSide(loop.slope, self._path(loop, values)))
 
     def _first(self, loop: Loop, poles: ComplexArray) -> ComplexArray:
