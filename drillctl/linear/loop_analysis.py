@@ -16,6 +16,7 @@ from drillctl.errors import InputError
 from drillctl.linear.ends import BitSide, ends_of, weight_path
 from drillctl.linear.loop_margins import Margins, margins, weight_delay_margin, whole_crossings
 from drillctl.linear.loop_model import loop_poles, model_poles
+from drillctl.linear.mesh_limited import Figures, figures_of, mesh_limited
 from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
 from drillctl.linear.slope_margin import slope_margin
 from drillctl.rig.weight_on_bit import PATHS
@@ -62,6 +63,9 @@ class LoopAnalysis(Result, kind="loop"):
     critical_weight_on_bit: float | None = label(
         unit="N", means="weight nearest to the operating one at which stability changes"
     )
+    mesh_limited: Figures = label(
+        means="figures that the mesh decides, each with its value of the exact string (SI) or None"
+    )
 
     @property
     def bit_side(self) -> BitSide:
@@ -98,6 +102,7 @@ class LoopAnalysis(Result, kind="loop"):
             else {name: _finite(value) for name, value in asdict(result).items()},
             "continuum_slope_margin": self.continuum_slope_margin,
             "weight_delay_margin": _finite(self.weight_delay_margin),
+            "mesh_limited": {name: _finite(x) for name, x in self.mesh_limited.items()},
             "critical_speed": self.critical_speed,
             "critical_weight_on_bit": self.critical_weight_on_bit,
             "operating_speed": self.operating_point.speed,
@@ -139,6 +144,14 @@ def loop(design: Design) -> LoopAnalysis:
     gains = design.linear_drive.gains()
     poles = loop_poles(design.string, *gains, point.slope) if simple else model_poles(design, bit)
     stable = bool(point.slope < tolerated)
+    at_top = margins(ends, design.linear_drive, bit, poles) if stable else None
+    moving = _moving(design, point) if stable else None
+    later, later_at = (
+        (None, None) if moving is None else weight_delay_margin(ends, design.linear_drive, moving)
+    )
+    figures = {"slope_margin": (tolerated, omega / (2.0 * math.pi)), **figures_of(at_top)}
+    if later is not None and later_at is not None:
+        figures["weight_delay_margin"] = (later, later_at / (2.0 * math.pi))
     return LoopAnalysis(
         design=design,
         operating_point=point,
@@ -147,8 +160,9 @@ def loop(design: Design) -> LoopAnalysis:
         slope_margin=tolerated,
         deciding_frequency_hz=omega / (2.0 * math.pi),
         continuum_slope_margin=_continuum(design, *gains) if simple else None,
-        margins=margins(ends, design.linear_drive, bit, poles) if stable else None,
-        weight_delay_margin=_delay_margin(design, point) if stable else None,
+        margins=at_top,
+        weight_delay_margin=later,
+        mesh_limited=mesh_limited(design, figures, bit, moving, poles),
         critical_speed=critical_speed(design, tolerated) if simple else None,
         critical_weight_on_bit=critical_weight_on_bit(design, tolerated) if simple else None,
     )
@@ -178,15 +192,15 @@ def tolerated_slope(design: Design, speed: float) -> tuple[float, float]:
     return float(result.slope[over[0]]), float(result.omega[over[0]])
 
 
-def _delay_margin(design: Design, point: OperatingPoint) -> float | None:
-    """Further delay of the moving weight that the loop bears (s); None without one."""
+def _moving(design: Design, point: OperatingPoint) -> BitSide | None:
+    """The bit with a weight that moves as a part of its own; None without one."""
     path = weight_path(design, point.speed)
     if path is None:
         return None
     held = point.slope
     if design.weight_on_bit.moves:  # its part in the slope is the path's here
         held += path.gain
-    return weight_delay_margin(ends_of(design.string), design.linear_drive, BitSide(held, path))[0]
+    return BitSide(held, path)
 
 
 def _continuum(design: Design, kp: float, ki: float) -> float | None:

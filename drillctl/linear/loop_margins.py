@@ -75,7 +75,9 @@ class Margins:
     delay_hz: float | None
 
 
-def margins(ends: Ends, drive: TopDriveLaw, bit: BitSide, poles: ComplexArray) -> Margins:
+def margins(
+    ends: Ends, drive: TopDriveLaw, bit: BitSide, poles: ComplexArray, below: float = math.inf
+) -> Margins:
     """Margins of a loop that is stable.
 
     Parameters
@@ -88,9 +90,12 @@ def margins(ends: Ends, drive: TopDriveLaw, bit: BitSide, poles: ComplexArray) -
         Slope of the rock, under the slope margin, and the moving weight.
     poles : ndarray of complex
         Of the loop (1/s), so that no peak is stepped over.
+    below : float
+        Highest angular frequency (rad/s) that counts.
     """
     loop = _Loop(ends, drive, bit)
     grid = pole_grid(ends, poles)
+    grid = grid[grid <= below]
     peak, peak_at = _largest(lambda w: np.abs(loop.sensitivity(w)), grid)
     balance, disk_at = _largest(lambda w: np.abs(loop.balance(w)), grid)
     # At no or at any frequency a loop without drive has S - T = 1: a disk that touches nothing.
@@ -243,8 +248,10 @@ def whole_crossings(ends: Ends, drive: TopDriveLaw, bit: BitSide) -> Crossings:
     return Crossings(slope[order], omega[order])
 
 
-def weight_delay_margin(ends: Ends, drive: TopDriveLaw, bit: BitSide) -> tuple[float, float | None]:
-    """Longest further delay of a moving weight that a stable loop bears."""
+def weight_delay_margin(
+    ends: Ends, drive: TopDriveLaw, bit: BitSide, below: float = math.inf
+) -> tuple[float, float | None]:
+    """Longest further delay of a moving weight that a stable loop bears, and its frequency."""
 
     def both(omega: Array) -> tuple[ComplexArray, NDArray[np.complex128]]:
         s = 1j * omega
@@ -258,7 +265,8 @@ def weight_delay_margin(ends: Ends, drive: TopDriveLaw, bit: BitSide) -> tuple[f
         rest, weight = both(omega)
         return np.log(np.abs(weight)) - np.log(np.abs(rest))
 
-    omega = _zeros(excess, _grid(ends, bit))
+    grid = _grid(ends, bit)
+    omega = _zeros(excess, grid[grid <= below])
     if len(omega) == 0:
         return math.inf, None
     rest, weight = both(omega)

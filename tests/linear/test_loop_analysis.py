@@ -18,10 +18,12 @@ from drillctl.linear.ends import ends_of
 from drillctl.linear.export import nonlinear_system
 from drillctl.linear.loop_margins import disk_gain_and_phase, pole_grid
 from drillctl.linear.loop_model import loop_poles, many_loop_poles, with_slope
+from drillctl.linear.mesh_limited import followed, line_poles
 from drillctl.linear.slope_margin import slope_margin
 from drillctl.linear.state_space import open_loop_matrices
 from drillctl.studies import Axis, loop_map
 from drillctl.studies.loop import STUDY
+from drillctl.studies.loop import _margins as margin_rows
 from drillctl.studies.loop.compute import loop_pictures
 
 HOLDS = (
@@ -271,8 +273,7 @@ def test_lags_stay_in_the_linear_loop_of_a_limited_drive():
 
 def test_a_lag_that_only_the_limit_of_the_rate_brings_is_said():
     limited = {"controller.drive.torque_rate_limit": "20 kN*m/s"}
-    (said,) = STUDY.remarks(loop(paper(**limited)), "si")
-    assert "lag of 10 ms" in said
+    assert any("lag of 10 ms" in one for one in STUDY.remarks(loop(paper(**limited)), "si"))
     own = limited | {"controller.drive.lag": "10 ms"}
     assert not any("lag" in one for one in STUDY.remarks(loop(paper(**own)), "si"))
 
@@ -281,3 +282,73 @@ def test_a_limited_drive_is_not_integrated_without_its_limits():
     design = paper(**{"controller.drive.torque_limit": "40 kN*m"})
     with pytest.raises(InputError, match="takes an ideal drive"):
         nonlinear_system(design)
+
+
+@pytest.mark.parametrize(("elements", "delay_ms"), [(15, 13.96), (60, 3.331), (120, 1.656)])
+def test_a_delay_margin_that_the_mesh_decides_is_said_to_be_mesh_limited(elements, delay_ms):
+    found = loop(paper(**{f"{PIPE}.elements": elements}))
+    assert found.margins.delay == pytest.approx(delay_ms * 1e-3, rel=1e-3)
+    assert found.summary()["mesh_limited"] == {"delay_margin": None}  # the exact string has none
+    (row,) = [row for row in margin_rows(found) if "delay" in row[0]]
+    assert row[3:] == ["mesh-limited", "none"]
+    assert any(one.startswith("Mesh-limited") for one in STUDY.remarks(found, "si"))
+
+
+@pytest.mark.parametrize("elements", [15, 30, 60])
+def test_damping_takes_the_delay_margin_from_the_mesh(elements):
+    found = loop(paper(**{f"{PIPE}.elements": elements, f"{PIPE}.stiffness_damping": "0.1 ms"}))
+    assert found.mesh_limited == {}
+    assert [row[3:] for row in margin_rows(found)] == [["", ""]] * len(margin_rows(found))
+    assert not any("esh-limited" in one for one in STUDY.remarks(found, "si"))
+
+
+def test_a_coarse_mesh_stands_beside_the_exact_string():
+    damped = {f"{PIPE}.stiffness_damping": "0.1 ms"}
+    coarse = loop(paper(**damped, **{f"{PIPE}.elements": 2}))
+    fine = loop(paper(**damped, **{f"{PIPE}.elements": 300}))
+    exact = coarse.mesh_limited["delay_margin"]
+    assert exact == pytest.approx(fine.margins.delay, rel=1e-4)
+    assert abs(coarse.margins.delay / exact - 1.0) > 0.05
+    assert coarse.summary()["mesh_limited"]["delay_margin"] == exact
+
+
+def test_a_figure_of_high_modes_that_no_mesh_changes_is_no_mesh_limited_one():
+    """The high-mode limit of the slope margin is the same for every number of elements."""
+    found = loop(paper(450.0))
+    assert found.deciding_frequency_hz > followed(found.design.string.parts) / (2.0 * math.pi)
+    assert "slope_margin" not in found.mesh_limited
+
+
+def test_a_lumped_string_has_no_mesh():
+    assert loop(drillctl.load("navarro-lopez-4dof")).mesh_limited == {}
+
+
+DELAYED = {
+    "weight_on_bit.law": "navarro-lopez-suarez", "weight_on_bit.gain": "4 kN*s/rad",
+    "weight_on_bit.path.delay": "0.2 s",
+}  # fmt: skip
+
+
+def test_margins_of_a_moving_weight_may_be_the_exact_string_s_or_the_mesh_s():
+    damped = loop(paper(**DELAYED, **{f"{PIPE}.stiffness_damping": "1 ms"}))
+    assert damped.weight_delay_margin == pytest.approx(0.2968, abs=1e-4)
+    assert damped.mesh_limited == {}
+    less = DELAYED | {"weight_on_bit.gain": "2 kN*s/rad"}
+    coarse = loop(paper(**less, **{f"{PIPE}.elements": 3}))
+    assert coarse.stable
+    limited = coarse.mesh_limited
+    # The exact string is not stable, and has no margins.
+    assert limited.pop("slope_margin") < coarse.operating_point.slope
+    assert {"weight_delay_margin", "delay_margin"} <= set(limited)
+    assert set(limited.values()) == {None}
+
+
+@pytest.mark.parametrize("kp", [100.0, 625.0, 2000.0])
+def test_poles_of_the_exact_string_are_found(kp):
+    design = paper(kp, **{f"{PIPE}.elements": 400})
+    result, coarse = loop(design), loop(paper(kp, **{f"{PIPE}.elements": 40}))
+    line = ends_of(design.string, "wave")
+    poles = line_poles(line, design.linear_drive, result.bit_side, coarse.poles)
+    low = result.poles[(result.poles.imag > 0.0) & (np.abs(result.poles) < 30.0)]
+    nearest = np.abs(poles[None, :] - low[:, None]).min(axis=1)
+    assert (nearest < 2.5e-4 * np.abs(low)).all()

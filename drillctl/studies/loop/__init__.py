@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,8 +33,9 @@ def tables(result: LoopAnalysis) -> Iterator[Table]:
     from drillctl.studies.loop_mapping import tables as of_map
 
     pair = (Column("quantity"), Column("value"), Column("unit", hidden=True))
+    more = (*pair, Column("mesh", ""), Column("exact_string", "exact string"))
     yield Table("operating-point", "steady drilling", pair, _operating_point(result))
-    yield Table("margins", "margins of the loop about steady drilling", pair, _margins(result))
+    yield Table("margins", "margins of the loop about steady drilling", more, _margins(result))
     columns = (
         Column("pair"), Column("frequency", unit="Hz", digits=6),
         Column("damping_ratio", "damping", percent=True),
@@ -60,28 +62,40 @@ def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
 
 
 def _margins(result: LoopAnalysis) -> list[list[Any]]:
-    rows: list[tuple[str, float | None, str]] = [
-        ("largest real part of the poles", result.spectral_abscissa, "1/s"),
-        ("falling slope of the rock, −dT/dω", result.operating_point.slope, SLOPE),
-        ("slope margin D*", result.slope_margin, SLOPE),
-        ("deciding frequency", result.deciding_frequency_hz, "Hz"),
-        ("slope margin of the continuous string", result.continuum_slope_margin, SLOPE),
+    rows: list[tuple[str, float | None, str, str]] = [
+        ("largest real part of the poles", result.spectral_abscissa, "1/s", ""),
+        ("falling slope of the rock, −dT/dω", result.operating_point.slope, SLOPE, ""),
+        ("slope margin D*", result.slope_margin, SLOPE, "slope_margin"),
+        ("deciding frequency", result.deciding_frequency_hz, "Hz", ""),
+        ("slope margin of the continuous string", result.continuum_slope_margin, SLOPE, ""),
     ]
     margins = result.margins
     if margins is not None:
         rows += [
-            ("disk margin: gain", margins.gain_db, "dB"),
-            ("disk margin: phase", margins.phase_deg, "deg"),
-            ("largest sensitivity", margins.peak_sensitivity, "1"),
-            ("frequency of the largest sensitivity", margins.peak_sensitivity_hz, "Hz"),
-            ("delay at the top torque that is tolerated", margins.delay, "s"),
-            ("deciding frequency", margins.delay_hz, "Hz"),
+            ("disk margin: gain", margins.gain_db, "dB", "disk_gain_db"),
+            ("disk margin: phase", margins.phase_deg, "deg", "disk_phase_deg"),
+            ("largest sensitivity", margins.peak_sensitivity, "1", "peak_sensitivity"),
+            ("frequency of the largest sensitivity", margins.peak_sensitivity_hz, "Hz", ""),
+            ("delay at the top torque that is tolerated", margins.delay, "s", "delay_margin"),
+            ("deciding frequency", margins.delay_hz, "Hz", ""),
         ]
     if result.weight_delay_margin is not None:
         rows.append(("further delay of the moving weight that is tolerated",
-                     result.weight_delay_margin, "s"))  # fmt: skip
-    stable: list[Any] = ["stable", "yes" if result.stable else "no", ""]
-    return [stable, *([name, Quantity(value, unit), unit] for name, value, unit in rows)]
+                     result.weight_delay_margin, "s", "weight_delay_margin"))  # fmt: skip
+    stable: list[Any] = ["stable", "yes" if result.stable else "no", "", "", ""]
+    return [stable, *map(partial(_margin_row, result.mesh_limited), rows)]
+
+
+def _margin_row(
+    limited: dict[str, float | None], row: tuple[str, float | None, str, str]
+) -> list[Any]:
+    """A figure, and beside one that the mesh decides that of the exact string."""
+    head, value, unit, name = row
+    own = [head, Quantity(value, unit), unit]
+    if name not in limited:
+        return [*own, "", ""]
+    exact = limited[name]
+    return [*own, "mesh-limited", "none" if exact is None else Quantity(exact, unit)]
 
 
 def pictures(result: LoopAnalysis) -> Iterator[Picture]:
@@ -100,6 +114,12 @@ def remarks(result: LoopAnalysis, system: units.System) -> Iterator[str]:
 
     if result.margins is None:
         yield "The loop is not stable: it has no margins at the top torque."
+    if result.mesh_limited:
+        yield (
+            "Mesh-limited: the last modes of the mesh decide this figure; other elements give "
+            "another. Damping of the string (drillstring.sections.NAME.stiffness_damping, usually "
+            "1e-3 s) or the exact string, where it has such a value, decides in their place."
+        )
     drive = result.design.tables.controller.drive
     if drive.torque_rate_limit is not None and drive.lag < SHORTEST_LAG:
         lag = f"{SHORTEST_LAG * 1e3:g} ms"
