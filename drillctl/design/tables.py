@@ -277,7 +277,7 @@ class MapTable(Table):
 
     axes: tuple[AxisTable, ...] = PAPER_AXES
     levels: tuple[q.PositiveNumber, ...] = (20.0, 30.0, 40.0, 50.0)
-    audit_cells: q.CountOrZero = 12
+    audit_cells: q.CountOrZero = 48
 
     @field_validator("levels")
     @classmethod

@@ -1,4 +1,11 @@
-"""Self-audit of a map: some of its cells, simulated again by the reference solver."""
+"""Audit of the batch engine: some of its runs again, by the reference solver and at a finer step.
+
+One comparison with one verdict for every study. Each measure is compared within its own tolerance,
+the status must be the same. Where a quarter of the step moves J1 by a good part of its tolerance,
+one stick more or less decides it: a cell on the *verge*. Such cells are listed, and the verdict is
+of the others. A measure that jumps, such as a settling time by one swing, is excused in the same
+way where it moves as far. Where that is frequent, the step is too long, and nothing is excused.
+"""
 
 from __future__ import annotations
 
@@ -6,79 +13,206 @@ import math
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
+from functools import cached_property
+from itertools import islice, pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from drillctl.arrays import Array, Index
+from drillctl.arrays import Array, Index, Mask
 from drillctl.design import Design
-from drillctl.ensemble.grid import Axis, cell_design, shape_of
+from drillctl.design.tables import SimulationTable
 from drillctl.errors import SimulationError
 from drillctl.progress import SILENT, Progress
+from drillctl.rig.drillstring import Drillstring
+from drillctl.simulation.batch import Prepared, prepare, run_batch
+from drillctl.simulation.lanes import single_lane
+from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES
+from drillctl.simulation.propagator import string_step
+from drillctl.simulation.scheme import ACCURACIES, Scheme
 from drillctl.store.codec import label
 
 SEED = 20121  # seed of the choice of cells: the same map is audited at the same cells
-WORST_ALLOWED = 1e-2  # relative difference in J1 above which the verdict is `check`
 TOLERANCE = 1e-7  # tolerance of the reference solver in an audit: J1 to some 1e-7
+PARTS = 4  # of the step, at the other accuracy
+RICHARDSON = PARTS**2 / (PARTS**2 - 1.0)
+"""Error of a scheme of order 2 per difference to the same at the finer step."""
+MOVED = 0.2
+"""Share of a tolerance by which the finer step moves what is excused. Where runs follow the step
+smoothly it moves them by their error; where a stick decides, one more or less at either step."""
+MOST_EXCUSED = 0.25  # largest share of cells that are excused
+AT_LEVELS = 0.25  # share of the audited cells that are those nearest to the levels
+
+Values = dict[str, Array]
+"""Measures of cells by name, NaN where undefined, and their `status`, an index into `STATUSES`."""
+
+
+class Compared(NamedTuple):
+    """A measure over the audited cells."""
+
+    name: str
+    tolerance: float  # share of the value, or of what it counts for at least
+    worst: float | None  # largest difference that is not excused, in the same way; None without
+    beyond: int  # cells that differ by more and are not excused
 
 
 @dataclass(frozen=True, eq=False)
 class Audit:
     """Batch engine against reference solver at some cells."""
 
-    cells: Index = label("audited", name="audited_{of}", means="index in the flattened map")
-    batch: Array = label("audited", unit="s", name="audited_{of}_by_batch", means="J1 of the map")
-    reference: Array = label(
-        "audited", unit="s", name="audited_j1",
-        means="J1 by the reference solver; NaN where that failed",
+    cells: Index = label("audited_{of}s", name="audited_{of}", means="index in the flattened map")
+    batch: Values = label(
+        "audited_{of}s", name="audited_{of}_by_batch", means="by the batch engine, SI"
+    )
+    reference: Values = label(
+        "audited_{of}s", name="audited_{of}_by_reference",
+        means="by the reference solver, SI; NaN where that failed",
     )  # fmt: skip
-    of: str = "cell"  # what was audited: cells of a map, lanes of realizations
+    finer: Values = label(
+        "audited_{of}s", name="audited_{of}_at_finer_step", default_factory=dict,
+        means="by the batch engine at a quarter of its step, SI",
+    )  # fmt: skip
+    speed: Array = label(
+        "audited_{of}s", name="audited_{of}_speed", unit="rad/s", means="set speed",
+        default_factory=lambda: np.empty(0),
+    )  # fmt: skip
+    duration: float = label(unit="s", means="length of the runs", default=math.inf)
+    of: str = "cell"  # what was audited: cells of a map, lanes of realizations, draws
 
     @property
     def differences(self) -> Array:
-        """Relative differences, shape (audited,); NaN where the reference solver failed."""
-        # A rig that never leaves its set speed has J1 = 0, known to the tolerance alone.
-        return np.abs(self.batch - self.reference) / np.maximum(np.abs(self.reference), TOLERANCE)
+        """Relative differences in J1, shape (audited,); NaN where the reference solver failed."""
+        return self._apart("j1", self.reference)
 
     @property
     def worst(self) -> float | None:
-        """Largest relative difference; None if no cell was audited or none could be."""
-        result = self.differences[np.isfinite(self.differences)]
-        return float(result.max()) if result.size else None
+        """Largest of them; None if no cell was audited or none could be."""
+        return _largest(self.differences)
+
+    @property
+    def estimates(self) -> Array:
+        """Relative errors of J1 by the engine's own account, shape (audited,)."""
+        return RICHARDSON * self._apart("j1", self.finer) if self.finer else np.empty(0)
+
+    @property
+    def median(self) -> float | None:
+        """Median of them; None without any."""
+        known = self.estimates[np.isfinite(self.estimates)]
+        return float(np.median(known)) if known.size else None
+
+    @cached_property
+    def failed(self) -> Mask:
+        """Cells that the reference solver could not finish."""
+        return ~np.isfinite(self.reference["j1"])
+
+    @cached_property
+    def verge(self) -> Mask:
+        """Cells in which one stick more or less decides J1."""
+        return self._excused("j1")
+
+    @property
+    def beyond(self) -> Mask:
+        """Cells in which a measure or the status differs from the reference solver's, or all do."""
+        results = [self._apart(n, self.reference) > _tolerance(n) for n in self.batch]
+        return np.logical_or.reduce([self.failed, *results])
 
     @property
     def verdict(self) -> str:
         """`ok`, `check` when a cell differs too much or failed, `none` without audited cells."""
         if not len(self.cells):
             return "none"
-        fine = np.isfinite(self.reference).all() and (self.worst or 0.0) <= WORST_ALLOWED
-        return "ok" if fine else "check"
+        often = self.beyond.mean() > MOST_EXCUSED
+        return "check" if self.failed.any() or self.wrong or often else "ok"
+
+    @cached_property
+    def compared(self) -> tuple[Compared, ...]:
+        """Every measure that was compared, and the status."""
+        results = []
+        for name in self.batch:
+            excused = self.verge | self._excused(name)
+            apart = np.where(excused, np.nan, self._apart(name, self.reference))
+            tolerance = _tolerance(name)
+            beyond = int((apart > tolerance).sum())
+            results.append(Compared(name, tolerance, _largest(apart), beyond))
+        return tuple(results)
 
     def sentence(self, what: str) -> str:
-        """The verdict, and how far the engines differ at most."""
+        """The verdict, how far the engines differ at most, and where the verge decides."""
         text = f"audit: {self.verdict}, {len(self.cells)} {what}"
-        if self.worst is None:
-            return text
-        return f"{text}, worst relative difference in J1 {self.worst:.2g}"
+        if self.worst is not None:
+            text += f", worst relative difference in J1 {self.worst:.2g}"
+        if self.median is not None:
+            text += f", estimated median error {self.median:.1g}"
+        if self.verge.any():
+            text += f", {self.verge.sum()} on the verge of another stick"
+        if self.wrong:
+            text += f"; beyond tolerance: {', '.join(self.wrong)}"
+        return text
+
+    @property
+    def wrong(self) -> list[str]:
+        """What differs by more than its tolerance and is not excused."""
+        names = [one.name for one in self.compared if one.beyond]
+        return [MEASURES[name].label if name in MEASURES else name for name in names]
 
     def summary(self) -> dict[str, Any]:
-        """Number of cells, worst difference, verdict."""
+        """Verdict, number of cells, differences by measure, estimated errors, the verge."""
         return {
             "cells": len(self.cells),
             "worst_relative_difference": self.worst,
             "verdict": self.verdict,
+            "failed": int(self.failed.sum()),
+            "estimated_error": {"median": self.median, "worst": _largest(self.estimates)},
+            "verge": self.cells[self.verge].tolist(),
+            "beyond": self.cells[self.beyond].tolist(),
+            "measures": {one.name: one._asdict() for one in self.compared},
         }
+
+    def _apart(self, name: str, other: Values) -> Array:
+        """Differences from other runs, shape (audited,), in the way of the tolerance."""
+        one, other_one = self.batch[name], other[name]
+        if name == "status":
+            return np.where(np.isnan(other_one), np.nan, np.abs(one - other_one))
+        undefined = np.isnan(one) & np.isnan(other_one)
+        scale = np.maximum(np.abs(other_one), self._least(name))
+        apart = np.where(undefined, 0.0, np.abs(one - other_one) / scale)
+        # Defined in one of them alone; of a run that failed nothing is.
+        return np.where(np.isnan(other["j1"]), np.nan, np.where(np.isnan(apart), np.inf, apart))
+
+    def _least(self, name: str) -> Any:
+        least = MEASURES[name].least
+        if isinstance(least, float):
+            return least
+        return self.duration if least == "duration" else np.abs(self.speed)
+
+    def _excused(self, name: str) -> Mask:
+        """Cells in which the finer step moves a measure by a good part of its tolerance."""
+        if not self.finer:
+            return np.zeros(len(self.cells), dtype=bool)
+        return self._apart(name, self.finer) > MOVED * _tolerance(name)
+
+
+def _tolerance(name: str) -> float:
+    return 0.0 if name == "status" else MEASURES[name].tolerance
+
+
+def _largest(values: Array) -> float | None:
+    """Largest of the values that are numbers."""
+    known = values[np.isfinite(values)]
+    return float(known.max()) if known.size else None
 
 
 def unaudited(of: str = "cell") -> Audit:
     """No cells."""
-    return Audit(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0), of)
+    none = {"j1": np.empty(0)}
+    return Audit(np.empty(0, dtype=np.int64), none, none, of=of)
 
 
 def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> Index:
-    """Cells to audit: a seeded random sample, spread over the levels."""
+    """Cells to audit: those nearest to the levels, and a seeded sample spread between them."""
     flat = np.nan_to_num(values.ravel(), nan=np.inf)
+    near = _nearest(flat, levels, int(AT_LEVELS * count))
     random = np.random.default_rng(SEED)
     edges = [-np.inf, *levels, 2.0 * levels[-1]]
     bands = [
@@ -89,65 +223,112 @@ def choose_cells(values: Array, levels: tuple[float, ...], count: int) -> Index:
     turns = sorted(
         (turn, band) for band, cells in enumerate(bands) for turn in range(min(len(cells), count))
     )
-    chosen = [int(bands[band][-1 - turn]) for turn, band in turns[:count]]
+    spread = (int(bands[band][-1 - turn]) for turn, band in turns)
+    chosen = [*near, *islice((cell for cell in spread if cell not in near), count - len(near))]
     return np.array(sorted(chosen), dtype=np.int64)
 
 
-def audit(
-    design: Design,
-    axes: tuple[Axis, ...],
-    values: Array,
-    levels: tuple[float, ...],
-    count: int,
+def _nearest(flat: Array, levels: tuple[float, ...], count: int) -> list[int]:
+    """Cells nearest to the levels, as many to each; none beyond twice the highest level."""
+    chosen = list[int]()
+    for number, level in enumerate(reversed(levels)):
+        share = -(-(count - len(chosen)) // (len(levels) - number))
+        if share:
+            away = np.where(flat <= 2.0 * levels[-1], np.abs(flat - level), np.inf)
+            away[chosen] = np.inf
+            near = np.argpartition(away, min(share, away.size) - 1)[:share]
+            chosen += near[np.isfinite(away[near])].tolist()
+    return chosen
+
+
+def kept(measures: Values, status: NDArray[Any] | None, cells: Index) -> Values:
+    """What a study knows of some cells of its flattened map."""
+    known = {name: measures[name].ravel()[cells] for name in BATCH_MEASURES if name in measures}
+    return known if status is None else known | {"status": status.ravel()[cells].astype(float)}
+
+
+def audited(
+    cells: Index,
+    batch: Values,
+    designs: list[Design],
+    of: str = "cell",
     progress: Progress = SILENT,
+    seconds: float = math.inf,
 ) -> Audit:
-    """Simulate some cells of a map again with the reference solver, on all cores."""
-    cells = choose_cells(values.reshape(shape_of(axes)), levels, count)
-    designs = [cell_design(design, axes, int(cell)) for cell in cells]
-    reference = references(designs, progress)
-    return Audit(cells, values.ravel()[cells], reference)
+    """Compare cells of a study, of which it knows some measures, on all cores.
 
-
-def references(
-    designs: list[Design], progress: Progress = SILENT, seconds: float = math.inf
-) -> Array:
-    """J1 of designs by the reference solver (s), on all cores; NaN for those that fail.
-
-    The solver does not hold the interpreter's lock, so that threads are enough.
+    Neither engine holds the interpreter's lock, so that threads are enough. After so many seconds
+    no further cell is begun.
     """
     if not designs:
-        return np.empty(0)
+        return unaudited(of)
 
     import numba
 
-    progress.begin("auditing cells", len(designs))
-    end, result = time.perf_counter() + seconds, list[float]()
+    progress.begin(f"auditing {of}s", len(designs))
+    end, runs = time.perf_counter() + seconds, list[tuple[dict[str, float], ...]]()
 
-    def in_time(design: Design) -> float | None:
-        return reference_j1(design) if time.perf_counter() < end else None
+    def in_time(design: Design) -> tuple[dict[str, float], ...] | None:
+        if time.perf_counter() >= end:
+            return None
+        return (*by_batch(design), by_reference(design))
 
     # As many as the lanes may use, which is what `--threads` sets.
     with ThreadPoolExecutor(min(len(designs), numba.get_num_threads())) as pool:
         try:
-            for value in pool.map(in_time, designs):
-                if value is None:
+            for one in pool.map(in_time, designs):
+                if one is None:
                     break
-                result.append(value)
+                runs.append(one)
                 progress.advance(1)
         finally:  # interrupted: the others end what they have begun
             pool.shutdown(cancel_futures=True)
-    return np.array(result)
+    done = len(runs)
+    own, finer, reference = (
+        {name: np.array([one[k][name] for one in runs]) for name in (*BATCH_MEASURES, "status")}
+        for k in range(3)
+    )
+    # What the study did not keep is from its cell run alone.
+    own |= {name: values[:done] for name, values in batch.items()}
+    speed = np.array([design.speed for design in designs[:done]])
+    duration = designs[0].tables.simulation.duration
+    return Audit(cells[:done], own, reference, finer, speed, duration, of)
 
 
-def reference_j1(design: Design) -> float:
-    """J1 of a design by the reference solver (s); NaN if that fails, be it by overflow."""
+def by_batch(design: Design) -> tuple[dict[str, float], dict[str, float]]:
+    """Measures and status of a design by the batch engine, at its step and at a quarter of it."""
+    lane, table = single_lane(design), design.tables.simulation
+    own = prepare(lane, table)
+    results = []
+    for prepared in (own, refined(design.string, table, own, PARTS)):
+        ran = run_batch(lane, prepared)
+        values = {name: float(column[0]) for name, column in ran.measures.items()}
+        results.append(values | {"status": float(ran.status[0])})
+    return results[0], results[1]
+
+
+def by_reference(design: Design) -> dict[str, float]:
+    """The same by the reference solver; all NaN if that fails, be it by overflow."""
     from drillctl.simulation.reference import solve
-    from drillctl.simulation.run import deviation
+    from drillctl.simulation.run import sample
 
-    table = design.tables.simulation
     try:
         with np.errstate(all="ignore"):  # a run that grows without bound counts as failed
-            motion = solve(design, tolerance=TOLERANCE)
+            ran = sample(solve(design, tolerance=TOLERANCE))
     except (SimulationError, ArithmeticError, np.linalg.LinAlgError):
-        return float("nan")
-    return deviation(motion, table.j1_from, table.duration) / design.speed
+        return dict.fromkeys((*BATCH_MEASURES, "status"), math.nan)
+    values = {k: math.nan if v is None else float(v) for k, v in ran.measures.as_dict().items()}
+    return values | {"status": float(STATUSES.index(ran.status))}
+
+
+def refined(string: Drillstring, table: SimulationTable, prepared: Prepared, parts: int) -> Any:
+    """The same run with each step in parts, and as many times the modes."""
+    if parts == 1:
+        return prepared
+    old = prepared.scheme
+    step = old.step / parts
+    followed = int((string.undamped_modes[0] * step <= ACCURACIES[table.accuracy].phase).sum())
+    modes = min(string.nodes, max(parts * old.modes, followed))
+    scheme = Scheme(step, parts * old.steps, modes, parts * old.sampling)
+    stepper = string_step(string, step, modes)
+    return Prepared(stepper, scheme, prepared.duration, prepared.j1_from)

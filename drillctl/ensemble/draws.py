@@ -105,6 +105,15 @@ def beyond_the_table(design: Design, drawn: tuple[str, ...]) -> Design:
     return design.replace({"bit_rock.outside_table": "extrapolate"})
 
 
+def drawn_designs(design: Design, values: dict[str, Array], numbers: Index) -> list[Design]:
+    """The design at some draws, by their numbers."""
+    design = beyond_the_table(design, tuple(values))
+    return [
+        design.replace({path: units.SI(column[n]) for path, column in values.items()})
+        for n in numbers.tolist()
+    ]
+
+
 def _group(part: list[_Drawn]) -> DrawnGroup:
     columns = {key: np.array([one.lane[key] for one in part]) for key in part[0].lane}
     design = part[0].design

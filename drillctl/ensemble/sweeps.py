@@ -258,12 +258,23 @@ def sweep(
         levels=table.levels,
         measures=result,
         status=status,
-        audit=auditing.audit(design, axes, result["j1"], table.levels, count, progress),
+        audit=_audit(design, axes, result, status, count, progress),
         step=step,
         modes=modes,
         seconds=times.lanes,
         total_seconds=time.perf_counter() - begin,
     )
+
+
+def _audit(
+    design: Design, axes: tuple[Axis, ...], measures: dict[str, Array], status: NDArray[np.int8],
+    count: int, progress: Progress,
+) -> auditing.Audit:  # fmt: skip
+    """Some cells of the map again."""
+    cells = auditing.choose_cells(measures["j1"], design.tables.map.levels, count)
+    designs = [cell_design(design, axes, int(cell)) for cell in cells]
+    batch = auditing.kept(measures, status, cells)
+    return auditing.audited(cells, batch, designs, progress=progress)
 
 
 def kept_measures(asked: Sequence[str] | None, where: str = "measures") -> tuple[str, ...]:

@@ -106,7 +106,7 @@ def sweep_line(result: Sweep, ax: Axes | None = None, system: units.System = "si
     ax.plot(x, result.j1, "-", color=style.BLACK, linewidth=style.LINE, label="batch engine")
     if len(result.audit.cells):
         ax.plot(
-            x[result.audit.cells], result.audit.reference, "o", markerfacecolor="none",
+            x[result.audit.cells], result.audit.reference["j1"], "o", markerfacecolor="none",
             markeredgecolor=style.VERMILLION, label="reference solver",
         )  # fmt: skip
     for level in result.levels:
@@ -140,7 +140,7 @@ def error_estimate(result: Doctor, ax: Axes | None = None) -> Figure:
     )  # fmt: skip
     if len(result.audit.cells):
         ax.loglog(
-            np.maximum(result.audit.batch, SMALLEST),
+            np.maximum(result.audit.batch["j1"], SMALLEST),
             np.maximum(result.audit.differences, ROUNDING),
             "o", markerfacecolor="none", markeredgecolor=style.VERMILLION, markersize=8,
             label="beside the reference solver",

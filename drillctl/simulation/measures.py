@@ -34,10 +34,14 @@ class Measure(NamedTuple):
     label: str  # as axes of pictures, heads of tables and legends call it
     unit: str  # SI; "1" for a number without
     meaning: str
+    # by how much two engines may differ in it: a share of its value, or of what it counts for at
+    # least, which may be the `duration` or the `set speed` of the run
+    tolerance: float = 1e-2
+    least: float | str = 1e-7
 
 
-def _row(label: str, unit: str, meaning: str) -> Any:
-    return field(metadata={"measure": (label, unit, meaning)})
+def _row(label: str, unit: str, meaning: str, *agreement: float | str) -> Any:
+    return field(metadata={"measure": (label, unit, meaning, *agreement)})
 
 
 @dataclass(frozen=True)
@@ -46,24 +50,34 @@ class Measures:
 
     j1: float = _row("J1", "s", "integral of |bit speed - set speed| over the set speed")
     j1_rate: float = _row("J1 rate", "1", "J1 over the length of its window")
-    stuck_time: float = _row("stuck time", "s", "total time that the bit stands still")
-    sticks: int = _row("sticks", "1", "times the bit comes to rest; a start at rest is one")
+    stuck_time: float = _row(
+        "stuck time", "s", "total time that the bit stands still", 1e-2, "duration"
+    )
+    sticks: int = _row(  # those shorter than a step of the batch engine escape it
+        "sticks", "1", "times the bit comes to rest; a start at rest is one", 0.25, 16.0
+    )
     stick_slip_index: float | None = _row(
         "stick-slip index", "1",
         "(max - min) / (2 mean) of the bit speed over the last 20 s; none if it never turned",
+        5e-2, 1.0,
     )  # fmt: skip
-    mean_bit_speed: float = _row("mean bit speed", "rad/s", "over the whole run")
-    min_bit_speed: float = _row("lowest bit speed", "rad/s", "over the whole run")
-    peak_bit_speed: float = _row("peak bit speed", "rad/s", "over the whole run")
-    peak_pipe_torque: float = _row(
-        "peak pipe torque", "N*m", "largest magnitude in the uppermost element"
+    mean_bit_speed: float = _row("mean bit speed", "rad/s", "over the whole run", 1e-2, "set speed")
+    min_bit_speed: float = _row(
+        "lowest bit speed", "rad/s", "over the whole run", 2e-2, "set speed"
     )
-    peak_top_torque: float = _row("peak top torque", "N*m", "largest magnitude at the drive")
+    peak_bit_speed: float = _row("peak bit speed", "rad/s", "over the whole run", 2e-2, "set speed")
+    peak_pipe_torque: float = _row(
+        "peak pipe torque", "N*m", "largest magnitude in the uppermost element", 2e-2
+    )
+    peak_top_torque: float = _row("peak top torque", "N*m", "largest magnitude at the drive", 2e-2)
     settling_time: float | None = _row(
         "settling time", "s",
         "after which the bit stays within 2 % of the set speed; none if not for the last 5 s",
+        1e-2, "duration",
     )  # fmt: skip
-    settling_time_wide: float | None = _row("settling time to 5 %", "s", "the same within 5 %")
+    settling_time_wide: float | None = _row(
+        "settling time to 5 %", "s", "the same within 5 %", 1e-2, "duration"
+    )
     mean_weight_on_bit: float = _row("mean WOB", "N", "time mean over the whole run")
     rop_proxy: float = _row(
         "ROP proxy", "1", "mean of weight x |bit speed| over nominal weight x set speed"
@@ -73,7 +87,11 @@ class Measures:
         "work per turn", "J", "the same per revolution of the bit; none if it hardly turned"
     )
     time_outside_table: float = _row(
-        "time outside table", "s", "with the weight on bit outside the friction table"
+        "time outside table",
+        "s",
+        "with the weight on bit outside the friction table",
+        1e-2,
+        "duration",
     )
 
     def as_dict(self) -> dict[str, Any]:

@@ -29,13 +29,14 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from drillctl import registry
 from drillctl.progress import SILENT, Progress
-from drillctl.store.tables import Table, number
+from drillctl.store.tables import Column, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from drillctl import units
     from drillctl.design import Design
+    from drillctl.ensemble.audit import Audit
     from drillctl.store.folder import Growing
 
 Group = Literal["Describe a rig", "Analyse the loop", "Simulate", "Decide", "Hand over"]
@@ -295,9 +296,49 @@ def in_batch(request: Requested) -> str:
     return ""
 
 
-def audited(audit: Any, what: str, cells: str) -> Iterator[Check]:
+def spelled(at: Mapping[str, float]) -> str:
+    """Values (SI) by path as text; `design` without any."""
+    return ", ".join(f"{path} = {value:.4g}" for path, value in at.items()) or "design"
+
+
+def audited(audit: Audit, what: str, cells: str) -> Iterator[Check]:
     """Whether the reference solver agrees, if anything was audited."""
     if len(audit.cells):
-        detail = f"{len(audit.cells)} {cells}, worst relative difference in J1 "
+        detail = audit.sentence(cells).removeprefix(f"audit: {audit.verdict}, ")
         question = f"Does the reference solver agree with {what}?"
-        yield Check(question, audit.verdict == "ok", detail + number(audit.worst, 2))
+        yield Check(question, audit.verdict == "ok", detail)
+
+
+def doubted(audit: Audit) -> Iterator[str]:
+    """What deserves attention in an audit."""
+    if audit.verdict == "check":
+        reasons = [f"the reference solver fails in {n}"] if (n := audit.failed.sum()) else []
+        reasons += [f"the engines differ in {', '.join(audit.wrong)}"] if audit.wrong else []
+        yield f"audit: check: {'; '.join(reasons) or 'the step is too long for most of them'}"
+
+
+def audit_tables(
+    audit: Audit, place: Callable[[int], str], ending: str = "", of: str = ""
+) -> Iterator[Table]:
+    """What was compared, and where one stick more or less decides."""
+    if not len(audit.cells):
+        return
+    columns = (
+        Column("measure"), Column("worst", "largest difference", digits=2),
+        Column("tolerance", "tolerance", digits=2), Column("beyond", "beyond it"),
+    )  # fmt: skip
+    rows = [[one.name, one.worst, one.tolerance, one.beyond] for one in audit.compared]
+    title = f"{of}audit: batch engine against reference solver, of {len(audit.cells)} {audit.of}s"
+    yield Table(f"audit{ending}", title, columns, rows, shown=audit.verdict == "check")
+    runs = (audit.batch, audit.finer, audit.reference)
+    lines = [
+        [place(int(audit.cells[k])), *(float(one["j1"][k]) for one in runs)]
+        for k in audit.verge.nonzero()[0]
+    ]
+    heads = (
+        Column(audit.of), Column("j1", "J1", "s", 6),
+        Column("finer_j1", "J1 at a quarter of the step", "s", 6),
+        Column("reference_j1", "J1 by the reference solver", "s", 6),
+    )  # fmt: skip
+    title = f"{of}audited {audit.of}s on the verge, where one stick more or less decides"
+    yield Table(f"verge{ending}", title, heads, lines, shown=bool(lines))

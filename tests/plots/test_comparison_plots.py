@@ -10,6 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import drillctl
+from drillctl.ensemble.audit import unaudited
 from drillctl.errors import InputError
 from drillctl.plots import j1_against_weight, j1_distributions, paired_differences
 from drillctl.plots.comparison import UNBEATEN, _unbeaten
@@ -35,7 +36,7 @@ def case(design, name, shift, failed=0):
     return ComparedCase(
         name=name, design=design, drawn={"bit_rock.a1_factor": np.ones(COUNT)},
         measures=measures, status=status, failures=(), weight_shift=0.0, step=0.02, modes=9,
-        nominal=Nominal(None, "not asked", None),
+        nominal=Nominal(None, "not asked", None), audit=unaudited("draw"),
     )  # fmt: skip
 
 

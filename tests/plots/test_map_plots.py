@@ -13,7 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import drillctl
-from drillctl.ensemble.audit import Audit
+from drillctl.ensemble.audit import Audit, unaudited
 from drillctl.errors import InputError
 from drillctl.plots import stability_map, sweep_line, time_response
 from drillctl.plots.style import axis_label
@@ -21,7 +21,7 @@ from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
 from drillctl.studies import Axis, Sweep, responses
 
 OK, FAILED = STATUSES.index("ok"), STATUSES.index("failed")
-NOBODY = Audit(np.array([], dtype=int), np.array([]), np.array([]))
+NOBODY = unaudited()
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +34,10 @@ def design():
 KP = Axis("controller.kp", "N*m*s/rad", np.linspace(0.0, 1000.0, 6))
 WEIGHT = Axis("operating_point.weight_on_bit", "N", np.linspace(100e3, 200e3, 5))
 LEVELS = (20.0, 30.0, 40.0)
+
+
+def of_j1(cells, batch, reference):
+    return Audit(cells, {"j1": batch}, {"j1": reference})
 
 
 def made(design, j1, axes=(KP, WEIGHT), audit=NOBODY, levels=LEVELS):
@@ -111,13 +115,13 @@ def test_minimum_is_marked(design, field):
 
 def test_audit_is_marked_and_judged(design, field):
     cells = np.array([0, 11])
-    fine = Audit(cells, field.ravel()[cells], field.ravel()[cells] * 1.001)
+    fine = of_j1(cells, field.ravel()[cells], field.ravel()[cells] * 1.001)
     figure = stability_map(made(design, field, audit=fine))
     ring = named(figure.axes[0], "audited with the reference solver")
     assert ring.get_xdata().tolist() == [0.0, 400.0]
     assert ring.get_ydata().tolist() == [100.0, 125.0]
     assert "audit: ok (2 cells, worst 1.0e-03 relative in J1)" in figure.get_supxlabel()
-    bad = Audit(cells, field.ravel()[cells], np.array([np.nan, np.nan]))
+    bad = of_j1(cells, field.ravel()[cells], np.array([np.nan, np.nan]))
     assert (
         "audit: check (2 cells, none finished"
         in stability_map(made(design, field, audit=bad)).get_supxlabel()
@@ -198,7 +202,7 @@ def test_labels_of_other_parameters():
 
 def test_line_shows_levels_and_audit(design, field):
     values = field[:, 1]
-    audit = Audit(np.array([1, 3]), values[[1, 3]], np.array([12.5, 16.5]))
+    audit = of_j1(np.array([1, 3]), values[[1, 3]], np.array([12.5, 16.5]))
     figure = sweep_line(made(design, values, axes=(KP,), audit=audit))
     (ax,) = figure.axes
     assert drawn(figure)

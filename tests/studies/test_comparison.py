@@ -394,9 +394,10 @@ def test_no_case_at_all():
 
 def same(one, other):
     for a, b in zip(one.cases, other.cases, strict=True):
+        assert a.audit.summary() == b.audit.summary()
         assert (
-            replace(a, drawn={}, measures={}, status=None, nominal=None).__dict__
-            == replace(b, drawn={}, measures={}, status=None, nominal=None).__dict__
+            replace(a, drawn={}, measures={}, status=None, nominal=None, audit=None).__dict__
+            == replace(b, drawn={}, measures={}, status=None, nominal=None, audit=None).__dict__
         )
         assert a.status.tobytes() == b.status.tobytes()
         for name, values in (*a.measures.items(), *a.drawn.items()):
@@ -440,3 +441,25 @@ def test_data_is_labelled(shipped):
     assert set(COMPARED) | {f"drawn.{A1}", f"drawn.{A2}", "status"} == ours
     assert data["j1"].dims == data[f"drawn.{A1}"].dims == ("case", "realization")
     assert all("units" in data[name].attrs for name in (*COMPARED, f"drawn.{A1}"))
+
+
+# --- the audit ---------------------------------------------------------------------------------
+
+
+def test_draws_of_every_case_are_audited_with_its_shifted_weight(paper):
+    design = paper.replace({
+        "map.audit_cells": 3, "map.levels": [50.0, 100.0], "compare.maps": False,
+        f"uncertain.{WEIGHT}": {"distribution": "normal", "cov": 0.01}, **SHORT,
+    })  # fmt: skip
+    cases = {"constant": design, "following": following(design, 4)}
+    result = compare(cases, realizations=4, equal_mean_weight=True)
+    for case in result.cases:
+        audit = case.audit
+        assert len(audit.cells) == 2  # three cells over two cases, in full
+        assert audit.verdict == "ok"
+        assert audit.worst < 1e-3
+        for name in ("j1", "mean_weight_on_bit", "peak_top_torque"):
+            np.testing.assert_array_equal(audit.batch[name], case.measures[name][audit.cells])
+            assert {one.name: one for one in audit.compared}[name].worst < 1e-2
+        assert case.summary(result.levels)["audit"] == audit.summary()
+    assert result.cases[1].weight_shift > 1e3  # without it the audit would be of other rigs

@@ -53,7 +53,9 @@ def test_the_summary_says_what_was_chosen_and_why(found):
     assert said["estimate"]["lanes"] == 63
     assert said["estimate"]["failed"] == 0
     assert said["estimate"]["median"] <= said["estimate"]["p90"] <= said["estimate"]["worst"]
-    assert [lane["reference_j1"] for lane in said["audit"]["lanes"]] == list(found.audit.reference)
+    assert [lane["reference_j1"] for lane in said["audit"]["lanes"]] == list(
+        found.audit.reference["j1"]
+    )
     assert said["audit"]["lanes"][0]["at"].keys() == {"controller.kp", "controller.ki"}
 
 
@@ -213,12 +215,15 @@ def test_an_audit_that_differs_by_more_than_said_is_looked_at(found):
     import dataclasses
 
     checked = found.audit
-    worse = audit.Audit(checked.cells, checked.batch, checked.reference * (1 + 1e-2))
+    worse = dataclasses.replace(
+        checked,
+        reference={"j1": checked.reference["j1"] * (1 + 1e-2)},
+        batch={"j1": checked.batch["j1"]},
+    )
     doubted = dataclasses.replace(found, audit=worse)
     assert doubted.confirmed is False
     assert doubted.verdict in ("check", "not_reached")
-    none = np.empty(0)
-    unaudited = dataclasses.replace(found, audit=audit.Audit(none.astype(int), none, none))
+    unaudited = dataclasses.replace(found, audit=audit.unaudited())
     assert unaudited.confirmed is None
     assert examination.CONFIRMED == 3.0
 
@@ -227,4 +232,4 @@ def test_the_audit_begins_no_run_after_its_time(monkeypatch):
     monkeypatch.setattr(examination, "AUDIT_SECONDS", 0.0)
     few = examined(cells=5, **{"simulation.duration": "5 s", "map.levels": [10, 20]})
     assert len(few.audit.cells) < few.requested_audit == 5
-    assert np.isfinite(few.audit.reference).all()
+    assert np.isfinite(few.audit.reference["j1"]).all()

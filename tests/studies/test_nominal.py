@@ -283,13 +283,14 @@ def test_progress_is_told_of_runs_and_cells(short):
     told = Told()
     compare({"pi": short, "torque": short.replace(FIXED_TORQUE), "other": short},
             realizations=3, progress=told)  # fmt: skip
-    assert told.tasks == [["simulating cases", 54, 54]]
+    assert told.tasks[0] == ["simulating cases", 54, 54]
+    assert {task for task, _, _ in told.tasks[1:]} == {"auditing draws"}
 
 
 def test_no_maps_are_no_task(short):
     told = Told()
     compare(short.replace({"compare.maps": False}), realizations=3, progress=told)
-    assert [task for task, _, _ in told.tasks] == ["simulating cases"]
+    assert [task for task, _, _ in told.tasks] == ["simulating cases", "auditing draws"]
 
 
 def test_a_part_that_tells_again_is_counted_once():

@@ -315,7 +315,7 @@ def test_other_measures_are_kept_on_request():
 def test_audited_lanes_are_those_of_their_draw():
     result = uncertainty(small(), realizations=3, audit_cells=2)
     assert len(result.audit.cells) == 2
-    assert (result.audit.batch == result.j1.ravel()[result.audit.cells]).all()
+    assert (result.audit.batch["j1"] == result.j1.ravel()[result.audit.cells]).all()
     assert result.audit.worst < 5e-3
 
 

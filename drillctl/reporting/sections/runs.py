@@ -77,7 +77,14 @@ def _alt(runs: dict[str, Study]) -> str:
     return f"Time responses of bit and top speed. {'; '.join(text)}."
 
 
-CHECKED = ("simulate", "map", "uncertainty", "doctor")  # whose numbers are checked
+CHECKED = (
+    "simulate",
+    "map",
+    "uncertainty",
+    "compare",
+    "tune",
+    "doctor",
+)  # whose numbers are checked
 DETAILS = ("energy", "scheme", "errors")  # their tables and pictures beside the checks
 
 

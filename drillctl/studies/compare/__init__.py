@@ -11,12 +11,16 @@ from drillctl.store.tables import Column, Quantity, Table, quantity
 from drillctl.studies.base import (
     DRAWS,
     SEED,
+    Check,
     Option,
     Picture,
     Recipe,
     Requested,
     Section,
     Study,
+    audit_tables,
+    audited,
+    doubted,
     in_batch,
 )
 
@@ -30,6 +34,8 @@ def tables(result: Comparison) -> Iterator[Table]:
     yield _measures(result)
     yield _shares(result)
     yield _draws(result)
+    for number, case in enumerate(result.cases, start=1):
+        yield from audit_tables(case.audit, "draw {}".format, f"-{number}", f"{case.name}: ")
 
 
 def _measures(result: Comparison) -> Table:
@@ -122,7 +128,7 @@ def pictures(result: Comparison) -> Iterator[Picture]:
 
 
 def remarks(result: Comparison, system: units.System) -> Iterator[str]:
-    """Draws, shifted weights, failures and missing maps."""
+    """Draws, shifted weights, failures, missing maps and audits."""
     yield (
         f"{result.realizations} draws of {', '.join(result.baseline.drawn)}, the same for every "
         f"case; seed {result.seed}."
@@ -135,10 +141,19 @@ def remarks(result: Comparison, system: units.System) -> Iterator[str]:
             yield f"{case.name}: {failure.sentence(result.realizations)}"
         if case.nominal.no_map and result.design.tables.compare.maps:
             yield f"{case.name}: no map: {case.nominal.no_map}"
+        yield f"{case.name}: {case.audit.sentence('draws')}"
+
+
+def checks(result: Comparison) -> Iterator[Check]:
+    """Whether the reference solver agrees with every case."""
+    for case in result.cases:
+        yield from audited(case.audit, f"the draws of {case.name}", "draws")
 
 
 def notes(result: Comparison) -> Iterator[str]:
-    """That there is nothing to compare with."""
+    """That there is nothing to compare with; where the engines differ."""
+    for case in result.cases:
+        yield from (f"{case.name}: {note}" for note in doubted(case.audit))
     if len(result.cases) == 1:
         yield "one case only: name others in compare.cases to compare it with"
 

@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +19,16 @@ import numpy as np
 from drillctl import units
 from drillctl.arrays import Array
 from drillctl.design import Design, parameter, to_toml
+from drillctl.ensemble.audit import Audit, audited, choose_cells, kept, unaudited
 from drillctl.ensemble.cases import Estimate, Runs
-from drillctl.ensemble.draws import CommonDraws, Failures, equalising_shift, run_draws, start_up
+from drillctl.ensemble.draws import (
+    CommonDraws,
+    Failures,
+    drawn_designs,
+    equalising_shift,
+    run_draws,
+    start_up,
+)
 from drillctl.ensemble.grid import axes_of, refuse_too_large
 from drillctl.ensemble.parameters import Uncertain, refuse_dependent, uncertain_parameters
 from drillctl.ensemble.sweeps import Region, Sweep, region, sweep
@@ -176,6 +184,7 @@ class ComparedCase(Runs):
         unit="N", means="added to the nominal weight on bit for the sake of equal means"
     )
     nominal: Nominal = label(means="map and motion at its own values, the weight shifted")
+    audit: Audit = label(means="draws simulated again by the reference solver")
 
     def region(self, level: float) -> Region | None:
         """Cells and outline of the nominal map at or under a level of J1 (s); None without map."""
@@ -200,6 +209,7 @@ class ComparedCase(Runs):
             "failures": [asdict(failure) for failure in self.failures],
             **picked(self, "weight_shift", "step", "modes"),
             "nominal": self.nominal.summary(),
+            "audit": self.audit.summary(),
         }
 
 
@@ -335,6 +345,9 @@ def compare(
     for name, variant in named.items():
         with variant.within(_of_case(name)):
             results.append(_compared(name, variant, draws, equal, axes, progress))
+    each = -(-design.tables.map.audit_cells // len(named))
+    levels = design.tables.map.levels
+    results = [replace(case, audit=_audit(case, levels, each, progress)) for case in results]
     return Comparison(
         design=design,
         cases=tuple(results),
@@ -371,4 +384,16 @@ def _compared(
         failures=failures,
         weight_shift=shift,
         nominal=nominal_runs(shifted_design(design, shift), axes, progress),
+        audit=unaudited("draw"),
     )
+
+
+def _audit(case: ComparedCase, levels: tuple[float, ...], count: int, progress: Progress) -> Audit:
+    """Some draws of a case again."""
+    numbers, shift = choose_cells(case.measures["j1"], levels, count), case.weight_shift
+    batch, drawn = kept(case.measures, case.status, numbers), dict(case.drawn)
+    if shift:
+        del batch["rop_proxy"]  # over a nominal weight that is shifted in designs, not in lanes
+        drawn |= {WEIGHT: drawn[WEIGHT] + shift} if WEIGHT in drawn else {}
+    designs = drawn_designs(shifted_design(case.design, shift), drawn, numbers)
+    return audited(numbers, batch, designs, "draw", progress)

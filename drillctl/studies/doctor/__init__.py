@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
 from drillctl.store.tables import Column, Table, number
-from drillctl.studies.base import Check, Option, Picture, Recipe, Run, Study
+from drillctl.studies.base import Check, Option, Picture, Recipe, Run, Study, spelled
 
 if TYPE_CHECKING:
     from drillctl.design import Design
@@ -20,10 +20,10 @@ MODES = {
     "given": "simulation.modes",
 }
 VERDICTS = {
-    "ok": "ok: errors are within what '{accuracy}' promises",
+    "ok": "ok: errors of this design are within what '{accuracy}' promises over the paper's map",
     "check": "check: the reference solver differs by more than the estimate",
-    "not_reached": "accuracy not reached: errors exceed what '{accuracy}' promises over the "
-    "paper's map",
+    "not_reached": "accuracy not reached: errors of this design exceed what '{accuracy}' promises "
+    "over the paper's map",
     "refused": "refused",
 }
 
@@ -93,8 +93,8 @@ def _errors(result: Doctor, estimate: dict[str, Any]) -> Table:
 def _audited(audit: dict[str, Any]) -> Table:
     rows = [
         [
-            ", ".join(f"{path} = {value:.4g}" for path, value in lane["at"].items()) or "design",
-            lane["j1"], lane["reference_j1"], lane["relative_difference"], lane["estimated_error"],
+            spelled(lane["at"]), lane["j1"], lane["reference_j1"], lane["relative_difference"],
+            lane["estimated_error"],
         ]
         for lane in audit["lanes"]
     ]  # fmt: skip

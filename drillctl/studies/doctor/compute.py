@@ -44,7 +44,6 @@ from drillctl.simulation.batch import Prepared, _shared, _turns, prepare
 from drillctl.simulation.kernels.string_step import BlockString, UndampedString
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
-from drillctl.simulation.propagator import string_step
 from drillctl.simulation.scheme import (
     ACCURACIES,
     PROMISES,
@@ -223,19 +222,6 @@ class ErrorEstimate:
         return float(np.median(np.log2(first[seen] / second[seen])))
 
 
-def refined(string: Drillstring, table: SimulationTable, prepared: Prepared, parts: int) -> Any:
-    """The same run with each step in parts, and as many times the modes."""
-    if parts == 1:
-        return prepared
-    old = prepared.scheme
-    step = old.step / parts
-    followed = int((string.undamped_modes[0] * step <= ACCURACIES[table.accuracy].phase).sum())
-    modes = min(string.nodes, max(parts * old.modes, followed))
-    scheme = Scheme(step, parts * old.steps, modes, parts * old.sampling)
-    stepper = string_step(string, step, modes)
-    return Prepared(stepper, scheme, prepared.duration, prepared.j1_from)
-
-
 SEED = 20122  # seed of the sample: the same design is examined at the same cells
 LANES = 256  # lanes in the sample; fewer if the map has fewer cells
 AUDITED = 4
@@ -292,13 +278,14 @@ class Doctor(Result, kind="doctor"):
     @property
     def confirmed(self) -> bool | None:
         """Whether the audited differences are such as the estimate expects; None without any."""
-        known = np.isfinite(self.audit.differences)
+        differences = self.audit.differences
+        known = np.isfinite(differences)
         if not known.any():
             return None
         own = self.estimate.of_lanes[np.searchsorted(self.cells, self.audit.cells)]
         expected = np.fmax(own, self.estimate.errors.median)
         allowed = CONFIRMED * expected + REFERENCE
-        return bool((self.audit.differences[known] <= allowed[known]).all())
+        return bool((differences[known] <= allowed[known]).all())
 
     @property
     def verdict(self) -> str:
@@ -337,8 +324,8 @@ class Doctor(Result, kind="doctor"):
         lane = int(np.searchsorted(self.cells, cell))
         return {
             "at": place_of(self.axes, cell),
-            "j1": float(self.audit.batch[number]),
-            "reference_j1": float(self.audit.reference[number]),
+            "j1": float(self.audit.batch["j1"][number]),
+            "reference_j1": float(self.audit.reference["j1"][number]),
             "relative_difference": float(self.audit.differences[number]),
             "estimated_error": float(self.estimate.of_lanes[lane]),
         }
@@ -403,7 +390,6 @@ def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILE
 
 def _refused(design: Design, begin: float) -> Doctor:
     """Of a rock that is no law of the batch engine."""
-    none = np.empty(0)
     return Doctor(
         design=design,
         axes=(),
@@ -412,7 +398,7 @@ def _refused(design: Design, begin: float) -> Doctor:
         status=np.empty(0, dtype=np.int8),
         scheme=None,
         strings=0,
-        audit=auditing.Audit(np.empty(0, dtype=np.int64), none, none),
+        audit=auditing.unaudited(),
         requested_audit=0,
         speed=None,
         refused="'printed-three-branch' is not a law of the batch engine: maps, regions and "
@@ -459,7 +445,7 @@ class _Sample:
         for part in self.parts:
             lanes, table = part.group.some(part.chosen), part.group.design.tables.simulation
             for row, parts in enumerate(REFINEMENTS):
-                made = refined(lanes.string, table, part.prepared, parts)
+                made = auditing.refined(lanes.string, table, part.prepared, parts)
                 batch = measured(lanes, made)
                 j1[row, part.at] = batch.measures["j1"]
                 if parts == 1:
@@ -509,9 +495,8 @@ def _audited(
         known = np.flatnonzero(np.isfinite(j1))
         lanes = np.sort(known[np.argsort(j1[known])][:count])
     designs = [cell_design(design, axes, int(cell)) for cell in cells[lanes]]
-    reference = auditing.references(designs, progress, AUDIT_SECONDS)
-    lanes = lanes[: len(reference)]
-    return auditing.Audit(cells[lanes], j1[lanes], reference)
+    batch = {"j1": j1[lanes]}
+    return auditing.audited(cells[lanes], batch, designs, "cell", progress, AUDIT_SECONDS)
 
 
 def _speed(part: _Part) -> dict[str, Any]:

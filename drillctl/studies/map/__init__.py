@@ -16,8 +16,11 @@ from drillctl.studies.base import (
     Run,
     Section,
     Study,
+    audit_tables,
     audited,
+    doubted,
     mapped_in_batch,
+    spelled,
 )
 
 if TYPE_CHECKING:
@@ -57,6 +60,9 @@ def tables(result: Sweep) -> Iterator[Table]:
         [[name.replace("_", " "), n, n / result.j1.size] for name, n in counts.items()],
         shown=False,
     )  # fmt: skip
+    from drillctl.ensemble.grid import place_of
+
+    yield from audit_tables(result.audit, lambda cell: spelled(place_of(result.axes, cell)))
 
 
 def pictures(result: Sweep) -> Iterator[Picture]:
@@ -111,8 +117,7 @@ def notes(result: Sweep) -> Iterator[str]:
     """What deserves attention."""
     if result.minimum is None:
         yield "warning: no cell gives a finite answer; see the statuses"
-    if result.audit.verdict == "check":
-        yield "audit: check: the engines differ by more than 1 % in J1 in some cell"
+    yield from doubted(result.audit)
 
 
 def files(result: Sweep, folder: Path) -> None:
@@ -150,6 +155,6 @@ STUDY = Study(
     recipes=(Recipe("map", "the J1 map", mapped_in_batch, order=40),),
     sections=(
         Section("map", "J1 over the map", ("map", "cells"), order=50,
-                shows=("map", "regions", "statuses")),
+                shows=("map", "regions", "statuses", "verge")),
     ),
 )  # fmt: skip

@@ -40,7 +40,11 @@ from drillctl.studies.base import (
     Run,
     Section,
     Study,
+    audit_tables,
+    audited,
+    doubted,
     in_batch,
+    spelled,
 )
 
 if TYPE_CHECKING:
@@ -63,6 +67,7 @@ def tables(result: Tune) -> Iterator[Table]:
     """Gains with their tolerance, others beside them; cells and draws for files alone."""
     yield _tolerance(result)
     yield _baselines(result)
+    yield from audit_tables(result.certificate.audit, "draw {}".format)
     about = result.certificate.neighbourhood
     cells = itertools.product(*(axis.values.tolist() for axis in about.axes))
     yield Table(
@@ -169,7 +174,7 @@ def _certified(result: Tune) -> Iterator[str]:
     """Worst draw, draws without a rig, requirements, margins, audit."""
     certificate = result.certificate
     if (worst := certificate.worst) is not None:
-        drawn = ", ".join(f"{path} = {v[worst]:.4g}" for path, v in certificate.drawn.items())
+        drawn = spelled({path: v[worst] for path, v in certificate.drawn.items()})
         yield f"worst realization (SI): J1 {certificate.runs.j1[worst]:.4g} s at {drawn}"
     for failure in certificate.failures:
         yield (
@@ -179,12 +184,8 @@ def _certified(result: Tune) -> Iterator[str]:
     for name, missed in certificate.violations.items():
         yield f"at the fresh realizations {name} is missed by {missed:.2%} of its limit"
     yield _margins(result)
-    audit = certificate.audit
-    yield (
-        f"audit: {certificate.audit_verdict}, {len(audit.cells)} realizations by the reference "
-        f"solver, largest relative difference in J1 {number(audit.worst, 2)}, "
-        f"{certificate.other_side} on the other side of the level"
-    )
+    other = f"{certificate.other_side} of them on the other side of the level"
+    yield f"{certificate.audit.sentence('draws')}; {other}"
 
 
 def _margins(result: Tune) -> str:
@@ -201,18 +202,18 @@ def _margins(result: Tune) -> str:
 
 
 def checks(result: Tune) -> Iterator[Check]:
-    """Whether the certificate is passed."""
+    """Whether the certificate is passed, and the reference solver agrees."""
     certificate, runs = result.certificate, result.certificate.runs
     required = percent(certificate.required)
     detail = f"{chance(runs.probability, runs.interval)}, {len(runs.j1)} draws"
     question = f"Is P(J1 ≤ {number(runs.level)} s) at least {required}, at fresh draws?"
     yield Check(question, certificate.passed, detail)
+    yield from audited(certificate.audit, "the certificate", "draws")
 
 
 def notes(result: Tune) -> Iterator[str]:
-    """Where the two engines disagree about the level."""
-    if result.certificate.audit_verdict == "check":
-        yield "audit: check: the engines differ about the level at some realization"
+    """Where the two engines disagree."""
+    yield from doubted(result.certificate.audit)
 
 
 def files(result: Tune, folder: Path) -> None:

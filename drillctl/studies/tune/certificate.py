@@ -24,12 +24,11 @@ from typing import Any
 
 import numpy as np
 
-from drillctl import units
 from drillctl.arrays import Array
 from drillctl.design import Design, parameter
-from drillctl.ensemble.audit import Audit, choose_cells, references
+from drillctl.ensemble.audit import Audit, audited, choose_cells
 from drillctl.ensemble.cases import Interval, share_interval
-from drillctl.ensemble.draws import Failures, beyond_the_table
+from drillctl.ensemble.draws import Failures, drawn_designs
 from drillctl.ensemble.grid import Axis
 from drillctl.errors import InputError
 from drillctl.linear import loop
@@ -354,19 +353,9 @@ class Certificate:
     @property
     def other_side(self) -> int:
         """Audited draws that the two solvers put on different sides of the level."""
-        level, audit = self.runs.level, self.audit
-        known = np.isfinite(audit.reference)
-        return int(np.count_nonzero(((audit.batch <= level) != (audit.reference <= level))[known]))
-
-    @property
-    def audit_verdict(self) -> str:
-        """`ok` if both solvers put every audited draw on the same side of the level."""
-        # `check` if they do not, or if the reference solver failed; `none` without audited draws.
-        # How far two solvers are apart on a draw that sticks to the end says little here.
-        if not len(self.audit.cells):
-            return "none"
-        fine = np.isfinite(self.audit.reference).all() and self.other_side == 0
-        return "ok" if fine else "check"
+        audit = self.audit
+        one, other = (values["j1"] <= self.runs.level for values in (audit.batch, audit.reference))
+        return int(np.count_nonzero((one != other) & ~audit.failed))
 
     @property
     def message(self) -> str:
@@ -395,12 +384,7 @@ class Certificate:
             "margins": self.margins or None,
             "no_margins": self.no_margins or None,
             "worst": self._worst(),
-            "audit": {
-                "realizations": len(self.audit.cells),
-                "worst_relative_difference": self.audit.worst,
-                "other_side_of_level": self.other_side,
-                "verdict": self.audit_verdict,
-            },
+            "audit": {**self.audit.summary(), "other_side_of_level": self.other_side},
             "tolerance": {one.path: one.summary() for one in self.tolerances},
             "neighbourhood": {
                 "parameters": [axis.path for axis in self.neighbourhood.axes],
@@ -463,9 +447,5 @@ def _audit(
 ) -> Audit:
     """Some draws by the reference solver, spread over what lies under the level and beyond."""
     numbers = choose_cells(runs.j1, (runs.level,), count)
-    design = beyond_the_table(design, tuple(fresh.drawn))
-    designs = [
-        design.replace({path: units.SI(column[n]) for path, column in fresh.drawn.items()})
-        for n in numbers.tolist()
-    ]
-    return Audit(numbers, runs.j1[numbers], references(designs, progress))
+    designs = drawn_designs(design, fresh.drawn, numbers)
+    return audited(numbers, {"j1": runs.j1[numbers]}, designs, "draw", progress)

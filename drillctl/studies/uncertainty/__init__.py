@@ -25,9 +25,12 @@ from drillctl.studies.base import (
     Run,
     Section,
     Study,
+    audit_tables,
     audited,
+    doubted,
     in_batch,
     mapped_in_batch,
+    spelled,
 )
 
 if TYPE_CHECKING:
@@ -87,6 +90,11 @@ def tables(result: Uncertainty) -> Iterator[Table]:
     ]
     title = "areas of the inner regions against the number of draws"
     yield Table("convergence", title, columns, rows, shown=False)
+    cells = result.nominal.size
+    yield from audit_tables(
+        result.audit,
+        lambda lane: f"draw {lane // cells}, {spelled(result.at(lane % cells))}",
+    )
 
 
 def _areas(name: str, title: str, result: Uncertainty) -> Table:
@@ -223,8 +231,7 @@ def checks(result: Uncertainty) -> Iterator[Check]:
 
 def notes(result: Uncertainty) -> Iterator[str]:
     """What deserves attention."""
-    if result.audit.verdict == "check":
-        yield "audit: check: the engines differ by more than 1 % in J1 in some lane"
+    yield from doubted(result.audit)
 
 
 def files(result: Uncertainty, folder: Path) -> None:

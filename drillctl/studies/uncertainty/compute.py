@@ -42,7 +42,6 @@ if TYPE_CHECKING:
 
 SoFar = Callable[[], Uncertainty | None]
 
-AUDITED = 64  # realizations that audited lanes are chosen from: the first ones are as good as any
 COPIES = 4  # of what is kept of a lane, that are held at one time at most
 
 
@@ -217,15 +216,14 @@ class _Study:
         return result, seconds
 
     def _audit(self, result: Uncertainty, count: int) -> auditing.Audit:
-        known = np.where(result.censored, np.nan, result.j1)[:AUDITED]
-        lanes = auditing.choose_cells(known, self.levels, count)
+        lanes = result.to_audit(count)
         rig = beyond_the_table(self.design, tuple(result.drawn))
         designs = []
         for lane in lanes:
             row, cell = divmod(int(lane), result.nominal.size)
             designs.append(cell_design(rig, self.axes, cell).replace(_of(result.drawn, row)))
-        reference = auditing.references(designs, self.progress)
-        return auditing.Audit(lanes, known.ravel()[lanes], reference, "lane")
+        batch = auditing.kept(result.measures, result.status, lanes)
+        return auditing.audited(lanes, batch, designs, "lane", self.progress)
 
     def _failures(self, result: Uncertainty) -> tuple[Failures, ...]:
         """Realizations that failed in every cell, by reason."""

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.arrays import Array, Mask
+from drillctl.arrays import Array, Index, Mask
 from drillctl.design import Design
 from drillctl.design.uncertain_tables import UntilTable
-from drillctl.ensemble.audit import Audit, unaudited
+from drillctl.ensemble.audit import Audit, choose_cells, unaudited
 from drillctl.ensemble.cases import CONFIDENCE, Interval
 from drillctl.ensemble.draws import Failures
 from drillctl.ensemble.grid import Axis, axes_of, other_axes, place_of, span
@@ -63,6 +63,7 @@ from drillctl.studies.uncertainty.sensitivity import Sensitivity
 if TYPE_CHECKING:
     import shapely
 
+AUDITED = 64  # realizations that audited lanes are chosen from: the first ones are as good as any
 FEWEST = 16  # realizations that the first point of a curve has, or two a replicate
 
 
@@ -458,9 +459,15 @@ class Uncertainty(Result, kind="uncertainty"):
     def requested(self) -> tuple[Design, dict[str, Any]]:
         """Axes and audited lanes that the design does not give."""
         settings = other_axes(self, map_axes)
-        if len(self.audit.cells) != self.design.tables.map.audit_cells:
+        lanes = self.to_audit(self.design.tables.map.audit_cells)
+        if not np.array_equal(lanes, self.audit.cells):
             settings["audited"] = self.audit.cells.tolist()
         return self.design, settings
+
+    def to_audit(self, count: int) -> Index:
+        """Lanes to audit; none that was stopped."""
+        known = np.where(self.censored, np.nan, self.j1)[:AUDITED]
+        return choose_cells(known, self.levels, count)
 
     def growing(self) -> Growing | None:
         """The number of realizations, to which more can be added."""

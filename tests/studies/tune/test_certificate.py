@@ -8,7 +8,7 @@ import pytest
 
 import drillctl
 from drillctl.design import to_toml
-from drillctl.ensemble.audit import reference_j1
+from drillctl.ensemble.audit import by_reference
 from drillctl.ensemble.cases import share_interval
 from drillctl.ensemble.draws import drawn_lanes, run_draws
 from drillctl.ensemble.parameters import draw
@@ -93,12 +93,17 @@ def test_margins_and_audit_are_those_of_their_rooms(found):
     assert len(audit.cells) == 2
     number = int(audit.cells[0])
     rock = {path: column[number] for path, column in certificate.drawn.items()}
-    assert audit.reference[0] == reference_j1(design.replace(rock))
-    assert audit.batch[0] == certificate.runs.j1[number]
-    assert certificate.audit_verdict == "ok"
-    beyond = dataclasses.replace(audit, reference=audit.reference + 100.0)
+    known = by_reference(design.replace(rock))
+    assert {name: values[0] for name, values in audit.reference.items()} == pytest.approx(
+        known, rel=0.0, abs=0.0, nan_ok=True
+    )
+    j1 = audit.batch["j1"]
+    assert j1[0] == certificate.runs.j1[number]
+    assert (audit.verdict, certificate.other_side) == ("ok", 0)
+    beyond = dataclasses.replace(audit, reference=audit.reference | {"j1": j1 + 100.0})
     other = dataclasses.replace(certificate, audit=beyond)
-    assert (other.other_side, other.audit_verdict) == ((audit.batch <= 33.0).sum(), "check")
+    assert (other.other_side, beyond.verdict) == ((j1 <= 33.0).sum(), "check")
+    assert other.summary()["audit"]["other_side_of_level"] == other.other_side
 
 
 @pytest.mark.parametrize(
@@ -283,7 +288,7 @@ def test_its_section_of_a_report_holds_its_message_tables_and_pictures(found, tm
         blocks = SECTIONS["tuning"].build(gathered)
     assert found.message in {block.text for block in blocks if isinstance(block, Text)}
     tables = {block.name: block for block in blocks if isinstance(block, Table)}
-    assert set(tables) == {"tolerance", "baselines"}
+    assert set(tables) - {"verge"} == {"tolerance", "baselines"}
     assert tables["tolerance"].rows[0][:2] == (
         "controller.kp",
         f"{found.tuning.values[0]:.6g} N m s",
@@ -294,9 +299,11 @@ def test_its_section_of_a_report_holds_its_message_tables_and_pictures(found, tm
     ]
     drawn = [block.name for block in blocks if isinstance(block, Figure)]
     assert drawn == ["baselines", "neighbourhood"]
-    ((check,),) = (block.checks for block in blocks if isinstance(block, Checks))
+    ((check, audited),) = (block.checks for block in blocks if isinstance(block, Checks))
     assert check.answer == found.certificate.passed
     assert "at fresh draws" in check.question
+    assert audited.answer == (found.certificate.audit.verdict == "ok")
+    assert "reference solver agree with the certificate" in audited.question
 
 
 def test_runs_without_an_answer_are_null_and_come_back(found, tmp_path):
