@@ -15,13 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy"}
-NUMBERS = 4  # numbers that every call passes, used or not
-SIGNATURE = types.float64(types.CPointer(types.float64), *[types.float64] * NUMBERS)
+STATE = types.CPointer(types.float64)  # how an array is passed
+CALL = (STATE, *[types.float64] * 4)  # numbers of a law, and four more, used or not
 
 FARTHEST = 100.0
 """Largest exponent: a trial step far past zero speed is to be rejected, not to overflow."""
@@ -52,21 +50,6 @@ def _exp(x: float) -> float:
     return math.exp(min(x, FARTHEST))
 
 
-@intrinsic
-def call(typing_context: Any, address: Any, law: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-    """Call the function at `address` with the numbers of a law, a flat array, and four more."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        double = ir.DoubleType()
-        kind = ir.FunctionType(double, [double.as_pointer(), *[double] * NUMBERS])
-        function = builder.inttoptr(arguments[0], kind.as_pointer())
-        data = context.make_array(signature.args[1])(context, builder, arguments[1]).data
-        return builder.call(function, [data, *arguments[2:]])
-
-    numbers = [types.float64] * NUMBERS
-    return types.float64(types.int64, law, *numbers), generate
-
-
 # What each call computes, from the law `law` and the numbers a, b, c, d.
 FORMS = {
     "torque_and_slope": "method(law, a, b, exp)[0]",
@@ -89,7 +72,7 @@ def _compiled(kind: Any, method: str) -> Any:
     name = f"{kind.__name__}_{method}_{version()}"
     fields = ", ".join(f"p[{k}]" for k in range(len(kind._fields)))
     text = (
-        f"def {name}(numbers, a, b, c, d):\n"
+        f"def {name}(rig, numbers, a, b, c, d):\n"
         f"    p = carray(numbers, {max(1, len(kind._fields))})\n"
         f"    law = Law({fields})\n"
         f"    return {FORMS[method]}\n"
@@ -101,7 +84,7 @@ def _compiled(kind: Any, method: str) -> Any:
     # Under the name of this file, next to which numba keeps what it compiles.
     exec(compile(text, __file__, "exec"), scope)
     ours = kind.__module__.startswith("drillctl.")
-    return numba.cfunc(SIGNATURE, cache=ours, **OPTIONS)(scope[name])
+    return numba.cfunc(types.float64(types.voidptr, *CALL), cache=ours, **OPTIONS)(scope[name])
 
 
 def jitted(function: Any) -> Any:

@@ -11,6 +11,7 @@ factorised from the top, so that the same factors serve the string without its l
 
 from __future__ import annotations
 
+import inspect
 import math
 from typing import Any
 
@@ -24,9 +25,17 @@ from drillctl.arrays import Array
 from drillctl.rig.program import Ramp
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.top_drive.real_drive import MEMORY, SAMPLED_MEMORY, respond, respond_held, sample
-from drillctl.simulation.law_calls import call, from_numbers, jitted, on_disk, version
+from drillctl.simulation.law_calls import (
+    CALL,
+    OPTIONS,
+    STATE,
+    from_numbers,
+    jitted,
+    on_disk,
+    version,
+)
 
-compiled = numba.njit(error_model="numpy", fastmath={"contract"}, nogil=True)
+compiled = numba.njit(fastmath={"contract"}, nogil=True, **OPTIONS)
 """Decorator of what is part of the solver: products and sums may be fused, nothing else."""
 
 STUCK, CREEPING, PUSHED, FORWARD_EDGE, BACKWARD_EDGE = 0, 2, 3, 4, 5
@@ -109,6 +118,74 @@ def _pointer(typing_context: Any, address: Any) -> Any:
     return types.CPointer(types.float64)(types.int64), generate
 
 
+def by_address(field: str, *kinds: Any) -> Any:
+    """A call of the function whose address a rig holds: of the rig and of `kinds`.
+
+    What is called so is compiled once by itself, and not into each place that calls it. An array
+    (`STATE`) is passed as the address of its numbers.
+    """
+    place = dict(RIG.fields or {})[field][1]
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        whole, byte = ir.IntType(64), ir.IntType(8)
+        record = builder.bitcast(arguments[0], byte.as_pointer())
+        spot = builder.gep(record, [ir.Constant(whole, place)])
+        address = builder.load(builder.bitcast(spot, whole.as_pointer()))
+        passed = [record]
+        for kind, value in zip(signature.args[1:], arguments[1:], strict=True):
+            is_array = isinstance(kind, types.Array)
+            passed.append(
+                context.make_array(kind)(context, builder, value).data if is_array else value
+            )
+        kind = ir.FunctionType(ir.DoubleType(), [value.type for value in passed])
+        return builder.call(builder.inttoptr(address, kind.as_pointer()), passed)
+
+    def typed(context: Any, rig: Any, *given: Any) -> Any:
+        taken = [one if kind is STATE else kind for kind, one in zip(kinds, given, strict=True)]
+        return types.float64(rig, *taken), generate
+
+    names = ["context", "rig", *(f"a{k}" for k in range(len(kinds)))]
+    typed.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
+    )
+    return intrinsic(typed)
+
+
+_weight_law, _drive_law = by_address("weight", *CALL), by_address("drive_torque", *CALL)
+_rock_law, _static_law = by_address("rock_torque", *CALL), by_address("static_torque", *CALL)
+WEIGHING = (types.float64, types.float64, STATE)
+weight = by_address("weighing", *WEIGHING)
+"""Weight on bit (N) at a time (s) and a bit speed in its own direction (rad/s), of a state."""
+RATES = (types.float64, types.int64, STATE, STATE)
+rates_of = by_address("rates", *RATES)
+"""Rates of a state at a time (s) in a phase, in place; returns the torque on the bit (N m)."""
+
+
+def callable_at(function: Any, *kinds: Any) -> int:
+    """Address of a function of a rig and of `kinds`, compiled by itself."""
+    names = [f"a{k}" for k in range(len(kinds))]
+    views = [
+        f"carray({name}, rig.states)" if kind is STATE else name
+        for name, kind in zip(names, kinds, strict=True)
+    ]
+    name = f"{function.__name__.strip('_')}_{version()}"
+    scope = {"__name__": __name__, "carray": numba.carray, "function": function}
+    text = (
+        f"def {name}(pointer, {', '.join(names)}):\n"
+        f"    rig = carray(pointer, 1)[0]\n"
+        f"    return float(function(rig, {', '.join(views)}))\n"
+    )
+    exec(compile(text, __file__, "exec"), scope)
+    signature = types.float64(types.CPointer(numba.from_dtype(RIG)), *kinds)
+    made = numba.cfunc(signature, cache=True, **OPTIONS, fastmath={"contract"})(scope[name])
+    _alive.append(made)
+    return int(made.address)
+
+
+_alive: list[Any] = []
+"""Functions whose addresses are in use: each stays while the process lives."""
+
+
 @compiled
 def band(rig: Any, row: int) -> Any:
     """A row of `bands`."""
@@ -160,68 +237,6 @@ def pipe_torque(rig: Any, state: Any) -> float:
     return band(rig, STIFFNESS)[n - 2] * (state[n - 2] - state[n - 1])
 
 
-# What is compiled by itself.
-
-
-def by_address(field: str, numbers: tuple[Any, ...], arrays: int) -> Any:
-    """A call of the function whose address a rig holds: of numbers, then of states.
-
-    What is called so is compiled once by itself, and not into each place that calls it.
-    """
-    place = dict(RIG.fields or {})[field][1]
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        whole, byte = ir.IntType(64), ir.IntType(8)
-        record = builder.bitcast(arguments[0], byte.as_pointer())
-        spot = builder.gep(record, [ir.Constant(whole, place)])
-        address = builder.load(builder.bitcast(spot, whole.as_pointer()))
-        passed = [record, *arguments[1 : 1 + len(numbers)]]
-        for kind, array in zip(
-            signature.args[1 + len(numbers) :], arguments[1 + len(numbers) :], strict=True
-        ):
-            passed.append(context.make_array(kind)(context, builder, array).data)
-        kind = ir.FunctionType(ir.DoubleType(), [value.type for value in passed])
-        return builder.call(builder.inttoptr(address, kind.as_pointer()), passed)
-
-    names = [f"a{k}" for k in range(1 + len(numbers) + arrays)]
-    scope: dict[str, Any] = {"types": types, "generate": generate, "numbers": numbers}
-    exec(
-        f"def asked(context, {', '.join(names)}):\n"
-        f"    return types.float64({names[0]}, *numbers, "
-        f"{', '.join(names[1 + len(numbers) :])}), generate",
-        scope,
-    )
-    return intrinsic(scope["asked"])
-
-
-def callable_at(function: Any, numbers: tuple[Any, ...], arrays: int) -> int:
-    """Address of a function of a rig, numbers and states, compiled by itself."""
-    record, doubles = types.CPointer(numba.from_dtype(RIG)), types.CPointer(types.float64)
-    given = [f"n{k}" for k in range(len(numbers))]
-    states = [f"s{k}" for k in range(arrays)]
-    name = f"{function.__name__.strip('_')}_{version()}"
-    scope = {"__name__": __name__, "carray": numba.carray, "function": function}
-    views = ", ".join(f"carray({state}, rig.states)" for state in states)
-    text = (
-        f"def {name}(pointer, {', '.join(given + states)}):\n"
-        f"    rig = carray(pointer, 1)[0]\n"
-        f"    return float(function(rig, {', '.join(given)}, {views}))\n"
-    )
-    exec(compile(text, __file__, "exec"), scope)
-    signature = types.float64(record, *numbers, *[doubles] * arrays)
-    made = numba.cfunc(signature, cache=True, error_model="numpy", fastmath={"contract"})
-    return _kept(made(scope[name]))
-
-
-_alive: list[Any] = []
-
-
-def _kept(function: Any) -> int:
-    """Address of a compiled function, which stays while the process lives."""
-    _alive.append(function)
-    return int(function.address)
-
-
 # The string.
 
 
@@ -258,19 +273,25 @@ def _forces(rig: Any, state: Any, force: Any) -> None:
 
 
 @compiled
+def solve_factorised(pivot: Any, factor: Any, count: int, x: Any) -> None:
+    """Solve a tridiagonal system in place, of its factors and of one over its pivots."""
+    for i in range(1, count):
+        x[i] -= factor[i - 1] * x[i - 1]
+    for i in range(count):
+        x[i] *= pivot[i]
+    for i in range(count - 2, -1, -1):
+        x[i] -= factor[i] * x[i + 1]
+
+
+@compiled
 def _accelerate(rig: Any, force: Any, count: int) -> None:
     """Solve M a = f for the first `count` nodes, in place."""
-    pivot, factor = band(rig, PIVOT), band(rig, FACTOR)
-    if not rig.coupled:
-        for i in range(count):
-            force[i] *= pivot[i]
+    pivot = band(rig, PIVOT)
+    if rig.coupled:
+        solve_factorised(pivot, band(rig, FACTOR), count, force)
         return
-    for i in range(1, count):
-        force[i] -= factor[i - 1] * force[i - 1]
     for i in range(count):
         force[i] *= pivot[i]
-    for i in range(count - 2, -1, -1):
-        force[i] -= factor[i] * force[i + 1]
 
 
 @compiled
@@ -400,12 +421,7 @@ def _asked(rig: Any, time: float, state: Any) -> float:
         seen = past(rig, time - path[DELAY])
     else:
         seen = _signal(rig, memory, bit_speed(rig, state))
-    return call(rig.weight, law(rig, WEIGHT), seen, nominal, 0.0, 0.0)
-
-
-TIME_AND_SPEED = (types.float64, types.float64)
-weight = by_address("weighing", TIME_AND_SPEED, 1)
-"""Weight on bit (N) at a time (s) and a bit speed in its own direction (rad/s), of a state."""
+    return _weight_law(rig, law(rig, WEIGHT), seen, nominal, 0.0, 0.0)
 
 
 @compiled
@@ -414,7 +430,7 @@ def weight_in_place(rig: Any, time: float, speed: float, state: Any) -> float:
     if rig.weight_kind == AT_ONCE:
         present = law(rig, PRESENT)
         present[0] = _nominal(rig, time)
-        return call(rig.weight, present, speed, 0.0, 0.0, 0.0)
+        return _weight_law(rig, present, speed, 0.0, 0.0, 0.0)
     if law(rig, PATH)[HOIST] > 0.0:
         return state[rig.states - 1]
     return _asked(rig, time, state)
@@ -479,8 +495,8 @@ def _read_window(rig: Any, time: float, memory: Any) -> None:
         speed = past(rig, (k - 1.0 + i / (samples - 1.0)) * window)
         low, high, total = min(low, speed), max(high, speed), total + speed
     reading = rig.weight_states - 2
-    memory[reading] = call(
-        rig.weight, law(rig, WEIGHT), memory[reading], low, high, total / samples
+    memory[reading] = _weight_law(
+        rig, law(rig, WEIGHT), memory[reading], low, high, total / samples
     )
 
 
@@ -499,14 +515,14 @@ def friction(rig: Any, time: float, state: Any, speed: float) -> float:
     Continued smoothly past zero speed, so that the event can be located that ends the phase.
     """
     load = weight(rig, time, speed, state)
-    return call(rig.rock_torque, _rock(rig, time), load, speed, 0.0, 0.0)
+    return _rock_law(rig, _rock(rig, time), load, speed, 0.0, 0.0)
 
 
 @compiled
 def static_torque(rig: Any, time: float, state: Any) -> float:
     """Largest torque on a bit at rest (N m)."""
     load = weight(rig, time, 0.0, state)
-    return call(rig.static_torque, _rock(rig, time), load, 0.0, 0.0, 0.0)
+    return _static_law(rig, _rock(rig, time), load, 0.0, 0.0, 0.0)
 
 
 @compiled
@@ -536,7 +552,7 @@ def drive_torque(rig: Any, time: float, state: Any, free: float, gain: float, ra
     if rig.drive_kind == IDEAL:
         if program[0] != 0.0:
             angle -= _ramp_integral(_ramp(program), time)
-        return call(rig.drive_torque, numbers, angle, speed - lead, 0.0, 0.0)
+        return _drive_law(rig, numbers, angle, speed - lead, 0.0, 0.0)
     first = 2 * n + WORKS
     memory = state[first : first + rig.drive_states]
     if rig.drive_kind == CONTINUOUS:
@@ -595,11 +611,6 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
     if rig.weight_states:
         weight_rates(rig, time, state, top_torque, rates)
     return bit_torque
-
-
-TIME_AND_PHASE = (types.float64, types.int64)
-rates_of = by_address("rates", TIME_AND_PHASE, 2)
-"""Rates of a state at a time (s) in a phase, in place; returns the torque on the bit (N m)."""
 
 
 def factorised(bands: Array) -> Array:

@@ -14,80 +14,10 @@ import numpy as np
 from numba import types
 
 from drillctl.rig.top_drive import SampledDrive
-from drillctl.simulation.law_calls import on_disk
-from drillctl.simulation.reference_rates import (
-    AHEAD,
-    ALARMED,
-    AT_ONCE,
-    BACKWARD_EDGE,
-    BEGIN,
-    BIT_ANGLE,
-    BIT_SPEED,
-    CREEPING,
-    DELAY,
-    DRIVE,
-    FORWARD_EDGE,
-    LATE,
-    LENGTH,
-    PATH,
-    PERIOD,
-    PUSHED,
-    ROUNDING,
-    SAMPLED,
-    STUCK,
-    TIME_AND_PHASE,
-    TIME_AND_SPEED,
-    WINDOW,
-    begin_weight,
-    bit_speed,
-    by_address,
-    callable_at,
-    compiled,
-    copy,
-    friction,
-    is_held,
-    law,
-    on_tape,
-    pipe_torque,
-    rates_in_place,
-    rates_of,
-    read_weight,
-    sample_drive,
-    slope_on_tape,
-    static_torque,
-    tape_row,
-    weight_in_place,
-)
-from drillctl.simulation.reference_steps import (
-    DENSE_STAGES,
-    LARGEST,
-    SAFETY,
-    SMALLEST,
-    STAGES,
-    Dense,
-    Tableau,
-    Work,
-    explicit_dense,
-    explicit_dense_output,
-    explicit_error,
-    explicit_step,
-    first_length,
-    record,
-    record_whole,
-    state_at,
-    tableau,
-)
-from drillctl.simulation.reference_stiff import (
-    StiffTableau,
-    StiffWork,
-    change_with_time,
-    linearise,
-    stiff_dense_output,
-    stiff_error,
-    stiff_step,
-    stiff_tableau,
-    stiff_work,
-)
+from drillctl.simulation import reference_rates as f
+from drillctl.simulation import reference_steps as s
+from drillctl.simulation import reference_stiff as stiff_steps
+from drillctl.simulation.law_calls import STATE, on_disk
 
 LONGEST_STEP = 0.05  # longest step (s): a touch of zero speed shorter than that could go unseen
 WITHIN_STEP = 2e-3
@@ -125,7 +55,7 @@ TIME, STEP, STOP, PIECE_BEGIN, BIT_TORQUE, MARGINS = range(6)
 PHASE, IN_PIECE, PIECES, CHANGES, CROSSINGS, EXTREMES, REFUSED = range(7)
 
 
-@compiled
+@f.compiled
 def direction_of(rig: Any, phase: int) -> int:
     """Direction of slip; 0 where the bit counts as stuck."""
     return phase if abs(phase) == 1 else 0
@@ -134,32 +64,32 @@ def direction_of(rig: Any, phase: int) -> int:
 # The edges of the printed law.
 
 
-@compiled
+@f.compiled
 def _border(rig: Any, side: int) -> float:
     return side * rig.tolerance - rig.set_speed
 
 
-@compiled
+@f.compiled
 def _beyond(rig: Any, state: Any, side: int) -> float:
     """How far the bit turns beyond an edge (rad/s), exactly zero at it."""
     return side * (state[2 * rig.nodes - 1] - _border(rig, side))
 
 
-@compiled
+@f.compiled
 def _overload(rig: Any, time: float, state: Any) -> float:
     """Pipe torque beyond the static one (N m)."""
-    return abs(pipe_torque(rig, state)) - static_torque(rig, time, state)
+    return abs(f.pipe_torque(rig, state)) - f.static_torque(rig, time, state)
 
 
-@compiled
+@f.compiled
 def _side(phase: int) -> int:
     """Side of the tolerance of a phase at or beyond an edge."""
-    if phase == FORWARD_EDGE:
+    if phase == f.FORWARD_EDGE:
         return 1
-    return -1 if phase == BACKWARD_EDGE else phase
+    return -1 if phase == f.BACKWARD_EDGE else phase
 
 
-@compiled
+@f.compiled
 def _edge_margins(
     rig: Any, time: float, state: Any, side: int, holding: float
 ) -> tuple[float, float]:
@@ -168,20 +98,20 @@ def _edge_margins(
     The bit keeps its speed under the holding torque. It turns faster where Equation 5 takes
     less than that, and falls back where Equation 3 or 4 takes more.
     """
-    static = static_torque(rig, time, state)
-    within = min(max(pipe_torque(rig, state), -static), static)
-    turning = side * friction(rig, time, state, side * bit_speed(rig, state))
-    return side * (turning - holding), side * (holding - within) + ROUNDING * static
+    static = f.static_torque(rig, time, state)
+    within = min(max(f.pipe_torque(rig, state), -static), static)
+    turning = side * f.friction(rig, time, state, side * f.bit_speed(rig, state))
+    return side * (turning - holding), side * (holding - within) + f.ROUNDING * static
 
 
-@compiled
+@f.compiled
 def _printed_phase(rig: Any, unused: Any, time: float, phase: int, state: Any) -> int:
     """The phase of a bit under the printed law: by its speed, and at an edge by its margins.
 
     From an edge a bit goes to where it left it, be it by rounding alone; at an edge that it comes
     to it stays if both margins keep it.
     """
-    side = _side(phase) if phase >= FORWARD_EDGE else 0
+    side = _side(phase) if phase >= f.FORWARD_EDGE else 0
     for other in (1, -1):
         beyond = _beyond(rig, state, other)
         if side == 0 and beyond > 0.0:
@@ -189,26 +119,26 @@ def _printed_phase(rig: Any, unused: Any, time: float, phase: int, state: Any) -
         if side == 0 and beyond == 0.0:
             side = other
     if side != 0:
-        holding = rates_of(rig, time, STUCK, state, unused)
+        holding = f.rates_of(rig, time, f.STUCK, state, unused)
         outward, inward = _edge_margins(rig, time, state, side, holding)
-        if phase >= FORWARD_EDGE:
+        if phase >= f.FORWARD_EDGE:
             if outward <= inward:
                 return side
         elif outward < 0.0:
             return side
         elif inward >= 0.0:
-            return FORWARD_EDGE if side == 1 else BACKWARD_EDGE
+            return f.FORWARD_EDGE if side == 1 else f.BACKWARD_EDGE
     # Equation 3 or 4: by the pipe's torque in a moment, as now it may be at its limit.
-    rates_of(rig, time, CREEPING, state, unused)
+    f.rates_of(rig, time, f.CREEPING, state, unused)
     for i in range(len(state)):
-        unused[i] = state[i] + AHEAD * unused[i]
-    return PUSHED if _overload(rig, time + AHEAD, unused) > 0.0 else CREEPING
+        unused[i] = state[i] + f.AHEAD * unused[i]
+    return f.PUSHED if _overload(rig, time + f.AHEAD, unused) > 0.0 else f.CREEPING
 
 
 # From phase to phase.
 
 
-@compiled
+@f.compiled
 def _put_at_end(rig: Any, time: float, phase: int, state: Any) -> None:
     """A phase ended by itself: put the bit at rest, or at an edge, not to the locator's rounding.
 
@@ -219,10 +149,10 @@ def _put_at_end(rig: Any, time: float, phase: int, state: Any) -> None:
         state[last] = -rig.set_speed
         return
     side = _side(phase)
-    if phase in (CREEPING, PUSHED):
-        side = 1 if bit_speed(rig, state) > 0.0 else -1
+    if phase in (f.CREEPING, f.PUSHED):
+        side = 1 if f.bit_speed(rig, state) > 0.0 else -1
         to_edge = abs(_beyond(rig, state, side)) / rig.tolerance
-        static = static_torque(rig, time, state)
+        static = f.static_torque(rig, time, state)
         if abs(_overload(rig, time, state)) / static < to_edge:
             return
     state[last] = _border(rig, side)
@@ -231,21 +161,21 @@ def _put_at_end(rig: Any, time: float, phase: int, state: Any) -> None:
 # Stops.
 
 
-@compiled
+@f.compiled
 def _next_stop(rig: Any, clock: Any, time: float) -> float:
     """Next time (s) at which a controller works, a signal is read or a program turns."""
     stop = clock.duration
-    if rig.drive_kind == SAMPLED:
-        period = law(rig, DRIVE)[DRIVE_PERIOD]
+    if rig.drive_kind == f.SAMPLED:
+        period = f.law(rig, f.DRIVE)[DRIVE_PERIOD]
         stop = min(stop, (math.floor(time / period * (1.0 + 1e-12)) + 1.0) * period)
-    if rig.weight_kind != AT_ONCE:
-        path = law(rig, PATH)
-        delay, every, window = path[DELAY], path[PERIOD], path[WINDOW]
-        if rig.weight_kind == ALARMED:
-            k = max(1.0, math.floor((time - delay + LATE) / window) + 1.0)
+    if rig.weight_kind != f.AT_ONCE:
+        path = f.law(rig, f.PATH)
+        delay, every, window = path[f.DELAY], path[f.PERIOD], path[f.WINDOW]
+        if rig.weight_kind == f.ALARMED:
+            k = max(1.0, math.floor((time - delay + f.LATE) / window) + 1.0)
             stop = min(stop, k * window + delay)
         elif every > 0.0:
-            k = max(0.0, math.floor((time - delay + LATE) / every) + 1.0)
+            k = max(0.0, math.floor((time - delay + f.LATE) / every) + 1.0)
             stop = min(stop, k * every + delay)
         elif delay > 0.0:  # the method of steps: what comes late is known before it is asked for
             stop = min(stop, time + delay)
@@ -255,55 +185,55 @@ def _next_stop(rig: Any, clock: Any, time: float) -> float:
     return stop
 
 
-@compiled
+@f.compiled
 def _stop(rig: Any, time: float, state: Any) -> None:
     """What happens at a stop."""
-    if rig.drive_kind == SAMPLED:
-        turns = time / law(rig, DRIVE)[DRIVE_PERIOD]
+    if rig.drive_kind == f.SAMPLED:
+        turns = time / f.law(rig, f.DRIVE)[DRIVE_PERIOD]
         if abs(turns - round(turns)) < 1e-6:
-            sample_drive(rig, time, state)
-    if rig.weight_kind != AT_ONCE:
-        read_weight(rig, time, state)
+            f.sample_drive(rig, time, state)
+    if rig.weight_kind != f.AT_ONCE:
+        f.read_weight(rig, time, state)
 
 
 # Events.
 
 
-@compiled
+@f.compiled
 def _margin(rig: Any, time: float, phase: int, which: int, torque: float, state: Any) -> float:
     """What is left until a phase ends, by its first or second way to end; 1 if there is none.
 
     Exactly zero is where the phase came from, in a step too short to move the bit.
     """
     tiny = 1e-300
-    if which == 1 and phase not in (CREEPING, PUSHED):
+    if which == 1 and phase not in (f.CREEPING, f.PUSHED):
         return 1.0
-    if phase == STUCK:
-        return static_torque(rig, time, state) - abs(torque)
-    if phase >= FORWARD_EDGE:
+    if phase == f.STUCK:
+        return f.static_torque(rig, time, state) - abs(torque)
+    if phase >= f.FORWARD_EDGE:
         outward, inward = _edge_margins(rig, time, state, _side(phase), torque)
         return min(outward, inward)
-    if phase >= CREEPING:
+    if phase >= f.CREEPING:
         if which == 1:
             over = _overload(rig, time, state)
-            return over if phase == PUSHED else -over
+            return over if phase == f.PUSHED else -over
         return min(-_beyond(rig, state, 1), -_beyond(rig, state, -1)) or tiny
     if rig.tolerance > 0.0:
         return _beyond(rig, state, phase) or tiny
     if rig.set_valued:
-        return phase * bit_speed(rig, state) or tiny
+        return phase * f.bit_speed(rig, state) or tiny
     return 1.0
 
 
-@compiled
+@f.compiled
 def _decide(rig: Any, time: float, phase: int, what: int, state: Any, unused: Any) -> int:
     """What happens between two pieces; returns the phase that follows.
 
     A bit that came to rest sticks if the rock can hold it. A bit that was stuck may be loose at
     once after a stop, by a jump of weight or torque.
     """
-    if what == BEGIN_RUN and rig.weight_kind != AT_ONCE:
-        begin_weight(rig, state)
+    if what == BEGIN_RUN and rig.weight_kind != f.AT_ONCE:
+        f.begin_weight(rig, state)
     if what == BY_ITSELF:
         _put_at_end(rig, time, phase, state)
     else:
@@ -312,64 +242,61 @@ def _decide(rig: Any, time: float, phase: int, what: int, state: Any, unused: An
         return phase
     if rig.tolerance > 0.0:
         return _printed_phase(rig, unused, time, phase if what == BY_ITSELF else 0, state)
-    speed = bit_speed(rig, state)
+    speed = f.bit_speed(rig, state)
     if not rig.set_valued or (what == BEGIN_RUN and speed > 0.0):
         return 1
     if what == BEGIN_RUN and speed < 0.0:
         return -1
-    holding = rates_of(rig, time, STUCK, state, unused)
+    holding = f.rates_of(rig, time, f.STUCK, state, unused)
     slack = 1.0 + 1e-12 if what == AT_STOP else 1.0
-    if what == BY_ITSELF and phase == STUCK:
+    if what == BY_ITSELF and phase == f.STUCK:
         slack = 0.0
-    if abs(holding) <= static_torque(rig, time, state) * slack:
-        return STUCK
+    if abs(holding) <= f.static_torque(rig, time, state) * slack:
+        return f.STUCK
     return 1 if holding > 0.0 else -1
 
 
 BEGIN_RUN, AT_STOP, BY_ITSELF = range(3)  # what there is to decide
-_MARGIN = (types.float64, types.int64, types.int64, types.float64)
-_DECISION = (types.float64, types.int64, types.int64)
-_margin_of, _decided = by_address("margin", _MARGIN, 1), by_address("decision", _DECISION, 2)
+_MARGIN = (types.float64, types.int64, types.int64, types.float64, STATE)
+_DECISION = (types.float64, types.int64, types.int64, STATE, STATE)
+_margin_of, _decided = f.by_address("margin", *_MARGIN), f.by_address("decision", *_DECISION)
 
 
 @cache
 def addresses() -> dict[str, int]:
     """Where the functions lie that a rig is run with, by the fields of `RIG`."""
     return {
-        "rates": callable_at(rates_in_place, TIME_AND_PHASE, 2),
-        "weighing": callable_at(weight_in_place, TIME_AND_SPEED, 1),
-        "margin": callable_at(_margin, _MARGIN, 1),
-        "decision": callable_at(_decide, _DECISION, 2),
+        "rates": f.callable_at(f.rates_in_place, *f.RATES),
+        "weighing": f.callable_at(f.weight_in_place, *f.WEIGHING),
+        "margin": f.callable_at(_margin, *_MARGIN),
+        "decision": f.callable_at(_decide, *_DECISION),
     }
 
 
-@compiled
-def _value(
-    which: int, rig: Any, work: Any, row: Any, phase: int, state: Any, share: float
-) -> float:
+@f.compiled
+def _value(which: int, rig: Any, work: Any, row: Any, phase: int, share: float) -> float:
     """A function of the share of a step: margins (0, 1), bit speed (2), its slope (3)."""
     if which == 2:
-        return on_tape(row, BIT_SPEED, share)
+        return f.on_tape(row, f.BIT_SPEED, share)
     if which == 3:
-        return slope_on_tape(row, BIT_SPEED, share)
-    time, torque = row[BEGIN] + share * row[LENGTH], 0.0
-    state_at(work, state, share, work.trial)
-    if is_held(phase):
-        torque = rates_of(rig, time, phase, work.trial, work.stages[1])
+        return f.slope_on_tape(row, f.BIT_SPEED, share)
+    time, torque = row[f.BEGIN] + share * row[f.LENGTH], 0.0
+    s.state_at(work, share, work.trial)
+    if f.is_held(phase):
+        torque = f.rates_of(rig, time, phase, work.trial, work.stages[1])
     return _margin_of(rig, time, phase, which, torque, work.trial)
 
 
-@compiled
+@f.compiled
 def _locate(
-    which: int, rig: Any, work: Any, row: Any, phase: int, state: Any,
-    low_value: float, high_value: float,
-) -> float:  # fmt: skip
+    which: int, rig: Any, work: Any, row: Any, phase: int, low_value: float, high_value: float
+) -> float:
     """The share of a step at which a function changes its sign (Chandrupatla 1997)."""
     a, fa, b, fb = 1.0, high_value, 0.0, low_value
     c, fc, t = a, fa, 0.5
     for _ in range(100):
         x = a + t * (b - a)
-        fx = _value(which, rig, work, row, phase, state, x)
+        fx = _value(which, rig, work, row, phase, x)
         if (fx > 0.0) == (fa > 0.0):
             c, fc = a, fa
         else:
@@ -398,13 +325,13 @@ def begin(rigs: Any, clock: Any, work: Any, state: Any) -> None:
     clock.count[PHASE] = int(_decided(rigs[0], 0.0, 1, BEGIN_RUN, state, work.trial))
 
 
-@compiled
+@f.compiled
 def _begin_piece(rig: Any, method: Any, clock: Any, work: Any, state: Any) -> None:
     now, phase = clock.now, clock.count[PHASE]
     time = now[TIME]
-    torque = rates_of(rig, time, phase, state, work.stages[0])
+    torque = f.rates_of(rig, time, phase, state, work.stages[0])
     now[STOP], now[PIECE_BEGIN] = _next_stop(rig, clock, time), time
-    now[STEP] = first_length(
+    now[STEP] = s.first_length(
         rig, work, time, now[STOP], _longest(phase), clock.tolerance, method.order, phase, state
     )
     now[BIT_TORQUE] = torque
@@ -414,12 +341,12 @@ def _begin_piece(rig: Any, method: Any, clock: Any, work: Any, state: Any) -> No
     clock.count[IN_PIECE] = 1
 
 
-@compiled
+@f.compiled
 def _longest(phase: int) -> float:
-    return WITHIN_STEP if phase >= CREEPING else LONGEST_STEP
+    return WITHIN_STEP if phase >= f.CREEPING else LONGEST_STEP
 
 
-@compiled
+@f.compiled
 def _end_piece(rig: Any, clock: Any, work: Any, state: Any, by_itself: bool) -> None:
     """Close a piece, and go over to the next phase."""
     count, time = clock.count, clock.now[TIME]
@@ -441,7 +368,7 @@ def _end_piece(rig: Any, clock: Any, work: Any, state: Any, by_itself: bool) -> 
     count[CHANGES] += 1
 
 
-@compiled
+@f.compiled
 def _has_room(rig: Any, clock: Any) -> bool:
     count = clock.count
     return (
@@ -453,7 +380,7 @@ def _has_room(rig: Any, clock: Any) -> bool:
     )
 
 
-@compiled
+@f.compiled
 def _trial(
     rig: Any, method: Any, solver: Any, clock: Any, work: Any, state: Any, step: float,
     torque: float,
@@ -461,16 +388,16 @@ def _trial(
     """One trial step: the bit torque at its end, and its error over the tolerance."""
     time, phase = clock.now[TIME], clock.count[PHASE]
     if solver is not None:
-        bit = clock.now[BIT_TORQUE]
-        end = stiff_step(
-            rig, method.implicit, work, solver, time, step, phase, state, (torque, bit)
+        torques = torque, clock.now[BIT_TORQUE]
+        end = stiff_steps.stiff_step(
+            rig, method.implicit, work, solver, time, step, phase, state, torques
         )
-        return end, stiff_error(work, clock.tolerance, state)
-    end = explicit_step(rig, method.explicit, work, time, step, phase, state)
-    return end, explicit_error(method.explicit, work, step, clock.tolerance, state)
+        return end, stiff_steps.stiff_error(work, clock.tolerance, state)
+    end = s.explicit_step(rig, method.explicit, work, time, step, phase, state)
+    return end, s.explicit_error(method.explicit, work, step, clock.tolerance, state)
 
 
-@compiled
+@f.compiled
 def _try_step(
     rig: Any, method: Any, solver: Any, clock: Any, work: Any, state: Any
 ) -> tuple[float, float]:
@@ -481,25 +408,25 @@ def _try_step(
     length, refused, torque = min(max(now[STEP], least), _longest(phase)), False, 0.0
     power = -1.0 / method.order
     if solver is not None:
-        torque = linearise(rig, solver, time, phase, state, work.stages[0])
-        change_with_time(rig, solver, time, length, phase, state, work.stages[0])
+        torque = stiff_steps.linearise(rig, solver, time, phase, state, work.stages[0])
+        stiff_steps.change_with_time(rig, solver, time, length, phase, state, work.stages[0])
     while length >= least:
         step = min(length, end - time)
         bit_torque, error = _trial(rig, method, solver, clock, work, state, step, torque)
         if error < 1.0:
-            factor = LARGEST if error == 0.0 else min(LARGEST, SAFETY * error**power)
+            factor = s.LARGEST if error == 0.0 else min(s.LARGEST, s.SAFETY * error**power)
             now[STEP] = step * (min(1.0, factor) if refused else factor)
             return step, bit_torque
         refused = True
         clock.count[REFUSED] += 1
-        factor = SMALLEST
+        factor = s.SMALLEST
         if error < math.inf:
-            factor = max(SMALLEST, SAFETY * error**power)
+            factor = max(s.SMALLEST, s.SAFETY * error**power)
         length = step * factor
     return 0.0, 0.0
 
 
-@compiled
+@f.compiled
 def _keep_step(
     rig: Any, method: Any, solver: Any, clock: Any, work: Any, sums: Any, state: Any, step: float,
     torque: float,
@@ -508,17 +435,17 @@ def _keep_step(
     now, phase, last = clock.now, clock.count[PHASE], 2 * rig.nodes - 1
     time = now[TIME]
     if solver is None:
-        explicit_dense(rig, method.explicit, work, time, step, phase, state)
-    row = tape_row(rig, rig.steps)
-    summed = sums[0 if is_held(phase) else 1]
-    record(method.dense, work, time, step, state, summed, clock.kept, row)
+        s.explicit_dense(rig, method.explicit, work, time, step, phase, state)
+    row = f.tape_row(rig, rig.steps)
+    summed = sums[0 if f.is_held(phase) else 1]
+    s.record(method.dense, work, time, step, state, summed, clock.kept, row)
     rig.steps += 1
     values, until = work.values, 2.0
     values[2], values[3] = state[last], work.stages[0, last]
     for which in range(2):
         values[which] = now[MARGINS + which]
         values[4 + which] = _margin_of(rig, time + step, phase, which, torque, work.after)
-    values[6], values[7] = work.after[last], work.stages[STAGES, last]
+    values[6], values[7] = work.after[last], work.stages[s.STAGES, last]
     for which in range(2):
         now[MARGINS + which] = values[4 + which]
     for which in range(4):
@@ -526,25 +453,25 @@ def _keep_step(
         if not _happens(which, phase, before, after):
             continue
         if which < 2 and until == 2.0:
-            record_whole(method.dense, work, step, state)
-        share = _locate(which, rig, work, row, phase, state, before, after)
+            s.record(method.dense, work, time, step, state, work.none, work.every, work.whole)
+        share = _locate(which, rig, work, row, phase, before, after)
         if which < 2:
             until = min(until, share)
         elif share <= until:
             _note(which, clock, row, share)
     if until <= 1.0:
         now[TIME] = time + until * step
-        state_at(work, state, until, work.trial)
-        copy(state, work.trial)
+        s.state_at(work, until, work.trial)
+        f.copy(state, work.trial)
         return True
     now[TIME] = now[STOP] if step == now[STOP] - time else time + step
-    copy(state, work.after)
-    copy(work.stages[0], work.stages[STAGES])
+    f.copy(state, work.after)
+    f.copy(work.stages[0], work.stages[s.STAGES])
     now[BIT_TORQUE] = torque
     return False
 
 
-@compiled
+@f.compiled
 def _happens(which: int, phase: int, before: float, after: float) -> bool:
     """Whether an event lies within a step: a margin comes down to zero, a value changes sign."""
     down = before >= 0.0 and after <= 0.0
@@ -553,19 +480,14 @@ def _happens(which: int, phase: int, before: float, after: float) -> bool:
     return abs(phase) == 1 and (down or (before <= 0.0 and after >= 0.0))
 
 
-@compiled
+@f.compiled
 def _note(which: int, clock: Any, row: Any, share: float) -> None:
     """Keep when the bit turned at the set speed, and its angle; or of an extreme, its speed."""
     count = clock.count
-    time = row[BEGIN] + share * row[LENGTH]
-    if which == 2:
-        event = clock.crossings[count[CROSSINGS]]
-        event[0], event[1] = time, on_tape(row, BIT_ANGLE, share)
-        count[CROSSINGS] += 1
-    else:
-        event = clock.extremes[count[EXTREMES]]
-        event[0], event[1] = time, on_tape(row, BIT_SPEED, share)
-        count[EXTREMES] += 1
+    at, value = (CROSSINGS, f.BIT_ANGLE) if which == 2 else (EXTREMES, f.BIT_SPEED)
+    event = (clock.crossings if which == 2 else clock.extremes)[count[at]]
+    event[0], event[1] = row[f.BEGIN] + share * row[f.LENGTH], f.on_tape(row, value, share)
+    count[at] += 1
 
 
 @on_disk
@@ -595,24 +517,29 @@ def advance(
     return MORE
 
 
-def work_for(size: int) -> Work:
+def work_for(size: int) -> s.Work:
     """Memory of the steps of a rig with so many states."""
-    stages, errors, dense = (np.zeros((rows, size)) for rows in (DENSE_STAGES, 3, 7))
-    return Work(stages, np.zeros(size), np.zeros(size), errors, np.zeros(20), np.zeros(8), dense)
+    return s.Work(
+        np.zeros((s.DENSE_STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((3, size)),
+        np.zeros((s.DENSE_STAGES, 1)), np.zeros(8),
+        np.arange(size), np.zeros((0, size)), np.zeros(f.FIRST + 8 * size),
+    )  # fmt: skip
 
 
 class Method(NamedTuple):
     """How steps are taken."""
 
     order: float  # power of the length of a step that its error goes with
-    explicit: Tableau
-    implicit: StiffTableau
-    dense: Dense
+    explicit: s.Tableau
+    implicit: stiff_steps.StiffTableau
+    dense: s.Dense
 
 
-def method_for(stiff: bool, nodes: int, states: int) -> tuple[Method, StiffWork | None]:
+def method_for(stiff: bool, nodes: int, states: int) -> tuple[Method, stiff_steps.StiffWork | None]:
     """Explicit steps, or linearly implicit ones with what they are solved with."""
     if stiff:
-        method = Method(5.0, tableau(), stiff_tableau(), stiff_dense_output())
-        return method, stiff_work(nodes, states)
-    return Method(8.0, tableau(), stiff_tableau(), explicit_dense_output()), None
+        method = Method(
+            5.0, s.tableau(), stiff_steps.stiff_tableau(), stiff_steps.stiff_dense_output()
+        )
+        return method, stiff_steps.stiff_work(nodes, states)
+    return Method(8.0, s.tableau(), stiff_steps.stiff_tableau(), s.explicit_dense_output()), None

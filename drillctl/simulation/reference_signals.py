@@ -4,23 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from drillctl.simulation import reference_rates as f
 from drillctl.simulation.law_calls import on_disk
-from drillctl.simulation.reference_rates import (
-    BEGIN,
-    FREE_TOP,
-    HELD_TOP,
-    LENGTH,
-    STUCK,
-    band,
-    bit_speed,
-    drive_torque,
-    is_held,
-    on_tape,
-    slip_torque,
-    step_at,
-    tape_row,
-    weight,
-)
 
 
 @on_disk
@@ -28,10 +13,10 @@ def components_at(rigs: Any, components: Any, time: Any, out: Any) -> None:
     """Components of the tape at times (s), shape (components, times)."""
     rig = rigs[0]
     for i in range(len(time)):
-        row = tape_row(rig, step_at(rig, time[i]))
-        share = (time[i] - row[BEGIN]) / row[LENGTH]
+        row = f.tape_row(rig, f.step_at(rig, time[i]))
+        share = (time[i] - row[f.BEGIN]) / row[f.LENGTH]
         for k in range(len(components)):
-            out[k, i] = on_tape(row, components[k], share)
+            out[k, i] = f.on_tape(row, components[k], share)
 
 
 @on_disk
@@ -45,20 +30,20 @@ def torques_at(
         while last < len(pieces) - 1 and pieces[last, 1] < moment:
             last += 1
         phase = int(pieces[last, 2])
-        held = is_held(phase)
-        row = tape_row(rig, step_at(rig, moment))
-        share = (moment - row[BEGIN]) / row[LENGTH]
+        held = f.is_held(phase)
+        row = f.tape_row(rig, f.step_at(rig, moment))
+        share = (moment - row[f.BEGIN]) / row[f.LENGTH]
         for c in range(len(kept)):
-            state[kept[c]] = on_tape(row, c, share)
-        rock = 0.0 if held else slip_torque(rig, moment, state, phase)
+            state[kept[c]] = f.on_tape(row, c, share)
+        rock = 0.0 if held else f.slip_torque(rig, moment, state, phase)
         free = 0.0
         if rig.drive_states:
             end = ends[0 if held else 1]
-            free = on_tape(row, sums, share) + end[0] - end[1] * rock
-        gain = band(rig, HELD_TOP if held else FREE_TOP)[0]
-        torque = drive_torque(rig, moment, state, free, gain, unused)
+            free = f.on_tape(row, sums, share) + end[0] - end[1] * rock
+        gain = f.band(rig, f.HELD_TOP if held else f.FREE_TOP)[0]
+        torque = f.drive_torque(rig, moment, state, free, gain, unused)
         if held:
-            rock = on_tape(row, sums + 1, share) + ends[2, 0] + ends[2, 1] * torque
-        speed = 0.0 if phase == STUCK else abs(bit_speed(rig, state))
-        out[0, i], out[1, i], out[2, i] = torque, weight(rig, moment, speed, state), rock
+            rock = f.on_tape(row, sums + 1, share) + ends[2, 0] + ends[2, 1] * torque
+        speed = 0.0 if phase == f.STUCK else abs(f.bit_speed(rig, state))
+        out[0, i], out[1, i], out[2, i] = torque, f.weight(rig, moment, speed, state), rock
         out[3, i] = phase

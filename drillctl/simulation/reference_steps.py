@@ -23,6 +23,7 @@ from drillctl.simulation.reference_rates import (
     FIRST,
     LENGTH,
     compiled,
+    on_tape,
     rates_of,
 )
 
@@ -90,9 +91,11 @@ class Work(NamedTuple):
     trial: Any  # shape (states,): argument of a stage
     after: Any  # shape (states,): end of the step
     errors: Any  # shape (3, states)
-    scratch: Any  # shape (20,)
+    summed: Any  # shape (16, 1): a sum of the states of each stage
     values: Any  # shape (8,): of events, at both ends of a step
-    dense: Any  # shape (7, states): whole dense output, where asked for
+    every: Any  # shape (states,): all of them, and
+    none: Any  # shape (0, states): no sums, for
+    whole: Any  # shape (2 + 8 states,): whole dense output of a step, where an event ends it
 
 
 @compiled
@@ -174,6 +177,18 @@ def explicit_error(method: Any, work: Any, step: float, tolerance: float, state:
 
 
 @compiled
+def _record_one(
+    dense: Any, unit: float, begin: float, change: float, stages: Any, i: int, row: Any, place: int
+) -> None:
+    row[place], row[place + 1] = begin, change
+    for k in range(6):
+        total = 0.0
+        for j in range(DENSE_STAGES):
+            total += dense.weights[k, j] * stages[j, i]
+        row[place + 2 + k] = dense.changes[k] * change + unit * total
+
+
+@compiled
 def record(
     dense: Any, work: Any, time: float, step: float, state: Any, sums: Any, kept: Any, row: Any
 ) -> None:
@@ -181,60 +196,27 @@ def record(
     row[BEGIN], row[LENGTH] = time, step
     stages, after, unit = work.stages, work.after, step if dense.by_step else 1.0
     for c in range(len(kept)):
-        i, place = kept[c], FIRST + 8 * c
+        i = kept[c]
         change = after[i] - state[i]
-        row[place], row[place + 1] = state[i], change
-        for k in range(6):
-            total = 0.0
-            for j in range(DENSE_STAGES):
-                total += dense.weights[k, j] * stages[j, i]
-            row[place + 2 + k] = dense.changes[k] * change + unit * total
-    summed = work.scratch
+        _record_one(dense, unit, state[i], change, stages, i, row, FIRST + 8 * c)
+    summed = work.summed
     for c in range(len(sums)):
-        weights, place = sums[c], FIRST + 8 * (len(kept) + c)
-        begin, change = 0.0, 0.0
+        weights, begin, change = sums[c], 0.0, 0.0
         for i in range(len(weights)):
             begin += weights[i] * state[i]
             change += weights[i] * (after[i] - state[i])
         for j in range(DENSE_STAGES):
-            summed[j] = 0.0
+            summed[j, 0] = 0.0
             for i in range(len(weights)):
-                summed[j] += weights[i] * stages[j, i]
-        row[place], row[place + 1] = begin, change
-        for k in range(6):
-            total = 0.0
-            for j in range(DENSE_STAGES):
-                total += dense.weights[k, j] * summed[j]
-            row[place + 2 + k] = dense.changes[k] * change + unit * total
+                summed[j, 0] += weights[i] * stages[j, i]
+        _record_one(dense, unit, begin, change, summed, 0, row, FIRST + 8 * (len(kept) + c))
 
 
 @compiled
-def record_whole(dense: Any, work: Any, step: float, state: Any) -> None:
-    """The dense output of every state."""
-    whole, unit = work.dense, step if dense.by_step else 1.0
-    for i in range(len(state)):
-        change = work.after[i] - state[i]
-        whole[0, i] = change
-        for k in range(6):
-            total = 0.0
-            for j in range(DENSE_STAGES):
-                total += dense.weights[k, j] * work.stages[j, i]
-            whole[1 + k, i] = dense.changes[k] * change + unit * total
-
-
-@compiled
-def state_at(work: Any, state: Any, share: float, out: Any) -> None:
-    """Every state at a share of the step, from its whole dense output."""
-    dense, rest = work.dense, 1.0 - share
-    for i in range(len(state)):
-        value = dense[6, i] * share
-        value = (value + dense[5, i]) * rest
-        value = (value + dense[4, i]) * share
-        value = (value + dense[3, i]) * rest
-        value = (value + dense[2, i]) * share
-        value = (value + dense[1, i]) * rest
-        value = (value + dense[0, i]) * share
-        out[i] = state[i] + value
+def state_at(work: Any, share: float, out: Any) -> None:
+    """Every state at a share of the step whose whole dense output is kept."""
+    for i in range(len(out)):
+        out[i] = on_tape(work.whole, i, share)
 
 
 @compiled

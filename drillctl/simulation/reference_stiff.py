@@ -17,24 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drillctl.arrays import Array
-from drillctl.simulation.reference_rates import (
-    DAMPING,
-    FREE_TOP,
-    HELD_TOP,
-    MASS,
-    SIDE_DAMPING,
-    SIDE_MASS,
-    STIFFNESS,
-    WORKS,
-    band,
-    compiled,
-    copy,
-    drive_torque,
-    is_held,
-    rates_of,
-    slip_torque,
-    weight_rates,
-)
+from drillctl.simulation import reference_rates as f
 from drillctl.simulation.reference_steps import DENSE_STAGES, Dense
 
 STAGES = 8
@@ -82,35 +65,17 @@ def stiff_tableau() -> StiffTableau:
 def stiff_dense_output() -> Dense:
     """The dense output as published, in the nested form."""
     first = (
-        25.948786856663858,
-        -2.5579724845846235,
-        10.433815404888879,
-        -2.3679251022685204,
-        0.524948541321073,
-        1.1241088310450404,
-        0.4272876194431874,
-        -0.17202221070155493,
-    )
+        25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204,
+        0.524948541321073, 1.1241088310450404, 0.4272876194431874, -0.17202221070155493,
+    )  # fmt: skip
     second = (
-        -9.91568850695171,
-        -0.9689944594115154,
-        3.0438037242978453,
-        -24.495224566215796,
-        20.176138334709044,
-        15.98066361424651,
-        -6.789040303419874,
-        -6.710236069923372,
-    )
+        -9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796,
+        20.176138334709044, 15.98066361424651, -6.789040303419874, -6.710236069923372,
+    )  # fmt: skip
     third = (
-        11.419903575922262,
-        2.8879645146136994,
-        72.92137995996029,
-        80.12511834622643,
-        -52.072871366152654,
-        -59.78993625266729,
-        -0.15582684282751913,
-        4.883087185713722,
-    )
+        11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643,
+        -52.072871366152654, -59.78993625266729, -0.15582684282751913, 4.883087185713722,
+    )  # fmt: skip
     one, two, three = np.array(first), np.array(second), np.array(third)
     weights = np.zeros((6, DENSE_STAGES))
     weights[0, 1:9], weights[1, 1:9], weights[2, 1:9] = one, two + three, -three
@@ -145,7 +110,7 @@ class StiffWork(NamedTuple):
 
 def stiff_work(nodes: int, states: int) -> StiffWork:
     """Memory of the steps of a rig."""
-    m = states - 2 * nodes - WORKS
+    m = states - 2 * nodes - f.WORKS
     return StiffWork(
         np.zeros((5, nodes)), np.zeros((m, m)), np.zeros(m, dtype=np.int64), np.zeros(m),
         np.zeros(3 + m), np.zeros((5 + m, m)), np.zeros(1 + m), np.zeros(states),
@@ -161,135 +126,132 @@ BY_BIT, BY_TORQUE, BY_OWN = 3, 4, 5  # of the rates of the memories, after those
 # J of the laws.
 
 
-@compiled
+@f.compiled
 def linearise(rig: Any, solver: Any, time: float, phase: int, state: Any, rates: Any) -> float:
     """Take J of the laws at the begin of a step; returns the torque of the drive (N m)."""
-    n, held = rig.nodes, is_held(phase)
-    first, drives = 2 * n + WORKS, rig.drive_states
-    gain = band(rig, HELD_TOP if held else FREE_TOP)[0]
+    n, drives = rig.nodes, rig.drive_states
+    first = 2 * n + f.WORKS
+    gain = f.band(rig, f.HELD_TOP if f.is_held(phase) else f.FREE_TOP)[0]
     moved, out = solver.moved[0], solver.moved[1]
-    copy(moved, state)
+    f.copy(moved, state)
+    solver.top[:] = 0.0
     solver.rates[:] = 0.0
     solver.rock[:] = 0.0
     # The torque of the drive follows from its own acceleration, or is known without it.
     at_top = _torque_now(rig, time, state, rates, gain, out)
     free = rates[n] - gain * at_top
-    solver.top[:] = 0.0
-    for k in range(3 + drives):
-        size = DIFFERENCE
-        if k == BY_FREE:
-            size *= max(1.0, abs(free))
-            high = drive_torque(rig, time, moved, free + size, gain, out)
-            _take(solver.rates[k], out, first, drives, 1.0)
-            low = drive_torque(rig, time, moved, free - size, gain, out)
-        else:
-            place = (0, n)[k] if k < 2 else first + k - 3
-            size *= max(1.0, abs(state[place]))
-            moved[place] = state[place] + size
-            high = drive_torque(rig, time, moved, free, gain, out)
-            row = k if k < 3 else BY_OWN + k - 3
-            _take(solver.rates[row], out, first, drives, 1.0)
-            moved[place] = state[place] - size
-            low = drive_torque(rig, time, moved, free, gain, out)
-            moved[place] = state[place]
+    for k in range(3 + drives):  # top angle, top speed, free acceleration, own memory
+        place = (0, n, -1)[k] if k < 3 else first + k - 3
         row = k if k < 3 else BY_OWN + k - 3
-        _take(solver.rates[row], out, first, drives, -1.0)
-        solver.top[k] = (high - low) / (2.0 * size)
+        size, given = DIFFERENCE * max(1.0, abs(free if k == BY_FREE else state[place])), free
+        for sign in (1.0, -1.0):
+            if k == BY_FREE:
+                given = free + sign * size
+            else:
+                moved[place] = state[place] + sign * size
+            solver.top[k] += sign * f.drive_torque(rig, time, moved, given, gain, out)
+            for j in range(drives):
+                solver.rates[row, j] += sign * out[first + j]
+        if k != BY_FREE:
+            moved[place] = state[place]
+        solver.top[k] /= 2.0 * size
         for j in range(drives):
             solver.rates[row, j] /= 2.0 * size
-    _linearise_rock(rig, solver, time, phase, state, at_top)
+    _linearise_rock(rig, solver, time, phase, state)
+    _linearise_weight(rig, solver, time, state, at_top)
     return at_top
 
 
-@compiled
+@f.compiled
 def _torque_now(rig: Any, time: float, state: Any, rates: Any, gain: float, out: Any) -> float:
     """Torque of the drive (N m), from the acceleration of the top that it goes with."""
     n = rig.nodes
-    torque = drive_torque(rig, time, state, rates[n], gain, out)
+    torque = f.drive_torque(rig, time, state, rates[n], gain, out)
     # It is a straight line over the free acceleration: two points of it, and where they meet.
-    other = drive_torque(rig, time, state, rates[n] - gain * torque, gain, out)
+    other = f.drive_torque(rig, time, state, rates[n] - gain * torque, gain, out)
     if other == torque:
         return torque
     slope = (other - torque) / (-gain * torque)
-    return (torque) / (1.0 + slope * gain)
+    return torque / (1.0 + slope * gain)
 
 
-@compiled
-def _take(row: Any, rates: Any, first: int, count: int, sign: float) -> None:
-    for j in range(count):
-        row[j] = sign * rates[first + j] if sign > 0.0 else row[j] - rates[first + j]
-
-
-@compiled
-def _linearise_rock(
-    rig: Any, solver: Any, time: float, phase: int, state: Any, top_torque: float
-) -> None:
-    n, drives, weights = rig.nodes, rig.drive_states, rig.weight_states
-    moved, out = solver.moved[0], solver.moved[1]
-    held, last = is_held(phase), rig.states - weights
-    for k in range(1 + weights):
-        place = 2 * n - 1 if k == 0 else last + k - 1
+@f.compiled
+def _linearise_rock(rig: Any, solver: Any, time: float, phase: int, state: Any) -> None:
+    moved, weights = solver.moved[0], rig.weight_states
+    for k in range(0 if f.is_held(phase) else 1 + weights):  # bit speed, memory of the weight
+        place = 2 * rig.nodes - 1 if k == 0 else rig.states - weights + k - 1
+        slot = 0 if k == 0 else rig.drive_states + k
         size = DIFFERENCE * max(1.0, abs(state[place]))
-        if not held:
-            moved[place] = state[place] + size
-            high = slip_torque(rig, time, moved, phase)
-            moved[place] = state[place] - size
-            low = slip_torque(rig, time, moved, phase)
-            solver.rock[0 if k == 0 else drives + k] = (high - low) / (2.0 * size)
+        for sign in (1.0, -1.0):
+            moved[place] = state[place] + sign * size
+            solver.rock[slot] += sign * f.slip_torque(rig, time, moved, phase)
+        solver.rock[slot] /= 2.0 * size
         moved[place] = state[place]
-    for k in range(3 + weights if weights else 0):  # bit speed, top torque, top speed, own
-        size, torque = DIFFERENCE, top_torque
+
+
+@f.compiled
+def _linearise_weight(rig: Any, solver: Any, time: float, state: Any, top_torque: float) -> None:
+    n, drives, weights = rig.nodes, rig.drive_states, rig.weight_states
+    moved, out, last = solver.moved[0], solver.moved[1], rig.states - rig.weight_states
+    for k in range(3 + weights if weights else 0):  # bit speed, top torque, top speed, own memory
         place = (2 * n - 1, -1, n)[k] if k < 3 else last + k - 3
         row = (BY_BIT, BY_TORQUE, BY_SPEED)[k] if k < 3 else BY_OWN + drives + k - 3
+        by_torque, torque = place < 0, top_torque
+        size = DIFFERENCE * max(1.0, abs(top_torque if by_torque else state[place]))
         for sign in (1.0, -1.0):
-            if place < 0:
-                size = max(1.0, abs(top_torque)) * DIFFERENCE
+            if by_torque:
                 torque = top_torque + sign * size
             else:
-                size = max(1.0, abs(state[place])) * DIFFERENCE
                 moved[place] = state[place] + sign * size
-            weight_rates(rig, time, moved, torque, out)
+            f.weight_rates(rig, time, moved, torque, out)
             for j in range(weights):
-                change = sign * out[last + j] / (2.0 * size)
-                if sign > 0.0:
-                    solver.rates[row, drives + j] = change
-                else:
-                    solver.rates[row, drives + j] += change
-        if place >= 0:
+                solver.rates[row, drives + j] += sign * out[last + j] / (2.0 * size)
+        if not by_torque:
             moved[place] = state[place]
 
 
 # The linear systems.
 
 
-@compiled
-def _solve_string(rig: Any, solver: Any, count: int, x: Any) -> None:
-    pivot, factor = solver.rows[PIVOT_ROW], solver.rows[FACTOR_ROW]
-    for i in range(1, count):
-        x[i] -= factor[i - 1] * x[i - 1]
-    for i in range(count):
-        x[i] *= pivot[i]
-    for i in range(count - 2, -1, -1):
-        x[i] -= factor[i] * x[i + 1]
-    for i in range(count, rig.nodes):
+@f.compiled
+def _solve_string(solver: Any, count: int, x: Any) -> None:
+    f.solve_factorised(solver.rows[PIVOT_ROW], solver.rows[FACTOR_ROW], count, x)
+    for i in range(count, len(x)):
         x[i] = 0.0
 
 
-@compiled
-def factorise(rig: Any, solver: Any, phase: int, s: float) -> None:
-    """Factorise s I - J."""
-    n, held = rig.nodes, is_held(phase)
-    count = n - 1 if held else n
-    stiffness, damping, side_damping = (
-        band(rig, STIFFNESS),
-        band(rig, DAMPING),
-        band(rig, SIDE_DAMPING),
-    )
-    side_mass, mass = band(rig, SIDE_MASS), band(rig, MASS)
-    gain = band(rig, HELD_TOP if held else FREE_TOP)[0]
-    top, m = solver.top, len(solver.right)
+@f.compiled
+def _drive_by_speed(rig: Any, solver: Any, phase: int, s: float) -> tuple[float, float, float]:
+    """Top acceleration per torque, what its feedback leaves of a torque, torque per top speed."""
+    gain, top = f.band(rig, f.HELD_TOP if f.is_held(phase) else f.FREE_TOP)[0], solver.top
     shrink = 1.0 / (1.0 + top[BY_FREE] * gain)
-    by_speed = (top[BY_ANGLE] / s + top[BY_SPEED] + top[BY_FREE] * s) * shrink
+    return gain, shrink, (top[BY_ANGLE] / s + top[BY_SPEED] + top[BY_FREE] * s) * shrink
+
+
+@f.compiled
+def _memory_by_top(j: Any, row: int, gain: float, s: float, by_speed: float) -> tuple[float, float]:
+    """Rate of a memory per torque of the drive, and per top speed."""
+    by_torque = j[BY_TORQUE, row] - j[BY_FREE, row] * gain
+    by_top = j[BY_ANGLE, row] / s + j[BY_SPEED, row] + j[BY_FREE, row] * s
+    return by_torque, by_top + by_torque * by_speed
+
+
+@f.compiled
+def factorise(rig: Any, solver: Any, phase: int, s: float) -> None:
+    """Factorise s I - J.
+
+    The torque of the drive changes by dT = (T_u / s + T_v + T_a s) dv + T_m dm + alone, over
+    1 + T_a gain, as T follows from the acceleration of the top without it. What of that goes
+    with the top speed stands on the diagonal of the string's system; the memories m of drive and
+    weight pull at its ends, whence its answers to a torque at each end close their own system.
+    """
+    n, held = rig.nodes, f.is_held(phase)
+    count = n - 1 if held else n
+    mass, side_mass = f.band(rig, f.MASS), f.band(rig, f.SIDE_MASS)
+    damping, side_damping = f.band(rig, f.DAMPING), f.band(rig, f.SIDE_DAMPING)
+    stiffness = f.band(rig, f.STIFFNESS)
+    top, m = solver.top, len(solver.right)
+    gain, shrink, by_speed = _drive_by_speed(rig, solver, phase, s)
     pivot, factor = solver.rows[PIVOT_ROW], solver.rows[FACTOR_ROW]
     before = 0.0
     for i in range(count):
@@ -315,15 +277,13 @@ def factorise(rig: Any, solver: Any, phase: int, s: float) -> None:
     at_top[:] = 0.0
     at_bit[:] = 0.0
     at_top[0] = 1.0
-    _solve_string(rig, solver, count, at_top)
+    _solve_string(solver, count, at_top)
     if not held:
         at_bit[n - 1] = 1.0
-        _solve_string(rig, solver, count, at_bit)
+        _solve_string(solver, count, at_bit)
     j = solver.rates
     for row in range(m):
-        by_torque = j[BY_TORQUE, row] - j[BY_FREE, row] * gain
-        by_top = j[BY_ANGLE, row] / s + j[BY_SPEED, row] + j[BY_FREE, row] * s
-        by_top += by_torque * by_speed
+        by_torque, by_top = _memory_by_top(j, row, gain, s, by_speed)
         for column in range(m):
             own = top[BY_MEMORY + column] * shrink
             rock = solver.rock[1 + column]
@@ -334,7 +294,7 @@ def factorise(rig: Any, solver: Any, phase: int, s: float) -> None:
     _factorise_full(solver.matrix, solver.order)
 
 
-@compiled
+@f.compiled
 def _factorise_full(a: Any, order: Any) -> None:
     """Gauss with partial pivoting, in place."""
     m = len(order)
@@ -352,7 +312,7 @@ def _factorise_full(a: Any, order: Any) -> None:
                 a[i, j] -= a[i, k] * a[k, j]
 
 
-@compiled
+@f.compiled
 def _solve_full(a: Any, order: Any, x: Any) -> None:
     m = len(order)
     for k in range(m):
@@ -366,18 +326,17 @@ def _solve_full(a: Any, order: Any, x: Any) -> None:
         x[i] /= a[i, i]
 
 
-@compiled
+@f.compiled
 def _solve_stage(
     rig: Any, solver: Any, phase: int, s: float, state: Any, torques: tuple[float, float], r: Any
 ) -> None:
     """Solve (s I - J) u = r in place; `torques`: of drive and rock at the begin (N m)."""
-    n, held, frame = rig.nodes, is_held(phase), rig.set_speed
+    n, held, frame = rig.nodes, f.is_held(phase), rig.set_speed
     count = n - 1 if held else n
-    first, m, top, j = 2 * n + WORKS, len(solver.right), solver.top, solver.rates
-    mass, side_mass, stiffness = band(rig, MASS), band(rig, SIDE_MASS), band(rig, STIFFNESS)
-    gain = band(rig, HELD_TOP if held else FREE_TOP)[0]
-    shrink = 1.0 / (1.0 + top[BY_FREE] * gain)
-    by_speed = (top[BY_ANGLE] / s + top[BY_SPEED] + top[BY_FREE] * s) * shrink
+    first, m, top, j = 2 * n + f.WORKS, len(solver.right), solver.top, solver.rates
+    mass, side_mass = f.band(rig, f.MASS), f.band(rig, f.SIDE_MASS)
+    stiffness = f.band(rig, f.STIFFNESS)
+    gain, shrink, by_speed = _drive_by_speed(rig, solver, phase, s)
     alone = (top[BY_ANGLE] * r[0] / s - top[BY_FREE] * r[n]) * shrink
     x = solver.rows[RIGHT_ROW]
     for i in range(n):
@@ -388,14 +347,12 @@ def _solve_stage(
             value += side_mass[i] * r[n + i + 1] - stiffness[i] * (r[i] - r[i + 1]) / s
         x[i] = value
     x[0] += alone
-    _solve_string(rig, solver, count, x)
+    _solve_string(solver, count, x)
     by_memory, by_load = 0.0, 0.0
     if m:
         right = solver.right
         for row in range(m):
-            by_torque = j[BY_TORQUE, row] - j[BY_FREE, row] * gain
-            by_top = j[BY_ANGLE, row] / s + j[BY_SPEED, row] + j[BY_FREE, row] * s
-            by_top += by_torque * by_speed
+            by_torque, by_top = _memory_by_top(j, row, gain, s, by_speed)
             right[row] = r[first + row] + j[BY_ANGLE, row] * r[0] / s - j[BY_FREE, row] * r[n]
             right[row] += by_torque * alone + by_top * x[0] + j[BY_BIT, row] * x[n - 1]
         _solve_full(solver.matrix, solver.order, right)
@@ -414,7 +371,7 @@ def _solve_stage(
     r[2 * n] += top_change * (state[n] + frame) + torques[0] * x[0]
     r[2 * n + 1] += bit_change * (state[2 * n - 1] + frame) + torques[1] * x[n - 1]
     if rig.damped:
-        own, side = band(rig, DAMPING), band(rig, SIDE_DAMPING)
+        own, side = f.band(rig, f.DAMPING), f.band(rig, f.SIDE_DAMPING)
         for i in range(n):
             value = own[i] * x[i]
             if i > 0:
@@ -422,14 +379,14 @@ def _solve_stage(
             if i < n - 1:
                 value += side[i] * x[i + 1]
             r[2 * n + 2] += 2.0 * (state[n + i] + frame) * value
-    for k in range(WORKS):
+    for k in range(f.WORKS):
         r[2 * n + k] /= s
 
 
 # The step.
 
 
-@compiled
+@f.compiled
 def stiff_step(
     rig: Any, method: Any, work: Any, solver: Any, time: float, step: float, phase: int,
     state: Any, torques: tuple[float, float],
@@ -444,7 +401,7 @@ def stiff_step(
     for k in range(STAGES):
         u = stages[1 + k]
         if k == 0:
-            copy(u, stages[0])
+            f.copy(u, stages[0])
         else:
             for i in range(size):
                 work.trial[i] = state[i]
@@ -452,7 +409,7 @@ def stiff_step(
                 weight = method.a[k, j]
                 for i in range(size):
                     work.trial[i] += weight * stages[1 + j, i]
-            rates_of(rig, time + method.times[k] * step, phase, work.trial, u)
+            f.rates_of(rig, time + method.times[k] * step, phase, work.trial, u)
         for j in range(k):
             weight = method.c[k, j] / step
             for i in range(size):
@@ -464,10 +421,10 @@ def stiff_step(
         _solve_stage(rig, solver, phase, s, state, torques, u)
     for i in range(size):
         work.after[i] = work.trial[i] + stages[STAGES, i]
-    return rates_of(rig, time + step, phase, work.after, stages[12])
+    return f.rates_of(rig, time + step, phase, work.after, stages[12])
 
 
-@compiled
+@f.compiled
 def stiff_error(work: Any, tolerance: float, state: Any) -> float:
     """Estimated error of a step over the tolerance: the last stage is the difference."""
     size, total = len(state), 0.0
@@ -477,11 +434,11 @@ def stiff_error(work: Any, tolerance: float, state: Any) -> float:
     return math.sqrt(total / size)
 
 
-@compiled
+@f.compiled
 def change_with_time(rig: Any, solver: Any, time: float, step: float, phase: int, state: Any,
                      rates: Any) -> None:  # fmt: skip
     """Rates per time at the same state: of programs, and of what comes late."""
     ahead = 1e-3 * step
-    rates_of(rig, time + ahead, phase, state, solver.change)
+    f.rates_of(rig, time + ahead, phase, state, solver.change)
     for i in range(len(state)):
         solver.change[i] = (solver.change[i] - rates[i]) / ahead
