@@ -5,6 +5,7 @@ As coefficients, as a table of them over the weight on bit, and with a bit radiu
 
 from __future__ import annotations
 
+from collections import namedtuple
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple
@@ -122,7 +123,13 @@ class WeightTable:
         )
 
 
-class OverWeight(NamedTuple):
+class OverWeight(
+    namedtuple(
+        "OverWeight",
+        "w1 w2 w3 w4 w5 w6 w7 p0 p1 p2 p3 p4 p5 p6 p7 q0 q1 q2 q3 q4 q5 q6 q7 "
+        "b0 b1 b2 b3 b4 b5 b6 b7",
+    )
+):
     r"""The law of Navarro-Lopez & Suarez with torques and decay piecewise linear in the weight.
 
     .. math:: T(\omega, W) = p(W) + [q(W) - p(W)]\, e^{-\beta(W) |\omega|}
@@ -142,58 +149,20 @@ class OverWeight(NamedTuple):
         Of the decay: b0 in s/rad, the others in s/(rad N).
     """
 
-    w1: Any
-    w2: Any
-    w3: Any
-    w4: Any
-    w5: Any
-    w6: Any
-    w7: Any
-    p0: Any
-    p1: Any
-    p2: Any
-    p3: Any
-    p4: Any
-    p5: Any
-    p6: Any
-    p7: Any
-    q0: Any
-    q1: Any
-    q2: Any
-    q3: Any
-    q4: Any
-    q5: Any
-    q6: Any
-    q7: Any
-    b0: Any
-    b1: Any
-    b2: Any
-    b3: Any
-    b4: Any
-    b5: Any
-    b6: Any
-    b7: Any
+    __slots__ = ()
 
     @property
     def set_valued(self) -> bool:
         """A bit can stand still under this law."""
         return True
 
-    # The sums stand in each method, as a method that is compiled cannot call another.
-
     def static_torque(self, weight: Any) -> Any:
         """Largest torque of a bit at rest (N m) under `weight` (N)."""
-        static = self.q0 * weight
-        for k in range(7):
-            static = static + self[16 + k] * (weight > self[k]) * (weight - self[k])
-        return static
+        return _held(self, weight)[1]
 
     def kinetic_torque_at_rest(self, weight: Any) -> Any:
         """Torque of a bit that just turns (N m): the static torque."""
-        static = self.q0 * weight
-        for k in range(7):
-            static = static + self[16 + k] * (weight > self[k]) * (weight - self[k])
-        return static
+        return _held(self, weight)[1]
 
     def steepest_fall(self, weight: Any) -> Any:
         """Largest falling slope (N m s/rad) under a constant `weight` (N), at zero speed."""
@@ -206,24 +175,13 @@ class OverWeight(NamedTuple):
 
     def torque_and_slope(self, weight: Any, speed: Any, exp: Exp) -> tuple[Any, Any]:
         """Torque (N m) and slope (N m s/rad) at `speed` >= 0 (rad/s) under `weight` (N)."""
-        level, static, decay = self.p0 * weight, self.q0 * weight, self.b0
-        for k in range(7):
-            over = (weight > self[k]) * (weight - self[k])
-            level = level + self[8 + k] * over
-            static = static + self[16 + k] * over
-            decay = decay + self[24 + k] * over
+        level, static, decay = _held(self, weight)
         falling = (static - level) * exp(-decay * speed)
         return level + falling, -decay * falling
 
     def held(self, weight: Any) -> tuple[Any, Any, Any]:
         """Torque at high speed, static torque (N m) and decay (s/rad) under `weight` (N)."""
-        level, static, decay = self.p0 * weight, self.q0 * weight, self.b0
-        for k in range(7):
-            over = (weight > self[k]) * (weight - self[k])
-            level = level + self[8 + k] * over
-            static = static + self[16 + k] * over
-            decay = decay + self[24 + k] * over
-        return level, static, decay
+        return _held(self, weight)
 
     def torque_by_weight(self, weight: Any, speed: Any, exp: Exp) -> Any:
         """Torque per weight at constant speed, dT/dW (m); at a row the mean of both sides."""
@@ -240,6 +198,16 @@ class OverWeight(NamedTuple):
         fade = exp(-decay * speed)
         moved = static_rate - level_rate - decay_rate * speed * spread
         return level_rate + moved * fade
+
+
+def _held(law: Any, weight: Any) -> tuple[Any, Any, Any]:
+    level, static, decay = law.p0 * weight, law.q0 * weight, law.b0
+    for k in range(7):
+        over = (weight > law[k]) * (weight - law[k])
+        level = level + law[8 + k] * over
+        static = static + law[16 + k] * over
+        decay = decay + law[24 + k] * over
+    return level, static, decay
 
 
 def over_weight(

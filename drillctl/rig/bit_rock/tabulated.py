@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from pydantic import model_validator
 
@@ -15,7 +16,13 @@ from drillctl.rig.table import Table
 KNOTS = 12  # most points after the first
 
 
-class Tabulated(NamedTuple):
+class Tabulated(
+    namedtuple(
+        "Tabulated",
+        "static start rise fall w1 w2 w3 w4 w5 w6 w7 w8 w9 w10 w11 w12 "
+        "c1 c2 c3 c4 c5 c6 c7 c8 c9 c10 c11 c12",
+    )
+):
     r"""Set-valued friction through measured points, straight between them, level after the last.
 
     .. math:: T(\omega) = W \Big[ t_0 + s_0 |\omega|
@@ -40,34 +47,7 @@ class Tabulated(NamedTuple):
         Changes of slope over weight there (m s/rad); zero where there are fewer points.
     """
 
-    static: Any
-    start: Any
-    rise: Any
-    fall: Any
-    w1: Any
-    w2: Any
-    w3: Any
-    w4: Any
-    w5: Any
-    w6: Any
-    w7: Any
-    w8: Any
-    w9: Any
-    w10: Any
-    w11: Any
-    w12: Any
-    c1: Any
-    c2: Any
-    c3: Any
-    c4: Any
-    c5: Any
-    c6: Any
-    c7: Any
-    c8: Any
-    c9: Any
-    c10: Any
-    c11: Any
-    c12: Any
+    __slots__ = ()
 
     @property
     def set_valued(self) -> bool:
