@@ -27,11 +27,10 @@ from drillctl import units
 from drillctl.arrays import Array, ComplexArray, Mask
 from drillctl.design import Design, parameter
 from drillctl.errors import InputError
-from drillctl.linear.ends import BitSide, Ends, Route, ends_of, telling_grid, weight_path
+from drillctl.linear.ends import Ends, Route, bit_side, ends_of, telling_grid
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.operating_point import at_speed, operating_point
 from drillctl.linear.slope_margin import slope_margins
-from drillctl.rig.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
     import shapely
@@ -296,11 +295,9 @@ def root_locus(design: Design, path: str, values: ArrayLike, count: int = 12) ->
 
 def _lowest(design: Design, count: int) -> ComplexArray:
     point = operating_point(design)
-    at_once = not isinstance(design.weight_on_bit, PATHS)
     if design.simple_loop:
         return loop_poles(design.string, *design.linear_drive.gains(), point.slope)[:count]
-    path = None if at_once else weight_path(design, point.speed)
-    return model_poles(design, BitSide(point.slope, path))[:count]
+    return model_poles(design, bit_side(design, point.slope, point.speed))[:count]
 
 
 def _followed(before: ComplexArray, now: ComplexArray, width: int) -> ComplexArray:

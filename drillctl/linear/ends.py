@@ -29,7 +29,7 @@ from drillctl.linear.transmission import Banded, EndMobility, Lines
 from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.drillstring import Drillstring, Parts
 from drillctl.rig.drillstring.frequencies import Model, natural_frequencies
-from drillctl.rig.weight_on_bit import FollowingSpeed, RealWeight
+from drillctl.rig.weight_on_bit import PATHS, FollowingSpeed, RealWeight
 
 WAVE_MODES = 40  # modes of a continuum that are computed; there are infinitely many
 BETWEEN = 24  # frequencies between two neighbouring natural frequencies
@@ -224,3 +224,9 @@ class BitSide:
             return np.asarray(felt.bit + 0.0 * s)
         seen = ends.mobility(s, top=drive)
         return np.asarray((felt.top - felt.torque * drive) * seen.transfer / seen.bit)
+
+
+def bit_side(design: Design, slope: float, speed: float) -> BitSide:
+    """What closes the loop at the bit; a weight that moves at once is in the slope."""
+    moves_late = isinstance(design.weight_on_bit, PATHS)
+    return BitSide(slope, weight_path(design, speed) if moves_late else None)

@@ -13,13 +13,12 @@ from drillctl import units
 from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.ends import BitSide, ends_of, weight_path
+from drillctl.linear.ends import BitSide, bit_side, ends_of, weight_path
 from drillctl.linear.loop_margins import Margins, margins, weight_delay_margin, whole_crossings
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.mesh_limited import Figures, figures_of, mesh_limited
 from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
 from drillctl.linear.slope_margin import slope_margin
-from drillctl.rig.weight_on_bit import PATHS
 from drillctl.store.codec import label
 from drillctl.store.result import Result
 
@@ -70,7 +69,7 @@ class LoopAnalysis(Result, kind="loop"):
     @property
     def bit_side(self) -> BitSide:
         """What closes the loop at the bit; a weight that moves at once is in the slope."""
-        return _bit_side(self.design, self.operating_point)
+        return bit_side(self.design, self.operating_point.slope, self.operating_point.speed)
 
     @property
     def spectral_abscissa(self) -> float:
@@ -137,7 +136,7 @@ def loop(design: Design) -> LoopAnalysis:
         There is no steady drilling: the drive cannot turn the bit.
     """
     point = operating_point(design)
-    ends, bit = ends_of(design.string), _bit_side(design, point)
+    ends, bit = ends_of(design.string), bit_side(design, point.slope, point.speed)
     tolerated, omega = tolerated_slope(design, point.speed)
     # Two gains describe the drive, and a weight that acts at once is in the slope already.
     simple = design.simple_loop
@@ -168,20 +167,12 @@ def loop(design: Design) -> LoopAnalysis:
     )
 
 
-def _bit_side(design: Design, point: OperatingPoint) -> BitSide:
-    if not isinstance(design.weight_on_bit, PATHS):
-        return BitSide(point.slope)
-    return BitSide(point.slope, weight_path(design, point.speed))
-
-
 def tolerated_slope(design: Design, speed: float) -> tuple[float, float]:
     """Slope margin of any loop about steady drilling at a speed (rad/s)."""
     ends = ends_of(design.string)
-    at_once = not isinstance(design.weight_on_bit, PATHS)
     if design.simple_loop:
         return slope_margin(ends, *design.linear_drive.gains())
-    # A weight that moves at once is in the slope, not in the margin.
-    bit = BitSide(0.0, None if at_once else weight_path(design, speed))
+    bit = bit_side(design, 0.0, speed)
     poles = model_poles(design, bit)
     if poles.real.max() >= ROUNDING * np.abs(poles).max():
         return math.nan, math.nan

@@ -35,6 +35,7 @@ from drillctl.arrays import Array, ComplexArray
 from drillctl.linear.ends import BitSide, Ends, telling_grid
 from drillctl.linear.slope_margin import Crossings
 from drillctl.rig.top_drive import TopDriveLaw
+from drillctl.store.codec import documented, label
 
 CLUSTER = np.geomspace(0.03, 1e7, 90)
 """Distances from a pole at which a response is computed, over that of the pole from the axis."""
@@ -43,36 +44,23 @@ SLOWEST = 1e-3  # lowest frequency computed, over the magnitude of the smallest 
 NEAREST = 1e-13  # least distance from the axis that a pole is taken to have, over its frequency
 
 
+@documented
 @dataclass(frozen=True)
 class Margins:
-    """How far a stable loop is from instability, broken at the top torque.
+    """How far a stable loop is from instability, broken at the top torque."""
 
-    Attributes
-    ----------
-    peak_sensitivity : float
-        Largest of abs(S).
-    peak_sensitivity_hz : float or None
-        Where (Hz); None where it is reached beyond all modes only.
-    disk : float
-        Balanced disk margin alpha.
-    gain_db, phase_deg : float
-        Gain (dB) and phase (degrees) that may change together within the disk.
-    disk_hz : float
-        Where the disk is touched (Hz).
-    delay : float
-        Delay in the loop that makes it unstable (s); infinite if none does.
-    delay_hz : float or None
-        Frequency of that instability (Hz).
-    """
-
-    peak_sensitivity: float
-    peak_sensitivity_hz: float | None
-    disk: float
-    gain_db: float
-    phase_deg: float
-    disk_hz: float
-    delay: float
-    delay_hz: float | None
+    peak_sensitivity: float = label(means="largest of abs(S)")
+    peak_sensitivity_hz: float | None = label(
+        unit="Hz", means="where; None where it is reached beyond all modes only"
+    )
+    disk: float = label(means="balanced disk margin alpha")
+    gain_db: float = label(unit="dB", means="gain that may change with the phase in the disk")
+    phase_deg: float = label(unit="degrees", means="phase that may change with the gain")
+    disk_hz: float = label(unit="Hz", means="where the disk is touched")
+    delay: float = label(
+        unit="s", means="delay in the loop that makes it unstable, infinite if none does"
+    )
+    delay_hz: float | None = label(unit="Hz", means="frequency of that instability")
 
 
 def margins(
@@ -209,14 +197,10 @@ def peak_sensitivities(
 
 def _delay_margin(loop: _Loop, grid: Array) -> tuple[float, float | None]:
     """Shortest delay (s) that turns L to -1 at a crossover, and its angular frequency."""
-    from scipy.optimize import elementwise
-
     with np.errstate(divide="ignore"):
-        over = loop.excess(grid) > 0.0
-        place = np.flatnonzero(over[1:] != over[:-1])
-        if len(place) == 0:
-            return math.inf, None
-        omega = elementwise.find_root(loop.excess, (grid[place], grid[place + 1])).x
+        omega = _zeros(loop.excess, grid)
+    if len(omega) == 0:
+        return math.inf, None
     string, drive = loop.impedances(omega)
     turn = np.mod(np.angle(drive / string) + math.pi, 2.0 * math.pi) / omega
     first = int(np.argmin(turn))

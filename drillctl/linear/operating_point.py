@@ -14,28 +14,22 @@ from drillctl.errors import InputError
 from drillctl.rig.bit_rock import contact
 from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
+from drillctl.store.codec import documented, label
 
 FASTEST = 1e4  # highest speed of the scan (rad/s)
 SCAN = 4000  # speeds at which the balance is evaluated before its zeros are located
 
 
+@documented
 @dataclass(frozen=True)
 class OperatingPoint:
-    """One steady state of a rig.
+    """One steady state of a rig."""
 
-    Attributes
-    ----------
-    speed : float
-        Of top and bit (rad/s).
-    bit_torque : float
-        Torque of the rock (N m).
-    slope : float
-        Its falling slope D = -dT/dw (N m s/rad), negative where the torque rises with speed.
-    """
-
-    speed: float
-    bit_torque: float
-    slope: float
+    speed: float = label(unit="rad/s", means="of top and bit")
+    bit_torque: float = label(unit="N*m", means="torque of the rock")
+    slope: float = label(
+        unit="N*m*s/rad", means="its falling slope D = -dT/dw, negative where the torque rises"
+    )
 
 
 def operating_point(design: Design) -> OperatingPoint:

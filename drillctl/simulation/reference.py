@@ -156,6 +156,25 @@ class Motion:
 
         return self.components([BIT_ANGLE], time)[0]
 
+    def bit_speed(self, time: Array) -> Array:
+        """Absolute bit speed (rad/s) at times (s); exactly zero while stuck."""
+        from drillctl.simulation.reference_rates import BIT_SPEED
+
+        piece = np.minimum(np.searchsorted(self.ends, time), len(self.ends) - 1)
+        speed = self.components([BIT_SPEED], time)[0] + self.design.speed
+        return np.where(self.directions[piece] == 0.0, 0.0, speed)
+
+    def top_speed(self, time: Array) -> Array:
+        """Absolute speed of the top drive (rad/s) at times (s)."""
+        from drillctl.simulation.reference_rates import TOP_SPEED
+
+        return self.components([TOP_SPEED], time)[0] + self.design.speed
+
+    def mean_speed(self, begin: float, end: float) -> float:
+        """Mean bit speed between two times (rad/s)."""
+        first, last = self.bit_angle(np.array([begin, end]))
+        return float(last - first) / (end - begin) + self.design.speed
+
     def states(self, time: Array) -> Array:
         """Angles and speeds in the frame at times (s), shape (2 nodes, times), of `solve_whole`."""
         size = 2 * self.design.string.nodes

@@ -156,8 +156,8 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
     window = min(m.WINDOW, duration)
     late = time >= duration - window
     late_low, late_high = _extremes(motion, duration - window, bit[late])
-    mean = design.speed + _bit_angle_change(motion, 0.0, duration) / duration
-    late_mean = design.speed + _bit_angle_change(motion, duration - window, duration) / window
+    mean = motion.mean_speed(0.0, duration)
+    late_mean = motion.mean_speed(duration - window, duration)
     j1 = deviation(motion, since, duration) / design.speed
     weight = float(np.trapezoid(signals["weight_on_bit"], time) / duration)
     return m.Measures(
@@ -208,12 +208,6 @@ def _settling(design: Design, time: Array, bit: Array, band: float) -> float | N
     share = excess[last] / (excess[last] - excess[last + 1])
     moment = float(time[last] + share * (time[last + 1] - time[last]))
     return m.settled(moment, float(time[-1]))
-
-
-def _bit_angle_change(motion: Motion, begin: float, end: float) -> float:
-    """Angle of the bit in the frame between two times (rad)."""
-    first, last = motion.bit_angle(np.array([begin, end]))
-    return float(last - first)
 
 
 def deviation(motion: Motion, begin: float, end: float) -> float:
@@ -292,11 +286,13 @@ def _by_batch(design: Design, interval: float) -> Simulation:
     prepared = prepare(lanes, design.tables.simulation)
     batch = run_batch(lanes, prepared)
     time, traced = trace(lanes, prepared, interval)
+    signals = {name: values[:, 0] for name, values in traced.items()}
+    signals["twist"] = signals["top_angle"] - signals["bit_angle"]
     scheme = prepared.scheme
     return Simulation(
         design=design,
         time=time,
-        signals=_batch_signals({name: values[:, 0] for name, values in traced.items()}),
+        signals={name: signals[name] for name in SIGNALS},
         events=(),
         measures=measures_of(batch, 0),
         status=m.STATUSES[batch.status[0]],
@@ -306,20 +302,3 @@ def _by_batch(design: Design, interval: float) -> Simulation:
         modes=scheme.modes,
         energy=None,
     )
-
-
-def _batch_signals(traced: dict[str, Array]) -> dict[str, Array]:
-    """The signals of a `Simulation` from those of a trace."""
-    top_angle, top_speed = traced["top_angle"], traced["top_speed"]
-    return {
-        "top_speed": top_speed,
-        "bit_speed": traced["bit_speed"],
-        "twist": top_angle - traced["bit_angle"],
-        "top_angle": top_angle,
-        "bit_angle": traced["bit_angle"],
-        "top_torque": traced["top_torque"],
-        "pipe_torque": traced["pipe_torque"],
-        "bit_torque": traced["bit_torque"],
-        "weight_on_bit": traced["weight_on_bit"],
-        "stuck": traced["stuck"],
-    }

@@ -38,6 +38,7 @@ from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, ends_of
 from drillctl.linear.operating_point import equilibria
 from drillctl.linear.slope_margin import crossings
+from drillctl.store.codec import documented, label
 
 MODES = 3  # lowest crossings that are looked at, unless asked for more
 NODES = 64
@@ -48,30 +49,17 @@ AMPLITUDES = np.concatenate([np.linspace(0.01, 1.0, 100), np.geomspace(1.0, 40.0
 MEANS = 80  # mean speeds that are looked at where the drive does not fix the mean
 
 
+@documented
 @dataclass(frozen=True)
 class HarmonicCycle:
-    """A periodic motion as its first harmonic tells it.
+    """A periodic motion as its first harmonic tells it."""
 
-    Attributes
-    ----------
-    amplitude : float
-        Of the bit speed (rad/s).
-    frequency_hz : float
-        Cycles per second (Hz).
-    mean_speed : float
-        Mean bit speed (rad/s).
-    slope : float
-        Falling slope (N m s/rad) to which rock and loop agree.
-    stable : bool
-        Whether a change of amplitude dies out; a cycle that is not divides what settles from
-        what sticks and slips.
-    """
-
-    amplitude: float
-    frequency_hz: float
-    mean_speed: float
-    slope: float
-    stable: bool
+    amplitude: float = label(unit="rad/s", means="of the bit speed")
+    frequency_hz: float = label(unit="Hz", means="cycles per second")
+    mean_speed: float = label(unit="rad/s", means="mean bit speed")
+    slope: float = label(unit="N*m*s/rad", means="falling slope to which rock and loop agree")
+    # one that is not divides what settles from what sticks and slips
+    stable: bool = label(means="whether a change of amplitude dies out")
 
     @property
     def period(self) -> float:

@@ -10,7 +10,7 @@ with the rates before and after, and n the gradient of what ends the phase. Stic
 direction, the bit's own, for good.
 
 Where the drive does not act on the angle, nothing does: all angles may turn together. The
-motion is then told by the twists of the elements instead of the angles of the nodes.
+motion is then described by the twists of the elements instead of the angles of the nodes.
 """
 
 from __future__ import annotations
@@ -58,10 +58,16 @@ class Flight:
     legs: tuple[Leg, ...]  # the phases on the way
 
 
-class Rig:
-    """The laws of a rig once no program acts any more: functions of the motion alone."""
+class Flow:
+    """The motion of one design as a map of its coordinates.
 
-    def __init__(self, design: Design) -> None:
+    A point is [angles, speeds] in the frame (rad, rad/s), 2 nodes numbers; or [twists, speeds],
+    one less, where the drive does not act on the angle. No program acts any more: the laws are
+    functions of the motion alone.
+    """
+
+    def __init__(self, design: Design, tolerance: float = TOLERANCE) -> None:
+        self.tolerance = tolerance
         self.nodes, self.set_speed = design.string.nodes, design.speed
         self.drive, self.rock = design.top_drive, design.bit_rock
         self.weight = cast("Any", design.weight_on_bit)
@@ -69,6 +75,13 @@ class Rig:
         self.slip = slip_phase(design.string, design.speed)
         self.stick, self.reaction = stick_phase(design.string, design.speed)
         self.static_torque = float(self.rock.static_torque(self.weight.weight(0.0)))
+        kp, ki = (float(gain) for gain in design.top_drive.gains())
+        self.projection, self.embedding = _coordinates(self.nodes, free=ki == 0.0)
+        drive = np.zeros(2 * self.nodes)
+        drive[0], drive[self.nodes] = -ki, -kp
+        self.slip_jacobian = _jacobian(self.slip.first_order, drive)
+        self.stick_jacobian = _jacobian(self.stick.first_order, drive)
+        self.holding = self.reaction.motion + self.reaction.top * drive
 
     def bit_speed(self, state: Array) -> float:
         """Absolute speed of the bit (rad/s)."""
@@ -103,44 +116,19 @@ class Rig:
             return 0
         return 1 if holding > 0.0 else -1
 
-
-def _exp(x: float) -> float:
-    """exp(x), finite: a trial step far past zero speed is to be rejected, not to raise."""
-    return math.exp(min(x, 100.0))
-
-
-class Flow:
-    """The motion of one design as a map of its coordinates.
-
-    A point is [angles, speeds] in the frame (rad, rad/s), 2 nodes numbers; or [twists, speeds],
-    one less, where the drive does not act on the angle.
-    """
-
-    def __init__(self, design: Design, tolerance: float = TOLERANCE) -> None:
-        self.rig = Rig(design)
-        self.tolerance = tolerance
-        self.nodes = design.string.nodes
-        kp, ki = (float(gain) for gain in design.top_drive.gains())
-        self.told, self.lifted = _coordinates(self.nodes, free=ki == 0.0)
-        drive = np.zeros(2 * self.nodes)
-        drive[0], drive[self.nodes] = -ki, -kp
-        self.slip_jacobian = _jacobian(self.rig.slip.first_order, drive)
-        self.stick_jacobian = _jacobian(self.rig.stick.first_order, drive)
-        self.holding = self.rig.reaction.motion + self.rig.reaction.top * drive
-
     def point(self, state: Array) -> Array:
         """Coordinates of angles and speeds; anything behind these is left out."""
-        return np.asarray(self.told @ state[: 2 * self.nodes])
+        return np.asarray(self.projection @ state[: 2 * self.nodes])
 
     def state(self, point: Array) -> Array:
         """Angles and speeds; the top drive is at angle zero where no angle matters."""
-        return np.asarray(self.lifted @ point)
+        return np.asarray(self.embedding @ point)
 
     def rates(self, state: Array, direction: int) -> Array:
         """Rates of angles and speeds in a phase."""
-        phase = self.rig.slip if direction else self.rig.stick
-        rock = self.rig.slip_torque(state, direction) if direction else 0.0
-        inputs = np.concatenate([state, [self.rig.top_torque(state), rock, 1.0]])
+        phase = self.slip if direction else self.stick
+        rock = self.slip_torque(state, direction) if direction else 0.0
+        inputs = np.concatenate([state, [self.top_torque(state), rock, 1.0]])
         return np.asarray(phase.first_order @ inputs)
 
     def tangents(self, state: Array, matrix: Array, direction: int) -> Array:
@@ -149,7 +137,7 @@ class Flow:
             return np.asarray(self.stick_jacobian @ matrix)
         grown = self.slip_jacobian @ matrix
         grown[self.nodes :] -= np.outer(
-            self.rig.slip.bit * self._rock_slope(state, direction), matrix[-1]
+            self.slip.bit * self._rock_slope(state, direction), matrix[-1]
         )
         return np.asarray(grown)
 
@@ -158,8 +146,8 @@ class Flow:
     ) -> Flight:
         """Follow a motion for a given time."""
         state = self.state(point)
-        near = self.lifted.copy() if matrix else None
-        direction, time = self.rig.direction_at(state), 0.0
+        near = self.embedding.copy() if matrix else None
+        direction, time = self.direction_at(state), 0.0
         legs: list[Leg] = []
         while True:
             leg, state, near = self._leg(time, duration, direction, state, near, dense)
@@ -169,23 +157,18 @@ class Flow:
                 break
             if len(legs) >= MOST_PHASES:
                 raise SimulationError(f"{MOST_PHASES} changes of phase by {time:g} s: chattering")
-            after = self.rig.next_direction(direction, state)
+            after = self.next_direction(direction, state)
             if near is not None:
                 near = self._salted(state, near, direction, after)
             direction = after
-        rates = self.told @ self.rates(state, direction)
-        ended = None if near is None else self.told @ near
-        return Flight(self.told @ state, rates, ended, tuple(legs))
+        rates = self.projection @ self.rates(state, direction)
+        ended = None if near is None else self.projection @ near
+        return Flight(self.projection @ state, rates, ended, tuple(legs))
 
     def _leg(
-        self,
-        begin: float,
-        end: float,
-        direction: int,
-        state: Array,
-        near: Array | None,
+        self, begin: float, end: float, direction: int, state: Array, near: Array | None,
         dense: bool,
-    ) -> tuple[Leg, Array, Array | None]:
+    ) -> tuple[Leg, Array, Array | None]:  # fmt: skip
         size = 2 * self.nodes
 
         def rates(time: float, both: Array) -> Array:
@@ -197,33 +180,27 @@ class Flow:
 
         both = state if near is None else np.concatenate([state, near.ravel()])
         result = _integrate(
-            rates,
-            (begin, end),
-            both,
-            method="DOP853",
-            rtol=self.tolerance,
-            atol=self.tolerance,
-            events=self._events(direction),
-            dense_output=dense,
-        )
+            rates, (begin, end), both, method="DOP853", rtol=self.tolerance, atol=self.tolerance,
+            events=self._events(direction), dense_output=dense,
+        )  # fmt: skip
         if result.status < 0 or not np.isfinite(result.y[:, -1]).all():
             raise SimulationError(f"the integrator failed at {result.t[-1]:g} s: {result.message}")
         final = result.y[:size, -1].copy()
         if result.status == 1:  # at rest exactly, not to the locator's rounding
-            final[-1] = -self.rig.set_speed
+            final[-1] = -self.set_speed
         extremes = np.asarray(result.t_events[1]) if direction else np.zeros(0)
         leg = Leg(begin, float(result.t[-1]), direction, result.sol, extremes)
         return leg, final, None if near is None else result.y[size:, -1].reshape(near.shape)
 
     def _events(self, direction: int) -> list[Any]:
-        rig, size = self.rig, 2 * self.nodes
+        size = 2 * self.nodes
 
         def comes_to_rest(time: float, both: Array) -> float:
             # Exactly zero is the release itself, in a step too short to move the bit.
-            return direction * rig.bit_speed(both[:size]) or 1e-300
+            return direction * self.bit_speed(both[:size]) or 1e-300
 
         def breaks_loose(time: float, both: Array) -> float:
-            return rig.static_torque - abs(rig.holding_torque(both[:size]))
+            return self.static_torque - abs(self.holding_torque(both[:size]))
 
         def extreme(time: float, both: Array) -> float:
             return float(self.rates(both[:size], direction)[-1])
@@ -247,9 +224,13 @@ class Flow:
         ahead, behind = state.copy(), state.copy()
         ahead[-1] += SPEED_STEP
         behind[-1] -= SPEED_STEP
-        torque = self.rig.slip_torque
-        change = torque(ahead, direction) - torque(behind, direction)
-        return change / (2.0 * SPEED_STEP)
+        torque = self.slip_torque
+        return (torque(ahead, direction) - torque(behind, direction)) / (2.0 * SPEED_STEP)
+
+
+def _exp(x: float) -> float:
+    """exp(x), finite: a trial step far past zero speed is to be rejected, not to raise."""
+    return math.exp(min(x, 100.0))
 
 
 def _integrate(*arguments: Any, **options: Any) -> Any:
@@ -286,11 +267,11 @@ def _coordinates(nodes: int, free: bool) -> tuple[Array, Array]:
     """Matrices from [angles, speeds] to coordinates and back."""
     if not free:
         return np.eye(2 * nodes), np.eye(2 * nodes)
-    told = np.zeros((2 * nodes - 1, 2 * nodes))
-    lifted = np.zeros((2 * nodes, 2 * nodes - 1))
+    projection = np.zeros((2 * nodes - 1, 2 * nodes))
+    embedding = np.zeros((2 * nodes, 2 * nodes - 1))
     for element in range(nodes - 1):
-        told[element, element : element + 2] = 1.0, -1.0
-        lifted[element + 1 : nodes, element] = -1.0
-    told[nodes - 1 :, nodes:] = np.eye(nodes)
-    lifted[nodes:, nodes - 1 :] = np.eye(nodes)
-    return told, lifted
+        projection[element, element : element + 2] = 1.0, -1.0
+        embedding[element + 1 : nodes, element] = -1.0
+    projection[nodes - 1 :, nodes:] = np.eye(nodes)
+    embedding[nodes:, nodes - 1 :] = np.eye(nodes)
+    return projection, embedding

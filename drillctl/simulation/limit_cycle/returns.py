@@ -22,8 +22,7 @@ from drillctl.simulation.lanes import Kind
 from drillctl.simulation.limit_cycle.flow import Flow
 from drillctl.simulation.limit_cycle.shooting import Orbit, find_orbit
 from drillctl.simulation.reference import Motion, solve_whole, stuck_between
-from drillctl.simulation.reference_rates import BIT_SPEED, TOP_SPEED
-from drillctl.store.codec import label
+from drillctl.store.codec import documented, label
 
 LAST = 10  # returns that are reported
 PER_CYCLE = 4  # A motion may repeat with every return, or with every second, third or fourth
@@ -44,40 +43,38 @@ STATUSES = ("equilibrium", "settling", "stalled", "periodic", "not periodic")
 """
 
 
+@documented
 @dataclass(frozen=True, eq=False)
 class Returns:
-    """Returns of one long simulation.
+    """Returns of one long simulation."""
 
-    Attributes
-    ----------
-    duration : float
-        Length of the simulation (s).
-    mean_speed : float
-        Mean bit speed between the first and the last return; without returns over the second
-        half (rad/s).
-    swing : ndarray, shape (windows,)
-        Largest less smallest bit speed (rad/s) in each expected period of the second half.
-    times : ndarray, shape (returns,)
-        Times of the returns in the second half (s).
-    points : ndarray, shape (returns, coordinates)
-        Where the motion was: coordinates of `flow.Flow`.
-    peaks : ndarray, shape (returns - 1,)
-        Highest bit speed (rad/s) between returns.
-    stuck : ndarray, shape (returns - 1,)
-        Time at rest between returns (s).
-    time, bit_speed, top_speed : ndarray, shape (samples,)
-        The stretch between the last two returns, or the last expected period where there are
-        none (s from its begin, rad/s, rad/s).
-    """
-
-    duration: float
-    mean_speed: float
-    swing: Array = label("window", unit="rad/s")
-    times: Array = label("return", unit="s", name="return_time")
-    points: Array = label("return", "coordinate", unit="rad, rad/s", name="return_point")
-    peaks: Array = label("interval", unit="rad/s", name="return_peak")
-    stuck: Array = label("interval", unit="s", name="return_stuck")
-    time: Array = label("simulated_time", unit="s", name="simulated_time")
+    duration: float = label(unit="s", means="length of the simulation")
+    mean_speed: float = label(
+        unit="rad/s", means="mean bit speed from first to last return, else over the second half"
+    )
+    swing: Array = label(
+        "window", unit="rad/s", means="range of bit speed in each period of the second half"
+    )
+    times: Array = label("return", unit="s", name="return_time", means="returns in the second half")
+    points: Array = label(
+        "return",
+        "coordinate",
+        unit="rad, rad/s",
+        name="return_point",
+        means="where the motion was: coordinates of `flow.Flow`",
+    )
+    peaks: Array = label(
+        "interval", unit="rad/s", name="return_peak", means="highest bit speed between returns"
+    )
+    stuck: Array = label(
+        "interval", unit="s", name="return_stuck", means="time at rest between returns"
+    )
+    time: Array = label(
+        "simulated_time",
+        unit="s",
+        name="simulated_time",
+        means="between the last two returns, else the last expected period",
+    )
     bit_speed: Array = label(
         "simulated_time", unit="rad/s", name="simulated_bit_speed", means="simulated bit speed"
     )
@@ -149,20 +146,19 @@ def long_run(
 
 def take_returns(motion: Motion, period: float, level: float | None = None) -> Returns:
     """The returns in the second half of a run."""
-    trace = _Trace(motion)
     duration = float(motion.ends[-1])
     begin = 0.5 * duration
     time = np.linspace(begin, duration, max(2, int(FINE * (duration - begin) / period)))
-    speed = trace.bit_speed(time)
+    speed = motion.bit_speed(time)
     mean = float(speed.mean())
     level = mean if level is None else level
     half_down = 0.5 * (level + float(speed.min()))
     rises = _rises(time, speed, level, half_down)
-    moments = np.array([trace.crossing(*pair, level) for pair in rises])
+    moments = np.array([_crossing(motion, *pair, level) for pair in rises])
     flow = Flow(motion.design)
-    points = [flow.point(trace.state(moment)) for moment in moments]
+    points = [flow.point(state) for state in motion.states(moments).T]
     if len(moments) > 1:  # whole cycles have the mean, any other stretch has it nearly
-        mean = trace.mean(float(moments[0]), float(moments[-1]))
+        mean = motion.mean_speed(float(moments[0]), float(moments[-1]))
     windows = np.array_split(speed, max(2, int((duration - begin) / period)))
     last = moments[-2:] if len(moments) > 1 else np.array([duration - period, duration])
     shown = np.linspace(last[0], last[1], FINE + 1)
@@ -171,12 +167,12 @@ def take_returns(motion: Motion, period: float, level: float | None = None) -> R
         mean_speed=mean,
         swing=np.array([np.ptp(part) for part in windows]),
         times=moments,
-        points=np.array(points).reshape(len(points), flow.told.shape[0]),
-        peaks=np.array([trace.peak(*pair) for pair in pairwise(moments)]),
-        stuck=np.array([trace.stuck(*pair) for pair in pairwise(moments)]),
+        points=np.array(points).reshape(len(points), flow.projection.shape[0]),
+        peaks=np.array([_peak(motion, *pair) for pair in pairwise(moments)]),
+        stuck=np.array([stuck_between(motion, *pair) for pair in pairwise(moments)]),
         time=shown - shown[0],
-        bit_speed=trace.bit_speed(shown),
-        top_speed=trace.top_speed(shown),
+        bit_speed=motion.bit_speed(shown),
+        top_speed=motion.top_speed(shown),
     )
 
 
@@ -228,44 +224,17 @@ def _rises(time: Array, speed: Array, level: float, low: float) -> list[tuple[fl
     return results
 
 
-class _Trace:
-    """States and speeds of a run at any time."""
+def _crossing(motion: Motion, low: float, high: float, level: float) -> float:
+    """Time between two at which the bit speed is `level`."""
 
-    def __init__(self, motion: Motion) -> None:
-        self.motion = motion
-        self.set_speed = motion.design.speed
+    def excess(time: float) -> float:
+        return float(motion.bit_speed(np.array([time]))[0]) - level
 
-    def state(self, time: float) -> Array:
-        return self.motion.states(np.array([time]))[:, 0]
+    return float(brentq(excess, low, high, xtol=1e-12, rtol=1e-14))
 
-    def bit_speed(self, time: Array) -> Array:
-        """Absolute bit speed (rad/s); exactly zero while stuck."""
-        piece = np.minimum(np.searchsorted(self.motion.ends, time), len(self.motion.ends) - 1)
-        speed = self.motion.components([BIT_SPEED], time)[0] + self.set_speed
-        return np.where(self.motion.directions[piece] == 0.0, 0.0, speed)
 
-    def top_speed(self, time: Array) -> Array:
-        return self.motion.components([TOP_SPEED], time)[0] + self.set_speed
-
-    def crossing(self, low: float, high: float, level: float) -> float:
-        """Time between two at which the bit speed is `level`."""
-
-        def excess(time: float) -> float:
-            return float(self.bit_speed(np.array([time]))[0]) - level
-
-        return float(brentq(excess, low, high, xtol=1e-12, rtol=1e-14))
-
-    def mean(self, begin: float, end: float) -> float:
-        """Mean bit speed between two times (rad/s)."""
-        first, last = self.motion.bit_angle(np.array([begin, end]))
-        return float(last - first) / (end - begin) + self.set_speed
-
-    def peak(self, begin: float, end: float) -> float:
-        """Highest bit speed between two times, at a located extreme."""
-        moments = self.motion.extremes[:, 0]
-        inside = moments[(moments > begin) & (moments < end)]
-        return float(self.bit_speed(np.append(inside, [begin, end])).max())
-
-    def stuck(self, begin: float, end: float) -> float:
-        """Time at rest between two times (s)."""
-        return stuck_between(self.motion, begin, end)
+def _peak(motion: Motion, begin: float, end: float) -> float:
+    """Highest bit speed between two times, at a located extreme."""
+    moments = motion.extremes[:, 0]
+    inside = moments[(moments > begin) & (moments < end)]
+    return float(motion.bit_speed(np.append(inside, [begin, end])).max())

@@ -23,7 +23,7 @@ from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.simulation.limit_cycle.describing import HarmonicCycle, mean_torque_and_slope
 from drillctl.simulation.limit_cycle.flow import Flow, Leg
-from drillctl.store.codec import label
+from drillctl.store.codec import documented, label
 
 CLOSED = 1e-9
 """An orbit is closed when no angle (rad) and no speed (rad/s) is off by more after a period."""
@@ -35,42 +35,32 @@ LEAST_SWING = 1e-5
 SAMPLES = 1201  # samples of an orbit, both ends included
 
 
+@documented
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A periodic motion.
+    """A periodic motion."""
 
-    Attributes
-    ----------
-    period : float
-        Duration (s).
-    peak_bit_speed, min_bit_speed : float
-        Extremes of the bit speed (rad/s).
-    mean_bit_speed : float
-        Its time mean (rad/s).
-    stuck_time : float
-        Time at rest in a period (s).
-    multipliers : ndarray of complex, shape (coordinates - 1,)
-        Largest first, without the one at 1 that goes with the motion itself.
-    residual : float
-        Largest angle (rad) or speed (rad/s) by which the orbit does not close.
-    iterations : int
-        Newton steps that were taken.
-    point : ndarray, shape (coordinates,)
-        Where it starts: coordinates of `flow.Flow`.
-    time, bit_speed, top_speed : ndarray, shape (samples,)
-        One period (s, rad/s, rad/s).
-    """
-
-    period: float
-    peak_bit_speed: float
-    min_bit_speed: float
-    mean_bit_speed: float
-    stuck_time: float
-    multipliers: ComplexArray = label("number", name="multiplier")
-    residual: float = label()
-    iterations: int = label()
-    point: Array = label("coordinate", unit="rad, rad/s", name="orbit_point")
-    time: Array = label("time", unit="s")
+    period: float = label(unit="s", means="duration")
+    peak_bit_speed: float = label(unit="rad/s", means="highest bit speed")
+    min_bit_speed: float = label(unit="rad/s", means="lowest bit speed")
+    mean_bit_speed: float = label(unit="rad/s", means="time mean of the bit speed")
+    stuck_time: float = label(unit="s", means="time at rest in a period")
+    multipliers: ComplexArray = label(
+        "number",
+        name="multiplier",
+        means="largest first, without the one at 1 that goes with the motion itself",
+    )
+    residual: float = label(
+        unit="rad, rad/s", means="largest angle or speed by which the orbit does not close"
+    )
+    iterations: int = label(means="Newton steps that were taken")
+    point: Array = label(
+        "coordinate",
+        unit="rad, rad/s",
+        name="orbit_point",
+        means="where it starts: coordinates of `flow.Flow`",
+    )
+    time: Array = label("time", unit="s", means="one period")
     bit_speed: Array = label("time", unit="rad/s", means="bit speed of the orbit")
     top_speed: Array = label("time", unit="rad/s", means="top speed of the orbit")
 
@@ -188,8 +178,8 @@ class _Place:
 
     def start_rates(self) -> Array:
         state = self.flow.state(self.point)
-        direction = self.flow.rig.direction_at(state)
-        return np.asarray(self.flow.told @ self.flow.rates(state, direction))
+        direction = self.flow.direction_at(state)
+        return np.asarray(self.flow.projection @ self.flow.rates(state, direction))
 
 
 def _nearer(place: _Place) -> _Place:
@@ -228,7 +218,7 @@ def _orbit(place: _Place, steps: int) -> Orbit:
     moments = np.concatenate([leg.extremes for leg in legs])
     _, turning = _speeds(flow, legs, np.sort(moments))
     speeds = np.concatenate([bit, turning])
-    if np.ptp(speeds) <= LEAST_SWING * flow.rig.set_speed:
+    if np.ptp(speeds) <= LEAST_SWING * flow.set_speed:
         raise SimulationError("the guess led to steady drilling, not to a periodic motion")
     return Orbit(
         period=period,
@@ -260,9 +250,9 @@ def _speeds(flow: Flow, legs: tuple[Leg, ...], time: Array) -> tuple[Array, Arra
         mine = which == index
         if mine.any() and leg.solution is not None:
             state = leg.solution(time[mine])
-            top[mine] = state[flow.nodes] + flow.rig.set_speed
+            top[mine] = state[flow.nodes] + flow.set_speed
             if leg.direction != 0:
-                bit[mine] = state[-1] + flow.rig.set_speed
+                bit[mine] = state[-1] + flow.set_speed
     return top, bit
 
 
@@ -271,8 +261,5 @@ def _turned(flow: Flow, legs: tuple[Leg, ...]) -> float:
     first, last = legs[0], legs[-1]
     assert first.solution is not None
     assert last.solution is not None
-    begin, end = (
-        first.solution(first.begin)[flow.nodes - 1],
-        last.solution(last.end)[flow.nodes - 1],
-    )
-    return float(end - begin) + flow.rig.set_speed * last.end
+    angle, bit = last.solution(last.end) - first.solution(first.begin), flow.nodes - 1
+    return float(angle[bit]) + flow.set_speed * last.end
