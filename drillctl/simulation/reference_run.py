@@ -521,7 +521,7 @@ def work_for(size: int) -> s.Work:
     """Memory of the steps of a rig with so many states."""
     return s.Work(
         np.zeros((s.DENSE_STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((3, size)),
-        np.zeros((s.DENSE_STAGES, 1)), np.zeros(8),
+        np.zeros(s.DENSE_STAGES), np.zeros(8),
         np.arange(size), np.zeros((0, size)), np.zeros(f.FIRST + 8 * size),
     )  # fmt: skip
 

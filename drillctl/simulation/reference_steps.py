@@ -91,7 +91,7 @@ class Work(NamedTuple):
     trial: Any  # shape (states,): argument of a stage
     after: Any  # shape (states,): end of the step
     errors: Any  # shape (3, states)
-    summed: Any  # shape (16, 1): a sum of the states of each stage
+    one: Any  # shape (16,): a state, or a sum of states, of each stage
     values: Any  # shape (8,): of events, at both ends of a step
     every: Any  # shape (states,): all of them, and
     none: Any  # shape (0, states): no sums, for
@@ -178,13 +178,13 @@ def explicit_error(method: Any, work: Any, step: float, tolerance: float, state:
 
 @compiled
 def _record_one(
-    dense: Any, unit: float, begin: float, change: float, stages: Any, i: int, row: Any, place: int
+    dense: Any, unit: float, begin: float, change: float, stages: Any, row: Any, place: int
 ) -> None:
     row[place], row[place + 1] = begin, change
     for k in range(6):
         total = 0.0
         for j in range(DENSE_STAGES):
-            total += dense.weights[k, j] * stages[j, i]
+            total += dense.weights[k, j] * stages[j]
         row[place + 2 + k] = dense.changes[k] * change + unit * total
 
 
@@ -195,21 +195,22 @@ def record(
     """Keep the dense output of some states and of sums of states."""
     row[BEGIN], row[LENGTH] = time, step
     stages, after, unit = work.stages, work.after, step if dense.by_step else 1.0
+    one = work.one
     for c in range(len(kept)):
         i = kept[c]
-        change = after[i] - state[i]
-        _record_one(dense, unit, state[i], change, stages, i, row, FIRST + 8 * c)
-    summed = work.summed
+        for j in range(DENSE_STAGES):
+            one[j] = stages[j, i]
+        _record_one(dense, unit, state[i], after[i] - state[i], one, row, FIRST + 8 * c)
     for c in range(len(sums)):
         weights, begin, change = sums[c], 0.0, 0.0
         for i in range(len(weights)):
             begin += weights[i] * state[i]
             change += weights[i] * (after[i] - state[i])
         for j in range(DENSE_STAGES):
-            summed[j, 0] = 0.0
+            one[j] = 0.0
             for i in range(len(weights)):
-                summed[j, 0] += weights[i] * stages[j, i]
-        _record_one(dense, unit, begin, change, summed, 0, row, FIRST + 8 * (len(kept) + c))
+                one[j] += weights[i] * stages[j, i]
+        _record_one(dense, unit, begin, change, one, row, FIRST + 8 * (len(kept) + c))
 
 
 @compiled
