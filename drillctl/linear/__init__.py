@@ -28,12 +28,7 @@ thirty elements. `control` is imported where a system is made and not before, as
 from drillctl.linear import export, tuning
 from drillctl.linear.boundary import GainBoundary, RootLocus, gain_boundary, root_locus
 from drillctl.linear.ends import ends_of
-from drillctl.linear.loop_analysis import (
-    LoopAnalysis,
-    critical_speed,
-    critical_weight_on_bit,
-    loop,
-)
+from drillctl.linear.loop_analysis import LoopAnalysis, critical_speed, critical_weight_on_bit, loop
 from drillctl.linear.loop_margins import Margins, margins
 from drillctl.linear.loop_model import closed_loop
 from drillctl.linear.modal import Mode, Modes, modes

@@ -48,8 +48,7 @@ class LoopAnalysis(Result, kind="loop"):
         unit="Hz", means="frequency of the poles that decide it, 0 for a real pole"
     )
     continuum_slope_margin: float | None = label(
-        unit="N*m*s/rad",
-        means="D* of the exact continuum, of its lowest modes, if it has one",
+        unit="N*m*s/rad", means="D* of the exact continuum, of its lowest modes, if it has one"
     )
     margins: Margins | None = label(means="at the top torque; None if the loop is not stable")
     weight_delay_margin: float | None = label(

@@ -257,10 +257,7 @@ def _torque_shape(angle: Array, stiffness: Array) -> Array:
 
 
 def _entry(mode: Mode) -> dict[str, Any]:
-    entry: dict[str, Any] = {
-        "frequency_hz": mode.frequency_hz,
-        "damping_ratio": mode.damping_ratio,
-    }
+    entry: dict[str, Any] = {"frequency_hz": mode.frequency_hz, "damping_ratio": mode.damping_ratio}
     return entry | {"overdamped": True} if mode.overdamped else entry
 
 

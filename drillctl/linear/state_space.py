@@ -179,9 +179,5 @@ def named(
     import control
 
     return control.StateSpace(
-        *matrices,
-        name=name,
-        inputs=list(inputs),
-        outputs=list(outputs),
-        states=states,
+        *matrices, name=name, inputs=list(inputs), outputs=list(outputs), states=states
     )

@@ -97,10 +97,7 @@ class Lines:
     model: Model
 
     def mobility(
-        self,
-        s: ComplexArray,
-        top: ComplexArray | complex = 0.0,
-        bit: ComplexArray | complex = 0.0,
+        self, s: ComplexArray, top: ComplexArray | complex = 0.0, bit: ComplexArray | complex = 0.0
     ) -> EndMobility:
         """Response to torques on the two ends."""
         s = np.asarray(s, dtype=complex)

@@ -48,9 +48,8 @@ def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
     for number, case in enumerate(result.cases):
         values = np.sort(case.measures["j1"][~np.isnan(case.measures["j1"])])
         share = np.arange(1, len(values) + 1) / result.realizations
-        label = case.name if len(values) == result.realizations else (
-            f"{case.name} ({result.realizations - len(values)} failed)"
-        )  # fmt: skip
+        failed = result.realizations - len(values)
+        label = f"{case.name} ({failed} failed)" if failed else case.name
         ax.step(
             np.concatenate([values[:1], values]), np.concatenate([share[:1] * 0.0, share]),
             where="post", label=label, **style.look(number),
@@ -67,9 +66,8 @@ def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
     title = style.heading(result, "Distribution of J1 over the draws")
     ax.set_title(title, fontsize=style.TITLE, loc="left", pad=18.0)
     _legend_below(ax, len(result.cases))
-    figure.supxlabel(
-        _caption(result, _draws(result), "Grey: levels of J1 (s)."), fontsize=style.SMALL
-    )
+    text = _caption(result, _draws(result), "Grey: levels of J1 (s).")
+    figure.supxlabel(text, fontsize=style.SMALL)
     return figure
 
 
@@ -98,10 +96,8 @@ def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
     ax.axvline(0.0, color=style.BLACK, linewidth=0.8)
     ax.set_yticks(range(len(drawn)), [MEASURES[name].label for name in drawn])
     ax.set_ylim(max(len(drawn), 1) - 0.5, -0.5)
-    title = style.heading(
-        result, f"Mean difference from {result.baseline.name!r} at the same draws"
-    )
-    style.dress(ax, "difference (% of its mean)", "", title)
+    what = f"Mean difference from {result.baseline.name!r} at the same draws"
+    style.dress(ax, "difference (% of its mean)", "", style.heading(result, what))
     _legend_below(ax, len(others))
     lost = f"Zero or undefined in a case: {', '.join(left_out)}." if left_out else ""
     text = "Mean of the differences draw by draw; bars: 95 % bootstrap intervals of that mean."
@@ -191,12 +187,8 @@ def compared_regions(
     )  # fmt: skip
     ax.set_xlim(x[0], x[-1])
     ax.set_ylim(y[0], y[-1])
-    style.dress(
-        ax,
-        x_label,
-        y_label,
-        style.heading(result, f"Region of J1 at or under {level:g} s, by case"),
-    )
+    title = style.heading(result, f"Region of J1 at or under {level:g} s, by case")
+    style.dress(ax, x_label, y_label, title)
     _legend_below(ax, 2)
     figure.supxlabel(_caption(result, NO_DRAWS), fontsize=style.SMALL)
     return figure

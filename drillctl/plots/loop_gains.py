@@ -47,6 +47,7 @@ def drive_impedance(
     back: 0 takes all, 1 takes nothing.
     """
     drives = listed(results)
+    names = {drive.label for drive in drives}
     figure, (above, below) = style.grid_or_new(ax, 2, 1, 7.5, 6.0, share_x=True)
     for number, drive in enumerate(drives):
         look = style.look(number)
@@ -64,15 +65,11 @@ def drive_impedance(
     _mark(above, below, marks)
     hertz(below)
     above.legend(
-        handles=[line for line in above.get_lines() if line.get_label() in _names(drives)],
+        handles=[line for line in above.get_lines() if line.get_label() in names],
         fontsize=style.SMALL, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
         handlelength=3.5,
     )  # fmt: skip
     return figure
-
-
-def _names(drives: Sequence[DriveImpedance]) -> set[str]:
-    return {drive.label for drive in drives}
 
 
 def _mark(above: Axes, below: Axes, marks: Mapping[str, float] | Sequence[float]) -> None:
@@ -89,8 +86,8 @@ def _mark(above: Axes, below: Axes, marks: Mapping[str, float] | Sequence[float]
         )  # fmt: skip
 
 
-GAINS = ("controller.kp", "controller.ki")
 GAIN_UNITS = {"controller.kp": "N*m*s/rad", "controller.ki": "N*m/rad"}
+GAINS = tuple(GAIN_UNITS)
 STABLE = "#D5E8DF"
 """Stable gains."""
 DIAMOND: dict[str, Any] = {
@@ -200,10 +197,8 @@ def _dashed(ax: Axes, boundary: GainBoundary, number: int, system: units.System)
 
 def shown_gains(kp: Any, ki: Any, system: units.System) -> tuple[Any, Any]:
     """Gains in the units of the axes."""
-    return (
-        units.displayed(kp, GAIN_UNITS["controller.kp"], system)[0],
-        units.displayed(ki, GAIN_UNITS["controller.ki"], system)[0],
-    )
+    kp_unit, ki_unit = GAIN_UNITS.values()
+    return units.displayed(kp, kp_unit, system)[0], units.displayed(ki, ki_unit, system)[0]
 
 
 LINE_APART = 0.035  # least distance between two lines of text, over the height of the window
@@ -236,9 +231,7 @@ def root_locus(result: RootLocus, ax: Axes | None = None, system: units.System =
     title = style.heading(result, "Root locus")
     style.dress(ax, "real part (1/s), unstable to the right", "frequency (Hz)", title)
     _crossings(ax, tracks, values, top)
-    ax.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3, fontsize=style.SMALL, frameon=False
-    )
+    style.legend_under(ax, 3, drop=0.1)
     figure.supxlabel(_left_out(tracks, left, right, top), fontsize=style.SMALL)
     return figure
 

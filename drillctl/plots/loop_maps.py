@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -35,9 +35,7 @@ NAMES = {
     "peak_sensitivity": "largest |S|",
 }
 """What the colour bar says; the unit comes from `displayed`."""
-REASONS = {
-    "peak_sensitivity": "grey: loop not stable, or no steady drilling",
-}
+REASONS = {"peak_sensitivity": "grey: loop not stable, or no steady drilling"}
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class _Look:
     """Colours of a quantity, their limits, and levels drawn as lines."""
 
     norm: Normalize
-    colours: Colormap
+    colours: Colormap | str
     levels: tuple[float, ...]
 
 
@@ -87,12 +85,6 @@ def loop_map(
     return figure
 
 
-def _diverging() -> Colormap:
-    from matplotlib import colormaps
-
-    return colormaps["RdBu_r"]
-
-
 def _look(quantity: str, values: Array) -> _Look:
     """Limits that show what matters of each quantity, whatever a few cells do."""
     finite = values[np.isfinite(values)]
@@ -103,23 +95,20 @@ def _look(quantity: str, values: Array) -> _Look:
     if quantity == "spectral_abscissa":
         # Undamped high modes sit at almost zero: what decays is all but white.
         reach = float(np.quantile(np.abs(finite), 0.95)) if finite.size else 1.0
-        return _Look(Normalize(-reach or -1.0, reach or 1.0), _diverging(), ())
+        return _Look(Normalize(-reach or -1.0, reach or 1.0), "RdBu_r", ())
     if quantity == "low_damping":
         reach = min(1.0, max(1.25 * high, 0.05))
         levels = tuple(v for v in (0.02, 0.05, 0.1, 0.2, 0.5) if v < high)
-        return _Look(Normalize(-reach, reach), _diverging().reversed(), levels)
+        return _Look(Normalize(-reach, reach), "RdBu", levels)
     if quantity == "peak_sensitivity":
         top = max(10.0, 3.0 * low)
         levels = tuple(v for v in (1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 20.0) if low < v < top)
         return _Look(LogNorm(1.0, top), colours(0.3, 1.0).reversed(), levels)
     if not _varies(finite):
         return _Look(Normalize(0.9 * low - 0.1, 1.1 * high + 0.1), plain, ())
-    return _Look(Normalize(low, high), plain, _round_levels(low, high))
-
-
-def _round_levels(low: float, high: float) -> tuple[float, ...]:
-    ticks = MaxNLocator(7).tick_values(low, high)
-    return tuple(float(v) for v in ticks if low < v < high)
+    rounded = MaxNLocator(7).tick_values(low, high)
+    levels = tuple(float(v) for v in rounded if low < v < high)
+    return _Look(Normalize(low, high), plain, levels)
 
 
 def _colour(
@@ -164,25 +153,24 @@ def _outline(
 def _marks(ax: Axes, result: LoopMap, quantity: str, system: units.System) -> None:
     if quantity == "slope_margin" and result.best is not None and _varies(result.values[quantity]):
         margin, at = result.best
-        x, y = (_shown(at[axis.path], axis.unit, system) for axis in result.axes)
-        label = f"largest D*: {_text(margin, system)}"
-        ax.plot(x, y, "*", **style.STAR, zorder=6, label=label)
-    own = [_own(result, axis.path) for axis in result.axes]
-    inside = all(
-        axis.values.min() <= value <= axis.values.max()
+        value, unit = units.displayed(margin, "N*m*s/rad", system)
+        place = _placed(result, [at[axis.path] for axis in result.axes], system)
+        ax.plot(*place, "*", **style.STAR, zorder=6, label=f"largest D*: {value:.4g} {unit}")
+    # A parameter that the design leaves open is nowhere in the map.
+    own = [parameter(result.design, axis.path).value for axis in result.axes]
+    if all(
+        value is not None and axis.values.min() <= value <= axis.values.max()
         for axis, value in zip(result.axes, own, strict=True)
-    )
-    if inside:
-        x, y = (
-            _shown(value, axis.unit, system) for axis, value in zip(result.axes, own, strict=True)
-        )
-        ax.plot(x, y, "D", **DIAMOND, label="the design")
+    ):
+        ax.plot(*_placed(result, own, system), "D", **DIAMOND, label="the design")
 
 
-def _own(result: LoopMap, path: str) -> float:
-    """Value of a parameter of the design (SI); NaN for one that it leaves open."""
-    value = parameter(result.design, path).value
-    return np.nan if value is None else float(value)
+def _placed(result: LoopMap, values: list[Any], system: units.System) -> list[float]:
+    """Values of the two parameters (SI) in the units of the axes."""
+    return [
+        float(units.displayed(value, axis.unit, system)[0])
+        for axis, value in zip(result.axes, values, strict=True)
+    ]
 
 
 def _varies(values: Array) -> bool:
@@ -190,20 +178,12 @@ def _varies(values: Array) -> bool:
     return finite.size > 0 and float(np.ptp(finite)) > 1e-9 * float(np.abs(finite).max())
 
 
-def _text(margin: float, system: units.System) -> str:
-    value, unit = units.displayed(margin, "N*m*s/rad", system)
-    return f"{value:.4g} {unit}"
-
-
-def _shown(value: float, unit: str, system: units.System) -> float:
-    return float(units.displayed(value, unit, system)[0])
-
-
 def _caption(result: LoopMap, quantity: str) -> str:
     values = result.values[quantity]
     notes = [f"{int(result.stable.sum())} of {result.stable.size} cells stable"]
     if np.isnan(values).any():
-        notes.append(REASONS.get(quantity, "grey: no steady drilling"))
+        unstable = "loop not stable, or " if quantity == "peak_sensitivity" else ""
+        notes.append(f"grey: {unstable}no steady drilling")
     if quantity == "spectral_abscissa" and np.isfinite(values).any():
         least, most = float(np.nanmin(values)), float(np.nanmax(np.abs(values)))
         if -1e-3 * most < least < 0.0:

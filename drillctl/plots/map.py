@@ -186,9 +186,8 @@ def regularisation(result: Regularisation, ax: Sequence[Axes] | None = None) -> 
     for panel in (left, right):
         panel.legend(fontsize=style.SMALL, frameon=False)
     about = f"{result.j1.size} cells, {result.design.tables.simulation.duration:g} s"
-    figure.supxlabel(
-        style.caption(result, f"{style.title_of(result)}; {about}"), fontsize=style.SMALL
-    )
+    text = style.caption(result, f"{style.title_of(result)}; {about}")
+    figure.supxlabel(text, fontsize=style.SMALL)
     return figure
 
 

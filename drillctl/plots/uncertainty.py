@@ -23,7 +23,7 @@ from drillctl.errors import InputError
 from drillctl.plots import style
 
 if TYPE_CHECKING:
-    from drillctl.studies import Uncertainty
+    from drillctl.studies import Axis, Uncertainty
 
 
 BEST = ("mean", "q95")  # objectives whose best cells are shown unless others are chosen
@@ -50,10 +50,8 @@ def area_convergence(result: Uncertainty, ax: Axes | None = None) -> Figure:
     title = style.heading(result, "Area of the inner regions against the number of draws")
     style.dress(ax, "draws", "area of the 95 % region (% of the map)", title)
     ax.legend(fontsize=style.SMALL, frameon=False)
-    figure.supxlabel(
-        "bars: 95 % interval of the sampling error, at each number of draws by itself",
-        fontsize=style.SMALL,
-    )
+    text = "bars: 95 % interval of the sampling error, at each number of draws by itself"
+    figure.supxlabel(text, fontsize=style.SMALL)
     return figure
 
 
@@ -74,10 +72,7 @@ def cell_distributions(
     for k, (cell, name) in enumerate(named.items()):
         column = np.sort(np.nan_to_num(j1[:, cell], nan=np.inf))
         share = np.arange(1, len(column) + 1) / len(column)
-        place = ", ".join(
-            f"{style.NAMES.get(a.path, a.path)} {_shown(result, cell, a.path, system)}"
-            for a in result.axes
-        )
+        place = ", ".join(_shown(result, cell, axis, system) for axis in result.axes)
         ax.step(
             [0.0, *column, top], [0.0, *share, share[-1]], where="post",
             label=f"{place}{f' ({name})' if name else ''}", **style.look(k),
@@ -107,10 +102,9 @@ def _named(result: Uncertainty) -> dict[int, str]:
     return {cell: f"best by {', '.join(names)}" for cell, names in results.items()}
 
 
-def _shown(result: Uncertainty, cell: int, path: str, system: units.System) -> str:
-    unit = next(a.unit for a in result.axes if a.path == path)
-    value, label = units.displayed(result.at(cell)[path], unit, system)
-    return f"{value:g} {label}".rstrip()
+def _shown(result: Uncertainty, cell: int, axis: Axis, system: units.System) -> str:
+    value, unit = units.displayed(result.at(cell)[axis.path], axis.unit, system)
+    return f"{style.NAMES.get(axis.path, axis.path)} {f'{value:g} {unit}'.rstrip()}"
 
 
 @style.picture(result="With indices.", raises="The result has no indices.")
@@ -140,9 +134,9 @@ def sensitivity_bars(result: Uncertainty, ax: Sequence[Axes] | None = None) -> F
         panel.invert_yaxis()
         panel.set_xlim(-0.25, 1.1)  # what reaches further is error
         style.dress(panel, "Sobol index", "", _short(one.of))
-    handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(
-        handles, labels, loc="outside lower center", ncols=2, fontsize=style.SMALL, frameon=False,
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2,
+        fontsize=style.SMALL, frameon=False,
         title=f"{sobol.samples} points of Saltelli's design; bars: 95 % interval of the error",
         title_fontsize=style.SMALL,
     )  # fmt: skip
@@ -175,12 +169,14 @@ def uncertain_regions(
     few = result.realizations <= FEW and not result.censored.any()
     for panel, level in zip(panels, result.levels, strict=True):
         probability = result.maps[level].probability
-        _bands(panel, x, y, probability, result.realizations)
-        if few:
-            for number in np.flatnonzero(result.possible):
-                _outline(
-                    panel, x, y, _shown_regions(result.j1[number], level), level, "#555555", 0.6
-                )
+        for bound, colour in SHADES.items():
+            at = border(bound, result.realizations)
+            if probability.max() > at:
+                panel.contourf(x, y, probability.T, levels=[at, 2.0], colors=[colour])
+        for number in np.flatnonzero(result.possible) if few else ():
+            # A cell that failed is far above any level.
+            j1 = np.nan_to_num(result.j1[number], nan=10.0 * level)
+            _outline(panel, x, y, j1, level, "#555555", 0.6)
         _outline(panel, x, y, result.nominal, level, style.BLACK, style.LINE)
     handles: list[Patch | Line2D] = [
         Line2D([], [], color=style.BLACK, linewidth=style.LINE, label="design itself"),
@@ -283,35 +279,11 @@ def border(probability: float, total: int) -> float:
     return (needed(probability, total) - 0.5) / total
 
 
-def _bands(
-    panel: Axes,
-    x: Array,
-    y: Array,
-    probability: Array,
-    total: int,
-) -> None:
-    for bound, colour in SHADES.items():
-        at = border(bound, total)
-        if probability.max() > at:
-            panel.contourf(x, y, probability.T, levels=[at, 2.0], colors=[colour])
-
-
 def _outline(
-    panel: Axes,
-    x: Array,
-    y: Array,
-    j1: Array,
-    level: float,
-    colour: str,
-    width: float,
+    panel: Axes, x: Array, y: Array, j1: Array, level: float, colour: str, width: float
 ) -> None:
     if np.nanmin(j1) < level < np.nanmax(j1):
         panel.contour(x, y, j1.T, levels=[level], colors=[colour], linewidths=width)
-
-
-def _shown_regions(j1: Array, level: float) -> Array:
-    """J1 of a draw for its outline; a cell that failed is far above any level."""
-    return np.nan_to_num(j1, nan=10.0 * level)
 
 
 def _finish(

@@ -189,10 +189,7 @@ def stuck_between(motion: Motion, begin: float, end: float) -> float:
 
 
 def solve(
-    design: Design,
-    tolerance: float = 1e-8,
-    progress: Progress = SILENT,
-    stiff: bool | None = None,
+    design: Design, tolerance: float = 1e-8, progress: Progress = SILENT, stiff: bool | None = None
 ) -> Motion:
     """Simulate a design with located events; `stiff` overrules what its string would take."""
     with reporting_compilation(progress):

@@ -18,14 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drillctl.arrays import Array, Index
-from drillctl.simulation.reference_rates import (
-    BEGIN,
-    FIRST,
-    LENGTH,
-    compiled,
-    on_tape,
-    rates_of,
-)
+from drillctl.simulation.reference_rates import BEGIN, FIRST, LENGTH, compiled, on_tape, rates_of
 
 STAGES, DENSE_STAGES = 12, 16
 TOGETHER = 4  # stages that a sum takes in at once

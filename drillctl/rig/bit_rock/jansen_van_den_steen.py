@@ -91,8 +91,6 @@ LAWS = (
         ),
     ),
     FrictionLaw(
-        CoulombTable,
-        lambda table, weight, moves: JansenVanDenSteen(table.a, table.a),
-        draws=("a",),
+        CoulombTable, lambda table, weight, moves: JansenVanDenSteen(table.a, table.a), draws=("a",)
     ),
 )

@@ -327,8 +327,7 @@ class FrictionCoefficients(Table):
         )
         if law.a2 < law.a1:
             raise InputError(
-                f"the factors give a2 = {law.a2:g}, less than a1 = {law.a1:g}",
-                "bit_rock.a2_factor",
+                f"the factors give a2 = {law.a2:g}, less than a1 = {law.a1:g}", "bit_rock.a2_factor"
             )
         return law
 
