@@ -31,6 +31,7 @@ from drillctl.linear.ends import Ends, Route, bit_side, ends_of, telling_grid
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.operating_point import at_speed, operating_point
 from drillctl.linear.slope_margin import slope_margins
+from drillctl.store.codec import documented, label
 
 if TYPE_CHECKING:
     import shapely
@@ -58,31 +59,18 @@ class Branch:
 
 
 @dataclass(frozen=True, eq=False)
+@documented
 class GainBoundary:
-    """The curve in the plane of the gains and the region that it bounds.
+    """The curve in the plane of the gains and the region that it bounds."""
 
-    Attributes
-    ----------
-    design : Design
-        The rig.
-    model : str
-        Whether of its elements or of the continuum.
-    slope : float
-        Falling slope of the rock (N m s/rad).
-    window : tuple
-        Lowest and highest Kp (N m s/rad), lowest and highest Ki (N m/rad).
-    branches : tuple of Branch
-        By rising frequency.
-    region : shapely.MultiPolygon
-        Locally stable gains within the window.
-    """
-
-    design: Design
-    model: Route
-    slope: float
-    window: Window
-    branches: tuple[Branch, ...]
-    region: shapely.MultiPolygon
+    design: Design = label(means="the rig")
+    model: Route = label(means="whether of its elements or of the continuum")
+    slope: float = label(unit="N*m*s/rad", means="falling slope of the rock")
+    window: Window = label(
+        unit="N*m*s/rad, N*m/rad", means="lowest and highest Kp, lowest and highest Ki"
+    )
+    branches: tuple[Branch, ...] = label(means="by rising frequency")
+    region: shapely.MultiPolygon = label(means="locally stable gains within the window")
 
     def contains(self, kp: float, ki: float) -> bool:
         """Whether gains (N m s/rad, N m/rad) are inside the region."""
@@ -228,27 +216,21 @@ def _region(
 
 
 @dataclass(frozen=True, eq=False)
+@documented
 class RootLocus:
-    """Poles of a loop as one parameter changes.
+    """Poles of a loop as one parameter changes."""
 
-    Attributes
-    ----------
-    design : Design
-        The rig.
-    path, unit : str
-        The parameter and its SI unit.
-    values : ndarray, shape (values,)
-        Its values (SI).
-    poles : ndarray of complex, shape (values, tracks)
-        Poles (1/s), each column one pole followed from value to value; NaN where there are
-        fewer of them. The lowest by magnitude first, as they stand at the first value.
-    """
-
-    design: Design
-    path: str
-    unit: str
-    values: Array
-    poles: ComplexArray
+    design: Design = label(means="the rig")
+    path: str = label(means="the parameter")
+    unit: str = label(means="its SI unit")
+    values: Array = label("values", means="its values (SI)")
+    # the lowest by magnitude first, as they stand at the first value
+    poles: ComplexArray = label(
+        "values",
+        "tracks",
+        unit="1/s",
+        means="each column one pole followed from value to value, NaN where there are fewer",
+    )
 
     @property
     def data(self) -> xarray.Dataset:

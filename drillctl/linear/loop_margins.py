@@ -44,8 +44,8 @@ SLOWEST = 1e-3  # lowest frequency computed, over the magnitude of the smallest 
 NEAREST = 1e-13  # least distance from the axis that a pole is taken to have, over its frequency
 
 
-@documented
 @dataclass(frozen=True)
+@documented
 class Margins:
     """How far a stable loop is from instability, broken at the top torque."""
 

@@ -20,8 +20,8 @@ FASTEST = 1e4  # highest speed of the scan (rad/s)
 SCAN = 4000  # speeds at which the balance is evaluated before its zeros are located
 
 
-@documented
 @dataclass(frozen=True)
+@documented
 class OperatingPoint:
     """One steady state of a rig."""
 

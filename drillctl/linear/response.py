@@ -16,6 +16,7 @@ from drillctl.linear.state_space import INPUTS, LOOP_OUTPUTS, OUTPUTS
 from drillctl.linear.transmission import EndMobility
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.drillstring.frequencies import natural_frequencies
+from drillctl.store.codec import documented, label
 
 if TYPE_CHECKING:
     import control
@@ -52,26 +53,22 @@ _PER_SPEED = {
 
 
 @dataclass(frozen=True, eq=False)
+@documented
 class FrequencyResponse:
-    """Response of a string or a loop to each of its inputs.
+    """Response of a string or a loop to each of its inputs."""
 
-    Attributes
-    ----------
-    frequency_hz : ndarray, shape (frequencies,)
-        Frequencies (Hz).
-    response : ndarray of complex, shape (frequencies, outputs, inputs)
-        Unit of the output per unit of the input; positive bit torque brakes.
-    inputs, outputs : tuple of str
-        Names of the signals: torques in N m, speeds in rad/s, twist in rad.
-    title : str
-        What it is a response of, for figures.
-    """
-
-    frequency_hz: Array
-    response: ComplexArray
-    inputs: tuple[str, ...] = INPUTS
-    outputs: tuple[str, ...] = OUTPUTS
-    title: str = "String without control"
+    frequency_hz: Array = label("frequencies", unit="Hz", means="frequencies")
+    response: ComplexArray = label(
+        "frequencies",
+        "outputs",
+        "inputs",
+        unit="of the output per unit of the input",
+        means="positive bit torque brakes",
+    )
+    # names of the signals: torques in N m, speeds in rad/s, twist in rad
+    inputs: tuple[str, ...] = label(default=INPUTS, means="names of the signals")
+    outputs: tuple[str, ...] = label(default=OUTPUTS, means="names of the signals")
+    title: str = label(default="String without control", means="what it is a response of")
 
     def between(self, source: str, target: str) -> ComplexArray:
         """Response of one output to one input.

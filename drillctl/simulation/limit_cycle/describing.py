@@ -49,8 +49,8 @@ AMPLITUDES = np.concatenate([np.linspace(0.01, 1.0, 100), np.geomspace(1.0, 40.0
 MEANS = 80  # mean speeds that are looked at where the drive does not fix the mean
 
 
-@documented
 @dataclass(frozen=True)
+@documented
 class HarmonicCycle:
     """A periodic motion as its first harmonic tells it."""
 

@@ -43,8 +43,8 @@ STATUSES = ("equilibrium", "settling", "stalled", "periodic", "not periodic")
 """
 
 
-@documented
 @dataclass(frozen=True, eq=False)
+@documented
 class Returns:
     """Returns of one long simulation."""
 

@@ -35,8 +35,8 @@ LEAST_SWING = 1e-5
 SAMPLES = 1201  # samples of an orbit, both ends included
 
 
-@documented
 @dataclass(frozen=True, eq=False)
+@documented
 class Orbit:
     """A periodic motion."""
 
