@@ -118,10 +118,6 @@ class Requested:
         return result
 
 
-def _nothing_computed(design: Design) -> str:
-    return "nothing of it was computed"
-
-
 def _summary(result: Any) -> dict[str, Any]:
     return dict(result.summary())
 
@@ -155,7 +151,8 @@ class Section:
     # tables and pictures in their order; by default remarks, checks, pictures and tables of all
     # recipes, except for what another section of the study shows
     shows: tuple[str, ...] = ()
-    absent: Callable[[Design], str] = _nothing_computed  # why none of `shows` is there
+    # why none of `shows` is there
+    absent: Callable[[Design], str] = lambda design: "nothing of it was computed"
     text: str = ""  # last paragraph
     # blocks from what was gathered, for what cannot be said so
     build: Callable[[Any], tuple[Any, ...]] | None = None
@@ -172,8 +169,7 @@ def _none(*values: Any) -> tuple[()]:
     return ()
 
 
-def _nothing(*values: Any) -> None:
-    return None
+def _nothing(*values: Any) -> None: ...
 
 
 @dataclass(frozen=True)

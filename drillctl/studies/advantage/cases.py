@@ -394,10 +394,7 @@ def _case(
 ) -> Case:  # fmt: skip
     gains = {t.path: float(v) for t, v in zip(policy.tuned, best.values, strict=True)}
     return Case(
-        measures={name: own.runs.measures[name] for name in KEPT},
-        status=own.runs.status,
-        step=own.runs.step,
-        modes=own.runs.modes,
+        **vars(own.runs) | {"measures": {name: own.runs.measures[name] for name in KEPT}},
         policy=policy.name,
         terms=terms.name,
         gains={path: gains.get(path, 0.0) for path in PATHS},

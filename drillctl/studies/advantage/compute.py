@@ -140,6 +140,7 @@ def _regions(policy: Policy, best: Optimum) -> Regions:
     runs = GainRuns(design, drive, table.region_realizations, table.seed)
     points = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
     j1 = runs.measures(points, ("j1",))["j1"]
+    grid = tuple(Axis(t.path, t.unit, a) for t, a in zip(drive, axes, strict=True))
     shape = (len(axes[0]), len(axes[1]))
     return Regions(
         policy=policy.name,
@@ -147,15 +148,10 @@ def _regions(policy: Policy, best: Optimum) -> Regions:
         kp=axes[0],
         ki=axes[1],
         j1=j1.reshape(*shape, -1),
-        nominal=_nominal(design, policy, axes),
+        nominal=sweep(design, grid, audit_cells=0, measures=("j1",)).j1,
         levels=policy.design.tables.map.levels,
         seed=table.seed,
     )
-
-
-def _nominal(design: Design, policy: Policy, axes: list[Array]) -> Array:
-    grid = tuple(Axis(t.path, t.unit, a) for t, a in zip(policy.tuned, axes, strict=False))
-    return sweep(design, grid, audit_cells=0, measures=("j1",)).measures["j1"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -148,19 +148,15 @@ def nominal_runs(
     """Map and response of a case; without tables of axes no map."""
     result, reason = None, None
     try:
-        result = _map(design, tables, progress)
+        if tables is None:
+            raise InputError(NO_MAPS)
+        if len(tables) != 2:
+            raise InputError(f"a map runs over 2 parameters, [map] has {len(tables)}")
+        result = sweep(design, axes_of(design, tables), audit_cells=0, progress=Within(progress))
     except InputError as error:  # the axes do not fit this case, or a value on them is impossible
         reason = str(error)
         progress.advance(cells_of(tables))
     return Nominal(result, reason, simulate(design, engine="batch", interval=INTERVAL))
-
-
-def _map(design: Design, tables: tuple[AxisTable, ...] | None, progress: Progress) -> Sweep:
-    if tables is None:
-        raise InputError(NO_MAPS)
-    if len(tables) != 2:
-        raise InputError(f"a map runs over 2 parameters, [map] has {len(tables)}")
-    return sweep(design, axes_of(design, tables), audit_cells=0, progress=Within(progress))
 
 
 COMPARED = (
@@ -374,10 +370,7 @@ def _compared(
         failures = (*failures, Failures(NO_ANSWER, broken, "a number of the run is not finite"))
     progress.advance(draws.count)
     return ComparedCase(
-        measures={measure: runs.measures[measure] for measure in COMPARED},
-        status=runs.status,
-        step=runs.step,
-        modes=runs.modes,
+        **vars(runs) | {"measures": {measure: runs.measures[measure] for measure in COMPARED}},
         name=name,
         design=design,
         drawn=draws.values(design),

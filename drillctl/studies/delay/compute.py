@@ -76,10 +76,6 @@ class DelayedBenefit:
             **picked(self, "peak_bit_speed", "peak_pipe_torque", "mean_weight"),
         }
 
-    def share_summary(self) -> dict[str, Any]:
-        """The share of draws in which stick-slip has ended, as strict JSON values."""
-        return {"delay": self.delay, **self.ended.summary("share")}
-
 
 @dataclass(frozen=True)
 class GainLimits:
@@ -99,14 +95,13 @@ class GainLimits:
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values; the delay is null if stick-slip ends at none."""
-        at, after = self.ends_at, self.ends_before
+        at, after = (
+            one and {"delay": one.delay, **one.ended.summary("share")}
+            for one in (self.ends_at, self.ends_before)
+        )
         return {
             "gain": self.gain,
-            "ends_up_to": {
-                "delay": None if at is None else at.delay,
-                "at": None if at is None else at.share_summary(),
-                "next": None if after is None else after.share_summary(),
-            },
+            "ends_up_to": {"delay": at and at["delay"], "at": at, "next": after},
             "harmful_from": self.harmful_from.summary("delay"),
         }
 
@@ -298,10 +293,7 @@ def weight_delay(
         progress.advance(count * len(table.delays))
     runs = joined(results, np.stack)
     return WeightDelay(
-        measures=runs.measures,
-        status=runs.status,
-        step=runs.step,
-        modes=runs.modes,
+        **vars(runs),
         design=design,
         drawn=draws.values,
         constant=constant,

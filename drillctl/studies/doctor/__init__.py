@@ -44,13 +44,24 @@ def tables(result: Doctor) -> Iterator[Table]:
     yield _errors(result, summary["estimate"])
     if summary["audit"]["lanes"]:
         yield _audited(summary["audit"])
-    yield _speed(summary["speed"])
+    speed = summary["speed"]
+    rows = [
+        ["lanes per second", f"{speed['lanes_per_second']:,.0f} on {speed['threads']} threads"],
+        ["a step of a lane", f"{speed['lane_step_ns']:.2f} ns of a core"],
+    ]
+    columns = (Column("quantity"), Column("value"))
+    yield Table("speed", "speed on this machine, kernel warm", columns, rows)
 
 
 def _scheme(scheme: dict[str, Any]) -> Table:
     from drillctl.studies.doctor.compute import FORMS
 
-    rows = [["step", f"{1e3 * scheme['step']:.4g} ms", _why(scheme)]]
+    why = f"{scheme['decided_by']}, and whole steps to the run"
+    if scheme["decided_by"] == "sampling":
+        why = f"{scheme['sampling']} to a period of the sampled controller"
+    if scheme["decided_by"] == "program":
+        why = "whole steps to the changes of the program"
+    rows = [["step", f"{1e3 * scheme['step']:.4g} ms", why]]
     for name, step in sorted(scheme["bounds"].items(), key=lambda bound: bound[1]):
         rows.append([f"bound: {name}", f"{1e3 * step:.4g} ms", scheme["reasons"][name]])
     left = f", {scheme['modes_left_out']} left out" if scheme["modes_left_out"] else ""
@@ -62,14 +73,6 @@ def _scheme(scheme: dict[str, Any]) -> Table:
     rows.append(["string", FORMS[scheme["string"]], several])
     columns = (Column("setting"), Column("chosen"), Column("reason"))
     return Table("scheme", f"batch engine at accuracy {scheme['accuracy']}", columns, rows)
-
-
-def _why(scheme: dict[str, Any]) -> str:
-    if scheme["decided_by"] == "sampling":
-        return f"{scheme['sampling']} to a period of the sampled controller"
-    if scheme["decided_by"] == "program":
-        return "whole steps to the changes of the program"
-    return f"{scheme['decided_by']}, and whole steps to the run"
 
 
 def _errors(result: Doctor, estimate: dict[str, Any]) -> Table:
@@ -106,15 +109,6 @@ def _audited(audit: dict[str, Any]) -> Table:
     late = "" if audit["cells"] == audit["asked"] else " (the others would have taken too long)"
     title = f"audit of {audit['cells']} of {audit['asked']} lanes{late}"
     return Table("audited", title, columns, rows)
-
-
-def _speed(speed: dict[str, Any]) -> Table:
-    rows = [
-        ["lanes per second", f"{speed['lanes_per_second']:,.0f} on {speed['threads']} threads"],
-        ["a step of a lane", f"{speed['lane_step_ns']:.2f} ns of a core"],
-    ]
-    columns = (Column("quantity"), Column("value"))
-    return Table("speed", "speed on this machine, kernel warm", columns, rows)
 
 
 def pictures(result: Doctor) -> Iterator[Picture]:

@@ -482,12 +482,7 @@ def _sample(axes: tuple[Axis, ...], result: list[Group]) -> _Sample:
 
 
 def _audited(
-    design: Design,
-    axes: tuple[Axis, ...],
-    cells: Index,
-    j1: Array,
-    count: int,
-    progress: Progress,
+    design: Design, axes: tuple[Axis, ...], cells: Index, j1: Array, count: int, progress: Progress
 ) -> auditing.Audit:
     """Some lanes of the sample, spread over the levels; the lowest if all are beyond."""
     lanes = auditing.choose_cells(j1, design.tables.map.levels, count)

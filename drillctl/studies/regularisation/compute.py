@@ -62,16 +62,14 @@ class Regularisation(Result, kind="regularisation"):
         for i, width in enumerate(self.widths):
             size = np.abs(self.shifts[i])
             finite = size[np.isfinite(size)]
-            rows.append(
-                {
-                    "width": float(width),
-                    "median_shift": float(np.median(finite)) if finite.size else None,
-                    "worst_shift": float(finite.max()) if finite.size else None,
-                    "failed": int(np.isnan(self.smoothed[i]).sum()),
-                    "cells": {f"{level:g}": counts[level][1][i] for level in self.levels},
-                    "changed_side": {f"{level:g}": self.changed(level)[i] for level in self.levels},
-                }
-            )
+            rows.append({
+                "width": float(width),
+                "median_shift": float(np.median(finite)) if finite.size else None,
+                "worst_shift": float(finite.max()) if finite.size else None,
+                "failed": int(np.isnan(self.smoothed[i]).sum()),
+                "cells": {f"{level:g}": counts[level][1][i] for level in self.levels},
+                "changed_side": {f"{level:g}": self.changed(level)[i] for level in self.levels},
+            })  # fmt: skip
         return {
             "axes": span(self.axes),
             "set_valued_cells": {f"{level:g}": counts[level][0] for level in self.levels},
@@ -119,24 +117,18 @@ def regularisation(
         )
     if not widths or min(widths) <= 0.0:
         raise InputError("widths must be more than 0 rad/s", "widths")
-    exact = _set_valued(design)
-    axes = axes_of(exact, exact.tables.map.axes) if axes is None else axes
-    reference = sweep(exact, axes, audit_cells=0, progress=progress)
+    if weight_moves(design.tables):
+        raise InputError("friction under a weight that moves is not regularised", "weight_on_bit")
+    if design.tables.bit_rock.regularised_over is not None:
+        raise InputError("is compared with the set-valued law: leave it out", WIDTH_PATH)
+    axes = axes_of(design, design.tables.map.axes) if axes is None else axes
+    reference = sweep(design, axes, audit_cells=0, progress=progress)
     ordered = np.array(sorted(widths, reverse=True))
     smoothed = [
-        sweep(exact.replace({WIDTH_PATH: units.SI(float(w))}), axes, 0, progress).j1
+        sweep(design.replace({WIDTH_PATH: units.SI(float(w))}), axes, 0, progress).j1
         for w in ordered
     ]
     seconds = time.perf_counter() - begin
     return Regularisation(
-        exact, axes, exact.tables.map.levels, ordered, reference.j1, np.array(smoothed), seconds
+        design, axes, design.tables.map.levels, ordered, reference.j1, np.array(smoothed), seconds
     )
-
-
-def _set_valued(design: Design) -> Design:
-    """The design with its friction set-valued; refused (`InputError`) where it is smoothed."""
-    if weight_moves(design.tables):
-        raise InputError("friction under a weight that moves is not regularised", "weight_on_bit")
-    if getattr(design.tables.bit_rock, "regularised_over", None) is None:
-        return design
-    raise InputError("is compared with the set-valued law: leave it out", WIDTH_PATH)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from drillctl import plots, units
@@ -84,49 +85,34 @@ def summary(result: Simulation) -> dict[str, Any]:
     return own
 
 
-def _cell(which: str) -> Callable[[Requested], Design]:
+def _cell(which: str, request: Requested) -> Design:
     """The design of the best or of a bad cell of the map."""
-
-    def variant(request: Requested) -> Design:
-        at = request.summary("cells")[which]
-        values = {path: units.SI(value) for path, value in at.items()}
-        return request.design.replace({**values, "simulation.engine": "batch"})
-
-    return variant
+    at = request.summary("cells")[which]
+    values = {path: units.SI(value) for path, value in at.items()}
+    return request.design.replace({**values, "simulation.engine": "batch"})
 
 
-def _no_such_cell(which: str) -> Callable[[Requested], str]:
-    def missing(request: Requested) -> str:
-        return "" if request.summary("cells")[which] else f"the map has no {which} cell"
-
-    return missing
+def _no_such_cell(which: str, request: Requested) -> str:
+    return "" if request.summary("cells")[which] else f"the map has no {which} cell"
 
 
-def _finer_mesh(parts: int) -> Callable[[Requested], Design]:
+def _finer_mesh(parts: int, request: Requested) -> Design:
     """The design by the batch engine with its elements divided."""
-
-    def variant(request: Requested) -> Design:
-        design = request.design.replace({"simulation.engine": "batch"})
-        if parts == 1:
-            return design
-        counts = {part.name: part.elements for part in design.string.parts.sections}
-        return design.replace({
-            f"drillstring.sections.{table.name}.elements": parts * counts[table.name]
-            for table in design.tables.drillstring.sections
-            if table.stiffness is None and table.name in counts  # not lumped into a neighbour
-        })  # fmt: skip
-
-    return variant
+    design = request.design.replace({"simulation.engine": "batch"})
+    if parts == 1:
+        return design
+    counts = {part.name: part.elements for part in design.string.parts.sections}
+    return design.replace({
+        f"drillstring.sections.{table.name}.elements": parts * counts[table.name]
+        for table in design.tables.drillstring.sections
+        if table.stiffness is None and table.name in counts  # not lumped into a neighbour
+    })  # fmt: skip
 
 
-def _finer_step(parts: int) -> Callable[[Requested], Design]:
+def _finer_step(parts: int, request: Requested) -> Design:
     """The design by the batch engine with its step divided."""
-
-    def variant(request: Requested) -> Design:
-        step = units.SI(request.summary("mesh-1")["step"] / parts)
-        return request.design.replace({"simulation.engine": "batch", "simulation.step": step})
-
-    return variant
+    step = units.SI(request.summary("mesh-1")["step"] / parts)
+    return request.design.replace({"simulation.engine": "batch", "simulation.step": step})
 
 
 def _without_mesh(request: Requested) -> str:
@@ -141,21 +127,22 @@ def _recipes() -> Iterator[Recipe]:
     yield Recipe("simulate", "the run at the current setting", options=drawn, order=20)
     for order, which, title in ((60, "best", "the best cell"), (70, "bad", "a bad cell")):
         yield Recipe(
-            which, f"the run at {title}", _no_such_cell(which), _cell(which), ("cells",), drawn,
-            order=order,
+            which, f"the run at {title}", partial(_no_such_cell, which), partial(_cell, which),
+            ("cells",), drawn, order=order,
         )  # fmt: skip
-    yield Recipe(
-        "mesh-1", "the run by the batch engine", in_batch, _finer_mesh(1), (), numbers, order=140
-    )
-    for order, parts, title in ((141, 2, "twice"), (142, 4, "four times")):
+    for order, parts, how, missing in (
+        (140, 1, "by the batch engine", in_batch),
+        (141, 2, "with twice the elements", _without_mesh),
+        (142, 4, "with four times the elements", _without_mesh),
+    ):
         yield Recipe(
-            f"mesh-{parts}", f"the run with {title} the elements", _without_mesh,
-            _finer_mesh(parts), (), numbers, order=order,
+            f"mesh-{parts}", f"the run {how}", missing, partial(_finer_mesh, parts),
+            options=numbers, order=order,
         )  # fmt: skip
     for order, parts, title in ((143, 2, "half the step"), (144, 4, "a quarter of the step")):
         yield Recipe(
-            f"step-{parts}", f"the run with {title}", in_batch, _finer_step(parts), ("mesh-1",),
-            numbers, order=order,
+            f"step-{parts}", f"the run with {title}", in_batch, partial(_finer_step, parts),
+            ("mesh-1",), numbers, order=order,
         )  # fmt: skip
 
 

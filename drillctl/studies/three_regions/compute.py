@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import time
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,14 +49,12 @@ STARTS: tuple[Kind, ...] = ("rest", "wound_up")
 TRACED_LANES = 128  # lanes traced together: some 70 MB at 20 ms
 
 
-@dataclass(frozen=True, eq=False)
-class Ended:
-    """How runs from one start ended."""
+class Ended(NamedTuple):
+    """How runs from one start ended, shapes (lanes,)."""
 
-    # shape (lanes,): Bit speed within the band of the operating speed throughout the last window
-    attracted: Mask
-    sticking: Mask  # shape (lanes,): The bit stood still at some time in that window
-    failed: Mask  # shape (lanes,): No finite answer; neither of the others holds then
+    attracted: Mask  # bit speed within the band of the operating speed throughout the last window
+    sticking: Mask  # the bit stood still at some time in that window
+    failed: Mask  # no finite answer; neither of the others holds then
 
 
 def long_runs(group: Group) -> Prepared:
@@ -93,14 +91,11 @@ def _stays(lanes: Lanes, speed: Array, prepared: Prepared) -> Mask:
     return np.asarray((np.abs(late - speed) <= NARROW_BAND * speed).all(axis=0))
 
 
-@dataclass(frozen=True, eq=False)
-class Steady:
-    """Steady drilling of a number of lanes."""
+class Steady(NamedTuple):
+    """Steady drilling of a number of lanes, shapes (lanes,)."""
 
-    # shape (lanes,): Of top and bit (rad/s); NaN where drive, drag and rock balance at no speed
-    speed: Array
-    # shape (lanes,): Falling slope of the rock there (N m s/rad); NaN at the same lanes
-    slope: Array
+    speed: Array  # of top and bit (rad/s); NaN where drive, drag and rock balance at no speed
+    slope: Array  # falling slope of the rock there (N m s/rad); NaN at the same lanes
 
 
 def steady_drilling(design: Design, axes: tuple[Axis, ...], group: Group) -> Steady:
@@ -317,8 +312,7 @@ def _fill(
     cells = group.cells
     steady = steady_drilling(design, axes, group)
     margin = slopes_tolerated(design, axes, group, steady.speed)
-    fields["reference_speed"][cells] = steady.speed
-    fields["slope"][cells] = steady.slope
+    fields["reference_speed"][cells], fields["slope"][cells] = steady
     fields["slope_margin"][cells] = margin.slope
     fields["deciding_frequency"][cells] = margin.omega / (2.0 * np.pi)
     # NaN, where nothing is steady, is under no margin.

@@ -35,7 +35,7 @@ from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
-from drillctl.studies.tune.problem import GainProblem, GainRuns, Point, rank_weights
+from drillctl.studies.tune.problem import GainProblem, GainRuns, Point, rank_weights, weighted
 from drillctl.studies.tune.tuned import Tuned
 
 MARGINS = (
@@ -84,13 +84,13 @@ class FreshRuns:
     @property
     def quantiles(self) -> dict[str, float]:
         """Quantiles of J1 (s) over the draws that a rig can have, by name; infinite ones too."""
-        possible = np.sort(self.j1[~np.isnan(self.j1)])
-        results = {}
-        for q in QUANTILES:
-            weights = rank_weights("quantile", q, len(possible))
-            used = weights > 0.0  # no weight on what is infinite
-            results[f"q{round(100 * q):02d}"] = float(possible[used] @ weights[used])
-        return results
+        possible = self.j1[~np.isnan(self.j1)]
+        return {
+            f"q{round(100 * q):02d}": float(
+                weighted(possible, rank_weights("quantile", q, len(possible)))
+            )
+            for q in QUANTILES
+        }
 
 
 def fresh_design(design: Design) -> Design:
@@ -115,22 +115,9 @@ class FreshDraws:
     def __init__(self, design: Design, tuned: tuple[Tuned, ...]) -> None:
         self.design = fresh_design(design)
         self.problem = GainProblem(self.design, tuned)
+        self.count = len(self.problem.runs.draws)  # those that no rig has included
+        self.drawn = self.problem.runs.draws.values  # by path (SI), shape (draws,)
         self._others = 0
-
-    @property
-    def count(self) -> int:
-        """Draws, those that no rig has included."""
-        return len(self.problem.runs.draws)
-
-    @property
-    def failures(self) -> tuple[Failures, ...]:
-        """Draws that no rig has."""
-        return self.problem.runs.failures
-
-    @property
-    def drawn(self) -> dict[str, Array]:
-        """Drawn values by path (SI), shape (draws,)."""
-        return self.problem.runs.draws.values
 
     @property
     def trajectories(self) -> int:
@@ -281,23 +268,18 @@ def neighbourhood(fresh: FreshDraws, values: Array, ends: tuple[Tolerance, ...])
     """Probability over the first two parameters, or the only one, about the optimum."""
     some = min(2, len(values))
     points = POINTS if some == 2 else LINE_POINTS
-    axes = tuple(
-        _about(tuned, one, points)
-        for tuned, one in zip(fresh.problem.tuned[:some], ends[:some], strict=True)
-    )
+    axes = []
+    for tuned, one in zip(fresh.problem.tuned[:some], ends[:some], strict=True):
+        wide = AROUND * (one.high - one.low) + LEAST_HALF * (tuned.high - tuned.low)
+        low, high = max(tuned.low, one.low - wide), min(tuned.high, one.high + wide)
+        axes.append(Axis(tuned.path, tuned.unit, np.linspace(low, high, points)))
     grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
     cells = np.tile(values, (grid[0].size, 1))
     for k, column in enumerate(grid):
         cells[:, k] = column.ravel()
     count = min(FEW, fresh.count)
     shares = fresh.shares(cells, count)
-    return Neighbourhood(axes, shares.reshape(grid[0].shape), count)
-
-
-def _about(tuned: Tuned, one: Tolerance, points: int) -> Axis:
-    wide = AROUND * (one.high - one.low) + LEAST_HALF * (tuned.high - tuned.low)
-    low, high = max(tuned.low, one.low - wide), min(tuned.high, one.high + wide)
-    return Axis(tuned.path, tuned.unit, np.linspace(low, high, points))
+    return Neighbourhood(tuple(axes), shares.reshape(grid[0].shape), count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,7 +354,12 @@ class Certificate:
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI."""
-        runs = self.runs
+        runs, number = self.runs, self.worst
+        worst = number is not None and {
+            "realization": number,
+            "j1": float(runs.j1[number]),
+            "drawn": {path: float(column[number]) for path, column in self.drawn.items()},
+        }
         return {
             "level": runs.level,
             "required_probability": self.required,
@@ -383,7 +370,7 @@ class Certificate:
             "failures": [vars(one) for one in self.failures],
             "margins": self.margins or None,
             "no_margins": self.no_margins or None,
-            "worst": self._worst(),
+            "worst": worst or None,
             "audit": {**self.audit.summary(), "other_side_of_level": self.other_side},
             "tolerance": {one.path: one.summary() for one in self.tolerances},
             "neighbourhood": {
@@ -391,16 +378,6 @@ class Certificate:
                 "realizations": self.neighbourhood.realizations,
             },
             **picked(self, "trajectories", "seconds"),
-        }
-
-    def _worst(self) -> dict[str, Any] | None:
-        number = self.worst
-        if number is None:
-            return None
-        return {
-            "realization": number,
-            "j1": float(self.runs.j1[number]),
-            "drawn": {path: float(column[number]) for path, column in self.drawn.items()},
         }
 
 
@@ -411,7 +388,12 @@ def certified(
     begin, before = time.perf_counter(), fresh.trajectories
     table, problem = design.tables.tune, fresh.problem
     point, runs = fresh.of_gains(values)
-    margins, no_margins = _margins(design)
+    margins, no_margins = {}, ""
+    try:
+        summary = loop(design).summary()
+        margins = {key: summary[key] for key in MARGINS}
+    except InputError as error:
+        no_margins = str(error)
     audit = _audit(design, fresh, runs, table.certificate.audit, progress)
     drifts = tolerances(fresh, values, runs.probability, progress)
     return Certificate(
@@ -422,7 +404,7 @@ def certified(
             Drawn(path, parameter(design, path).si_unit, values)
             for path, values in fresh.drawn.items()
         ),
-        failures=fresh.failures,
+        failures=problem.runs.failures,
         violations=problem.violations(point),
         margins=margins,
         no_margins=no_margins,
@@ -432,14 +414,6 @@ def certified(
         trajectories=fresh.trajectories - before,
         seconds=time.perf_counter() - begin,
     )
-
-
-def _margins(design: Design) -> tuple[dict[str, Any], str]:
-    try:
-        result = loop(design).summary()
-    except InputError as error:
-        return {}, str(error)
-    return {key: result[key] for key in MARGINS}, ""
 
 
 def _audit(

@@ -101,10 +101,7 @@ class Tune(Result, kind="tune"):
 
 
 def tune(
-    design: Design,
-    exhaustive: bool = False,
-    progress: Progress = SILENT,
-    verbose: bool = False,
+    design: Design, exhaustive: bool = False, progress: Progress = SILENT, verbose: bool = False
 ) -> Tune:
     """Search robust gains, certify them, and set them beside others.
 
@@ -187,10 +184,7 @@ def baselines(
         ("paper's gains", lambda: _paper(design, fresh)),
         ("largest slope margin", lambda: _linear(design, fresh)),
         ("least nominal J1", lambda: _nominal(design, fresh)),
-        *(
-            (name, lambda law=law: ({"law": law}, fresh.of_design(_law(design, law)), {}))
-            for name, law in OTHER_LAWS.items()
-        ),
+        *((name, lambda law=law: _law(design, law, fresh)) for name, law in OTHER_LAWS.items()),
     ]
     if exhaustive is not None:
         made.append(("exhaustive grid", lambda: _exhaustive(exhaustive, fresh)))
@@ -229,9 +223,10 @@ def _paper(design: Design, fresh: FreshDraws) -> Made:
     return dict(PAPER), fresh.of_design(other), {}
 
 
-def _law(design: Design, law: str) -> Design:
-    """The design with a law at its default tuning; the drive around it stays."""
-    return design.replace({"controller.law": ANY_OTHER[law]}).replace({"controller.law": law})
+def _law(design: Design, law: str, fresh: FreshDraws) -> Made:
+    """A law at its default tuning; the drive around it stays."""
+    other = design.replace({"controller.law": ANY_OTHER[law]}).replace({"controller.law": law})
+    return {"law": law}, fresh.of_design(other), {}
 
 
 def _linear(design: Design, fresh: FreshDraws) -> Made:

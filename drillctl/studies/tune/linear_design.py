@@ -148,7 +148,12 @@ class LinearProgram:
             zero, kept = self._meaning(name, negative, called, some, own, t, v)
             equal += [ca.vec(zero)] if zero is not None else []
             more.append(ca.vec(kept))
-        return equal, [*more, *self._overall(t, v)]
+        asked = self.problem.asked
+        if asked.slope_reserve is not None:
+            more.append(t + v - asked.slope_reserve / self.problem.scale)
+        elif self.problem.needs_stability:
+            more.append(t + v)
+        return equal, more
 
     def _meaning(
         self, name: str, negative: bool, called: Any, some: list[Point], own: Any, t: Any, v: Any
@@ -170,12 +175,6 @@ class LinearProgram:
         over, under = called
         most = asked.peak_sensitivity or 0.0
         return None, most**2 * under * (1.0 + v) ** 2 - over
-
-    def _overall(self, t: Any, v: Any) -> list[Any]:
-        asked = self.problem.asked
-        if asked.slope_reserve is not None:
-            return [t + v - asked.slope_reserve / self.problem.scale]
-        return [t + v] if self.problem.needs_stability else []
 
     def _of(self, loop: Loop) -> PointFunctions:
         kind = kind_of(loop, self.problem.tuned)
@@ -386,27 +385,14 @@ KEPT = 1e-6  # violation that is rounding
 class LinearDesign(TunedGains):
     """Gains of the linear design."""
 
-    design: Design = label(means="with the gains put in")
-    tuned: tuple[Tuned, ...] = label(means="what was tuned")
-    values: Array = label(
-        "parameter", means="tuned values (SI); of an infeasible problem the closest ones"
-    )
     loops: int = label(means="how many loops they hold for")
     excess: float = label(
         unit="N*m*s/rad", means="least slope margin less slope of the rock over the loops"
     )
     slope_margin: float = label(unit="N*m*s/rad", means="D* of the design itself with these gains")
     deciding_frequency_hz: float = label(unit="Hz", means="of the poles that decide it")
-    violations: dict[str, float] = label(
-        means="requirements that are missed, with how far; empty for a feasible design. Slopes "
-        "count over the steepest slope of the rock, sensitivities over their limit, damping ratios "
-        "as they are"
-    )
-    message: str = label(means="the result, or what could not be met")
     starts: list[dict[str, Any]] = label(means="what each start led to")
     programs: int = label(means="nonlinear programs solved")
-    seconds: float = label(unit="s", means="time that it took")
-    processor_seconds: float = label(unit="s", means="processor time that it took")
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI."""
@@ -467,37 +453,25 @@ def linear_design(
             "tune.parameters",
         )
     best = min(followed, key=_merit)
-    return _result(design, problem, best, followed, program.solves, begin, processor)
-
-
-def _result(
-    design: Design,
-    problem: Loops,
-    best: LoopsState,
-    followed: list[LoopsState],
-    programs: int,
-    begin: float,
-    processor: float,
-) -> LinearDesign:
-    variant = put(design, problem.tuned, best.values)
+    variant = put(design, tuned, best.values)
     margin, omega = tolerated_slope(variant, variant.speed)
     missed = {key: value for key, value in best.violations.items() if value > KEPT}
     starts = [
-        {"gains": by_path(problem.tuned, s.values), "excess": s.excess, "violation": s.violation}
+        {"gains": by_path(tuned, s.values), "excess": s.excess, "violation": s.violation}
         for s in followed
     ]
     return LinearDesign(
         design=variant,
-        tuned=problem.tuned,
+        tuned=tuned,
         values=best.values,
-        loops=len(problem.loops),
+        loops=len(loops),
         excess=best.excess,
         slope_margin=margin,
         deciding_frequency_hz=omega / (2.0 * math.pi),
         violations=missed,
         message=_message(best, missed),
         starts=starts,
-        programs=programs,
+        programs=program.solves,
         seconds=time.perf_counter() - begin,
         processor_seconds=time.process_time() - processor,
     )
@@ -524,14 +498,11 @@ def _starts(problem: Loops) -> list[LoopsState]:
     width = np.array([t.high - t.low for t in tuned])
     chosen: list[LoopsState] = []
     for k in np.argsort(-np.array(excess), kind="stable"):
-        far = all(np.max(np.abs(points[k] - s.values) / width) > APART for s in chosen)
-        if not far:
-            continue
-        state = problem.at(points[k])
-        if math.isfinite(state.excess):
-            chosen.append(state)
         if len(chosen) == STARTS:
             break
+        if all(np.max(np.abs(points[k] - s.values) / width) > APART for s in chosen):
+            state = problem.at(points[k])
+            chosen += [state] if math.isfinite(state.excess) else []
     return chosen
 
 

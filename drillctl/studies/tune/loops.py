@@ -77,16 +77,13 @@ def chain(ends: Ends, s: ComplexArray) -> Chain:
     """Chain parameters of a string at complex frequencies `s` (1/s, not zero)."""
     # Between resistors at both ends no resonance is near; what they add is taken off again.
     first = ends.parts.sections[0]
-    resistor = first.impedance or math.sqrt(first.stiffness * _inertia(ends))
+    inertia = ends.parts.top_inertia + ends.parts.bit_inertia
+    resistor = first.impedance or math.sqrt(first.stiffness * inertia)
     seen = ends.mobility(s, top=resistor + 0.0 * s, bit=resistor + 0.0 * s)
     t, h, x = seen.top, seen.bit, seen.transfer
     d = t * h - x**2
     alpha = (1.0 - resistor * (t + h) + resistor**2 * d) / x
     return Chain(alpha, (t - resistor * d) / x, (h - resistor * d) / x, d / x)
-
-
-def _inertia(ends: Ends) -> float:
-    return ends.parts.top_inertia + ends.parts.bit_inertia
 
 
 class Grid(NamedTuple):
@@ -237,13 +234,11 @@ class Loop:
         side = self.weight
         gain = values.get("weight_on_bit.gain", side.gain)
         delay = values.get("weight_on_bit.path.delay")
-        path = side.path if delay is None else replace(side.path, delay=delay + _held(self.design))
+        path = side.path
+        if delay is not None:
+            held = 0.5 * float(getattr(self.design.weight_on_bit, "period", 0.0))  # a reading's age
+            path = replace(path, delay=delay + held)
         return replace(path, gain=side.torque * gain).feedback(s).bit + 0.0 * s
-
-
-def _held(design: Design) -> float:
-    """Mean age of a reading (s)."""
-    return 0.5 * float(getattr(design.weight_on_bit, "period", 0.0))
 
 
 def refuse_not_linear(design: Design, tuned: tuple[Tuned, ...]) -> None:
@@ -483,39 +478,29 @@ class Loops:
         """Whether a loop is stable without slope; ideal gains only take energy."""
         if loop.design.simple_drive and (loop.weight is None or loop.design.simple_loop):
             return True
-        variant = put(loop.design, self.tuned, values)
-        path = None if loop.weight is None else self._path(loop, values)
-        poles = model_poles(variant, BitSide(0.0, path))
+        poles = self._poles(loop, put(loop.design, self.tuned, values), 0.0)
         return bool(poles.real.max() < ROUNDING * np.abs(poles).max())
-
-    def _path(self, loop: Loop, values: Array) -> Any:
-        from drillctl.linear.ends import weight_path
-
-        variant = put(loop.design, self.tuned, values)
-        return weight_path(variant, variant.speed)
 
     def _state(self, loop: Loop, values: Array, named: Mapping[str, float]) -> LoopState:
         result = crossings_of(loop, named)
         stable = self._stable(loop, values)
         if not (self.needs_stability and stable):
             return LoopState(loop, result, stable)
-        poles = self._poles(loop, values)
-        asked, omega = self.asked, pole_grid(loop.ends, poles)
-        return LoopState(
-            loop,
-            result,
-            stable,
-            self._first(loop, poles) if asked.damping_ratio is not None else poles[:0],
-            _peaks(loop, named, omega) if asked.peak_sensitivity is not None else [],
-            _delays(loop, named, omega) if asked.delay is not None else [],
-        )
-
-    def _poles(self, loop: Loop, values: Array) -> ComplexArray:
-        """Poles of a loop with the slope of the rock (1/s)."""
         variant = put(loop.design, self.tuned, values)
         if variant.simple_drive and loop.weight is None:
-            return loop_poles(variant.string, *variant.linear_drive.gains(), loop.slope)
-        return model_poles(variant, BitSide(loop.slope, self._path(loop, values)))
+            poles = loop_poles(variant.string, *variant.linear_drive.gains(), loop.slope)
+        else:
+            poles = self._poles(loop, variant, loop.slope)
+        asked, omega = self.asked, pole_grid(loop.ends, poles)
+        first = self._first(loop, poles) if asked.damping_ratio is not None else poles[:0]
+        peaks = _peaks(loop, named, omega) if asked.peak_sensitivity is not None else []
+        delays = _delays(loop, named, omega) if asked.delay is not None else []
+        return LoopState(loop, result, stable, first, peaks, delays)
+
+    def _poles(self, loop: Loop, variant: Design, slope: float) -> ComplexArray:
+        """Poles of a loop with a slope of the rock (1/s)."""
+        path = None if loop.weight is None else weight_path(variant, variant.speed)
+        return model_poles(variant, BitSide(slope, path))
 
     def _first(self, loop: Loop, poles: ComplexArray) -> ComplexArray:
         """Poles of the drive's mode and the first elastic ones, the upper of each pair."""

@@ -76,15 +76,14 @@ class GainRuns:
         self._at_once = _at_once(self.design, tuned)
         drawn = drawn_lanes(self.design, self.draws)
         self.failures: tuple[Failures, ...] = drawn.failures
-        self.groups = [self._ready(group) for group in drawn.groups]
+        self.groups = []
+        for one in drawn.groups:
+            prepared = prepare(one.lanes, one.design.tables.simulation)
+            self.groups.append(Ready(one, prepared, string_numbers(one.design.string)))
         self.numbers = np.sort(np.concatenate([g.group.numbers for g in self.groups]))
 
     def __len__(self) -> int:
         return len(self.numbers)
-
-    def _ready(self, group: DrawnGroup) -> Ready:
-        table = group.design.tables.simulation
-        return Ready(group, prepare(group.lanes, table), string_numbers(group.design.string))
 
     def measures(
         self, points: Array, names: tuple[str, ...], first: int = 0, last: int | None = None,
@@ -129,17 +128,12 @@ class GainRuns:
         if any(path.startswith("controller.") for path in columns):
             numbers = drive_numbers(ready.group.design, columns, ready.string)
             numbers = tracked(ready.group.design, numbers)
-        drive = lanes.drive._replace(
-            **{
-                k: np.broadcast_to(np.asarray(v, float), len(lanes)).copy()
-                for k, v in numbers.items()
-                if k in lanes.drive._fields
-            }
-        )
+        known = {k: v for k, v in numbers.items() if k in lanes.drive._fields}
+        whole = {k: np.full(len(lanes), v, dtype=float) for k, v in known.items()}
         weight = lanes.weight
         if "weight_on_bit.gain" in columns:
             weight = weight._replace(gain=columns["weight_on_bit.gain"])
-        return replace(lanes, drive=drive, weight=weight)
+        return replace(lanes, drive=lanes.drive._replace(**whole), weight=weight)
 
     def _one_by_one(
         self, point: Array, chosen: Index, result: dict[str, Array], row: int,
@@ -225,6 +219,12 @@ def smooth_weights(kind: str, quantile: float, count: int) -> Array:
     return np.asarray(weights / weights.sum())
 
 
+def weighted(values: Array, weights: Array) -> Array:
+    """Weighted sum of the sorted values, over the last axis."""
+    used = weights > 0.0  # no weight on what is infinite
+    return np.asarray(np.sort(values, axis=-1)[..., used] @ weights[used])
+
+
 @dataclass(frozen=True, eq=False)
 class Objective:
     """Statistic of J1, weights of other measures, and limits of the runs."""
@@ -287,10 +287,7 @@ class Objective:
 
     def _statistic(self, j1: Array, smooth: bool) -> Array:
         make = smooth_weights if smooth else rank_weights
-        weights = make(self.table.objective, self.table.quantile, j1.shape[-1])
-        ordered = np.sort(j1, axis=-1)
-        used = weights > 0.0  # no weight on what is infinite
-        return np.asarray(ordered[..., used] @ weights[used])
+        return weighted(j1, make(self.table.objective, self.table.quantile, j1.shape[-1]))
 
 
 def objective_of(design: Design) -> Objective:
@@ -379,11 +376,10 @@ class GainProblem:
     def points(self, values: Array, count: int, first: int = 0) -> list[Point]:
         """Points at the first realizations, `values` of shape (points, parameters)."""
         measures = self.runs.measures(values, self.objective.needs, first, first + count)
-        results = []
-        for row, one in enumerate(values):
-            own = {name: column[row] for name, column in measures.items()}
-            results.append(self._point(one, own))
-        return results
+        return [
+            self._point(one, {name: column[row] for name, column in measures.items()})
+            for row, one in enumerate(values)
+        ]
 
     def at_all(self, point: Point) -> Point:
         """A point at all realizations; those that it met already are not run again."""

@@ -31,6 +31,7 @@ from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
+from drillctl.store.codec import documented, label
 from drillctl.store.json_files import picked
 from drillctl.studies.tune.linear_design import linear_design
 from drillctl.studies.tune.problem import GainProblem, Point
@@ -162,24 +163,15 @@ def _around(problem: GainProblem, best: Point, step: float, gained: Array) -> Ar
 
 
 @dataclass(frozen=True, eq=False)
+@documented
 class Tuning(TunedGains):
     """Gains of a search, not certified yet."""
 
-    design: Design  # with the gains put in
-    tuned: tuple[Tuned, ...]  # what was tuned
-    # shape (parameters,): Their values (SI); where requirements cannot be met, of the closest
-    # point
-    values: Array
-    value: float  # objective at all realizations of the search (s)
-    share: float  # share of them with J1 at or under the level
-    violations: dict[str, float]  # requirements that are missed, over their limits
-    realizations: int  # how many could be run
-    trajectories: int  # runs of the batch engine
-    stages: list[dict[str, Any]]  # what each stage led to, and the trajectories until then
-    message: str  # the result in a sentence
-    # time that it took (s)
-    seconds: float
-    processor_seconds: float
+    value: float = label(unit="s", means="objective at all realizations of the search")
+    share: float = label(means="share of them with J1 at or under the level")
+    realizations: int = label(means="how many could be run")
+    trajectories: int = label(means="runs of the batch engine")
+    stages: list[dict[str, Any]] = label(means="what each stage led to, and runs until then")
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI."""

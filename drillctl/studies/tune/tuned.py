@@ -22,6 +22,7 @@ from drillctl.ensemble.parameters import Draws
 from drillctl.errors import InputError, nearest
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive.law import StringNumbers, drive_laws, tracking
+from drillctl.store.codec import documented, label
 from drillctl.store.json_files import write_json, write_text
 from drillctl.studies.tune.settings import RangeTable
 
@@ -139,13 +140,24 @@ def designs_at(design: Design, draws: Draws) -> Iterator[Design]:
         yield variant
 
 
+@dataclass(frozen=True, eq=False)
+@documented
 class TunedGains:
     """What every design of gains has."""
 
-    design: Design  # with the gains put in
-    tuned: tuple[Tuned, ...]
-    values: Array  # shape (parameters,): SI
-    violations: dict[str, float]  # requirements that are missed
+    design: Design = label(means="with the gains put in")
+    tuned: tuple[Tuned, ...] = label(means="what was tuned")
+    values: Array = label(
+        "parameter", means="tuned values (SI); of an infeasible problem the closest ones"
+    )
+    violations: dict[str, float] = label(
+        means="requirements that are missed, with how far; empty for a feasible design. Slopes "
+        "count over the steepest slope of the rock, damping ratios as they are, all else over the "
+        "limit"
+    )
+    message: str = label(means="the result, or what could not be met")
+    seconds: float = label(unit="s", means="time that it took")
+    processor_seconds: float = label(unit="s", means="processor time that it took")
 
     @property
     def feasible(self) -> bool:

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,20 +30,6 @@ from drillctl.errors import InputError
 
 FEWEST_BEYOND = 10.0 - 1e-9
 """Realizations that are to be expected beyond a quantile for its error to follow from them."""
-
-
-class Objective(Protocol):
-    """A functional of the distribution of J1."""
-
-    @property
-    def name(self) -> str:
-        """By which it is asked for."""
-
-    def values(self, ordered: Array) -> Array:
-        """Of each cell, from realizations in increasing order, shape (realizations, cells)."""
-
-    def influence(self, j1: Array, ordered: Array) -> Array:
-        """Influence of every realization, shape (realizations, cells); its mean is about 0."""
 
 
 def enough(objective: Objective, count: int) -> bool:
@@ -139,6 +125,9 @@ class Exceedance(NamedTuple):
         return np.asarray((j1 > self.level) - self.values(ordered))
 
 
+Objective = Mean | Quantile | TailMean | Exceedance
+"""A functional of the distribution of J1: its values from realizations in increasing order, shape
+(realizations, cells), and the influence of each realization, whose mean is about 0."""
 CELLS = 128  # cells looked at at a time: bounds the memory
 NEEDS_FULL = "lanes were stopped at the highest level: run with --full"
 
@@ -216,7 +205,8 @@ def best_cells(
         low, high = _interval(one, j1[:, cell], censored[:, cell], scatter, seed)
         value = float(known[one.name].values[cell])
         if isinstance(one, Exceedance):  # reported as the probability of the level being kept
-            value, low, high = 1.0 - value, *_swapped(low, high)
+            low, high = (None if end is None else 1.0 - end for end in (high, low))
+            value = 1.0 - value
         best[one.name] = Best(one.name, cell, value, (low, high), alike.get(one.name))
     return best
 
@@ -227,18 +217,8 @@ def _cell(objective: Objective, result: Values, j1: Array) -> int | InputError:
         return InputError("every cell has failed lanes", objective.name)
     if np.isnan(known).all() or np.nanmin(known) > np.nanmin(result.values):
         return InputError(NEEDS_FULL, objective.name)
-    return _chosen(known, j1)
-
-
-def _swapped(low: float | None, high: float | None) -> tuple[float | None, float | None]:
-    return tuple(None if end is None else 1.0 - end for end in (high, low))  # type: ignore[return-value]
-
-
-def _chosen(known: Array, j1: Array) -> int:
-    """The smallest; among equals, as probabilities often are, that of the smallest mean."""
+    # Among equals, as probabilities often are, that of the smallest mean.
     equal = np.flatnonzero(known == np.nanmin(known))
-    if len(equal) == 1:
-        return int(equal[0])
     return int(equal[np.argmin(j1[:, equal].mean(axis=0))])
 
 

@@ -293,7 +293,7 @@ class Interim:
         self._every, self._path, self._system = every, path, system
         self._next = time.monotonic() + every
 
-    def __call__(self, so_far: Callable[[], Uncertainty | None]) -> None:
+    def __call__(self, so_far: SoFar) -> None:
         """Draw what is finished if it is time."""
         if time.monotonic() < self._next:
             return
@@ -311,9 +311,8 @@ def write_columns_of(result: Uncertainty, folder: Path) -> None:
     """Write what has many rows (SI): `cells.csv`, `draws.csv`, and `contours.csv` on request."""
     columns: dict[str, Array] = {}
     for level, one in result.maps.items():
-        name = f"probability_{level:g}"
-        columns[name] = one.probability
-        columns[f"{name}_low"], columns[f"{name}_high"] = one.interval
+        ends = dict(zip(("", "_low", "_high"), (one.probability, *one.interval), strict=True))
+        columns |= {f"probability_{level:g}{end}": values for end, values in ends.items()}
     columns |= {f"j1_{name}": values for name, values in result.known.items()}
     columns["nominal_j1"] = result.nominal
     cells = over_axes(result.axes) | {name: texts(v) for name, v in columns.items()}

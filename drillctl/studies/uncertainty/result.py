@@ -87,8 +87,7 @@ def convergence(j1: Array, levels: tuple[float, ...], scatter: Scatter, seed: in
         asked = [(probability_map(j1[:count], level, scatter), INNER) for level in levels]
         rows.append(region_areas(j1[:count], asked, scatter, seed))
     return Convergence(
-        tuple(counts),
-        {level: tuple(row[k] for row in rows) for k, level in enumerate(levels)},
+        tuple(counts), {level: tuple(row[k] for row in rows) for k, level in enumerate(levels)}
     )
 
 

@@ -167,7 +167,7 @@ def test_draws_that_no_rig_has_count_against_the_gains():
     design = tuning(values={"uncertain": uncertain}, certificate={"audit": 0})
     fresh = FreshDraws(design, tuned_parameters(design))
     _, runs = fresh.of_gains(np.array([630.0, 145.0]))
-    lost = sum(failure.count for failure in fresh.failures)
+    lost = sum(failure.count for failure in fresh.problem.runs.failures)
     assert lost == np.isnan(runs.j1).sum() > 5
     assert runs.hits <= 120 - lost
     assert np.isfinite(runs.quantiles["q50"])
