@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -108,15 +109,14 @@ def _chart(name: str, title: str, chart: Chart, shown: bool = True) -> Table:
     )  # fmt: skip
     plain = ("kp", "ki", "gain", "mean_weight", "rop_proxy", "tuned_value")
     rows: list[list[Any]] = []
-    for k, policy in enumerate(chart.policies):
-        for i, weight in enumerate(chart.weights):
-            for j, speed in enumerate(chart.speeds):
-                at = {key: float(values[k, i, j]) for key, values in chart.figures.items()}
-                ends = [
-                    Estimate(at[key], (at[f"{key}_low"], at[f"{key}_high"]))
-                    for key in ("objective", "advantage")
-                ]
-                rows.append([policy, float(weight), float(speed), *(at[x] for x in plain), *ends])
+    places = itertools.product(chart.policies, chart.weights.tolist(), chart.speeds.tolist())
+    for place, *figures in zip(places, *(x.flat for x in chart.figures.values()), strict=True):
+        at = dict(zip(chart.figures, map(float, figures), strict=True))
+        ends = [
+            Estimate(at[key], (at[f"{key}_low"], at[f"{key}_high"]))
+            for key in ("objective", "advantage")
+        ]
+        rows.append([*place, *(at[x] for x in plain), *ends])
     return Table(name, title, columns, rows, shown)
 
 

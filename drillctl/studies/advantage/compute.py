@@ -213,21 +213,15 @@ def chart(
 
 
 def _figures(best: Optimum, own: Measured, ground: Measured) -> dict[str, float | None]:
-    objective, apart = own.estimate, ground.less(own)
-    return {
-        "objective": objective.value,
-        "objective_low": objective.ends[0],
-        "objective_high": objective.ends[1],
+    results: dict[str, float | None] = {
         "mean_weight": own.runs.mean("mean_weight_after_start"),
         "rop_proxy": own.runs.mean("rop_proxy"),
         "tuned_value": best.value,
-        "advantage": apart.value,
-        "advantage_low": apart.ends[0],
-        "advantage_high": apart.ends[1],
-        "kp": best.values[0],
-        "ki": best.values[1],
-        "gain": best.values[2] if len(best.values) > 2 else 0.0,
+        **dict(zip(("kp", "ki", "gain"), (*best.values, 0.0), strict=False)),
     }
+    for name, one in (("objective", own.estimate), ("advantage", ground.less(own))):
+        results |= {name: one.value, f"{name}_low": one.ends[0], f"{name}_high": one.ends[1]}
+    return results
 
 
 STEPS = 10  # into which a step of the grid is divided where kept gains lose their advantage

@@ -297,7 +297,7 @@ def weight_delay(
         design=design,
         drawn=draws.values,
         constant=constant,
-        failures=lanes.parts[0].failures,
+        failures=lanes.parts[0][0].failures,
         total_seconds=time.perf_counter() - begin,
     )
 
@@ -349,21 +349,18 @@ def following_law(design: Design, given: dict[str, Any]) -> dict[str, Any]:
 class DelayedLanes:
     """Every draw at every delay."""
 
-    # at no delay, where that is asked for, and at all others: without any lag the first is of the
-    # law that acts at once, which has a kernel of its own
-    parts: tuple[DrawnLanes, ...]
+    # with the number of delays: at no delay, where that is asked for, and at all others. Without
+    # any lag the first is of the law that acts at once, which has a kernel of its own
+    parts: tuple[tuple[DrawnLanes, int], ...]
     draws: int  # how many draws, the impossible ones included
-    delays: Array  # shape (delays,): Increasing (s)
 
     def run(self, gain: float) -> Runs:
         """Simulate all at one gain (N s/rad); runs of shape (delays, draws)."""
         results = []
-        at = (self.delays > 0.0).astype(int)
-        sizes = [int((at == k).sum()) for k in (0, 1) if (at == k).any()]
-        for part, size in zip(self.parts, sizes, strict=True):
+        for part, size in self.parts:
             groups = tuple(
-                DrawnGroup(g.design, _with(g.lanes, gain=np.full(len(g.lanes), gain)), g.numbers)
-                for g in part.groups
+                replace(one, lanes=_with(one.lanes, gain=np.full(len(one.lanes), gain)))
+                for one in part.groups
             )
             runs = run_draws(DrawnLanes(groups, part.failures), size * self.draws)
             results.append(runs.over((size, self.draws), KEPT))
@@ -375,11 +372,11 @@ def delayed_lanes(following: Design, draws: Draws, delays: Array) -> DelayedLane
     late = delays[delays > 0.0]
     parts = []
     if late.size < delays.size:
-        parts.append(drawn_lanes(following, draws))
+        parts.append((drawn_lanes(following, draws), 1))
     if late.size:
         first = drawn_lanes(following.replace({DELAY: units.SI(float(late[0]))}), draws)
-        parts.append(_at_delays(first, len(draws), late))
-    return DelayedLanes(tuple(parts), len(draws), delays)
+        parts.append((_at_delays(first, len(draws), late), late.size))
+    return DelayedLanes(tuple(parts), len(draws))
 
 
 def _at_delays(drawn: DrawnLanes, count: int, delays: Array) -> DrawnLanes:

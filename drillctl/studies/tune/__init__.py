@@ -183,22 +183,18 @@ def _certified(result: Tune) -> Iterator[str]:
         )
     for name, missed in certificate.violations.items():
         yield f"at the fresh realizations {name} is missed by {missed:.2%} of its limit"
-    yield _margins(result)
+    if margins := certificate.margins:
+        disk = margins["disk_margin"] or {"gain_db": None, "phase_deg": None}
+        yield (
+            f"loop: slope margin {number(margins['slope_margin'], 4)} N m s/rad (the rock has "
+            f"{number(margins['slope'], 4)}), disk margins {number(disk['gain_db'], 3)} dB and "
+            f"{number(disk['phase_deg'], 3)} deg, peak sensitivity "
+            f"{number(margins['peak_sensitivity'], 3)}"
+        )
+    else:
+        yield f"no margins: {certificate.no_margins}"
     other = f"{certificate.other_side} of them on the other side of the level"
     yield f"{certificate.audit.sentence('draws')}; {other}"
-
-
-def _margins(result: Tune) -> str:
-    margins = result.certificate.margins
-    if not margins:
-        return f"no margins: {result.certificate.no_margins}"
-    disk = margins["disk_margin"] or {"gain_db": None, "phase_deg": None}
-    return (
-        f"loop: slope margin {number(margins['slope_margin'], 4)} N m s/rad (the rock has "
-        f"{number(margins['slope'], 4)}), disk margins {number(disk['gain_db'], 3)} dB and "
-        f"{number(disk['phase_deg'], 3)} deg, peak sensitivity "
-        f"{number(margins['peak_sensitivity'], 3)}"
-    )
 
 
 def checks(result: Tune) -> Iterator[Check]:

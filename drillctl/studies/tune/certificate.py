@@ -205,16 +205,13 @@ def tolerances(
 def _tolerance(fresh: FreshDraws, values: Array, k: int, probability: float) -> Tolerance:
     tuned = fresh.problem.tuned[k]
     seen = {float(values[k]): probability}
-    ends = []
-    for bound in (tuned.low, tuned.high):
-        if probability < fresh.problem.table.probability:
-            ends.append((float(values[k]), False))
-        else:
-            ends.append(_end(fresh, values, k, bound, seen))
+    kept, own = probability >= fresh.problem.table.probability, float(values[k])
+    bounds = (tuned.low, tuned.high)
+    ends = [_end(fresh, values, k, one, seen) if kept else (own, False) for one in bounds]
     at = np.array(sorted(seen))
+    (low, low_at_bound), (high, high_at_bound) = ends
     return Tolerance(
-        tuned.path, tuned.unit, float(values[k]),
-        ends[0][0], ends[1][0], ends[0][1], ends[1][1],
+        tuned.path, tuned.unit, own, low, high, low_at_bound, high_at_bound,
         at, np.array([seen[x] for x in at]),
     )  # fmt: skip
 

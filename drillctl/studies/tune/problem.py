@@ -18,7 +18,7 @@ always the plain statistic.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -61,6 +61,9 @@ class Ready:
     string: StringNumbers
 
 
+Batch = tuple[Index, Index, Lanes, Prepared]  # rows and columns of the results, and what to run
+
+
 class GainRuns:
     """Measures of gains at the realizations of a design."""
 
@@ -92,33 +95,37 @@ class GainRuns:
         """Measures of points at realizations."""
         chosen = self.numbers[first:last]
         results = {name: np.full((len(points), len(chosen)), np.nan) for name in names}
-        if not self._at_once:
-            for row, point in enumerate(points):
-                self._one_by_one(point, chosen, results, row, give_up)
-        else:
-            for ready in self.groups:
-                members = np.flatnonzero(np.isin(ready.group.numbers, chosen))
-                if len(members):
-                    columns = np.searchsorted(chosen, ready.group.numbers[members])
-                    self._group(points, ready, members, columns, results, give_up)
+        most = TOGETHER // (20 if "effort" in names else 1)  # traces take more room
+        for rows, columns, lanes, prepared in self._batches(points, chosen, most):
+            for name, values in _run(lanes, prepared, names, give_up).items():
+                results[name][np.ix_(rows, columns)] = values.reshape(len(rows), len(columns))
         self.trajectories += len(points) * len(chosen)
         if "j1" in results:
             results["j1"] = np.where(np.isnan(results["j1"]), math.inf, results["j1"])
         return results
 
-    def _group(
-        self, points: Array, ready: Ready, members: Index,
-        columns: Index, result: dict[str, Array], give_up: float,
-    ) -> None:  # fmt: skip
-        """All points at the realizations that share a string."""
-        most = TOGETHER // (20 if "effort" in result else 1)  # traces take more room
-        rows = max(1, most // len(members))
-        for begin in range(0, len(points), rows):
-            some = points[begin : begin + rows]
-            lanes = self._lanes(some, ready, members)
-            for name, values in _run(lanes, ready.prepared, tuple(result), give_up).items():
-                place = np.ix_(np.arange(begin, begin + len(some)), columns)
-                result[name][place] = values.reshape(len(some), len(members))
+    def _batches(self, points: Array, chosen: Index, most: int) -> Iterator[Batch]:
+        """Lanes of points at chosen realizations that share a string, point by point."""
+        for ready in self.groups if self._at_once else ():
+            members = np.flatnonzero(np.isin(ready.group.numbers, chosen))
+            columns = np.searchsorted(chosen, ready.group.numbers[members])
+            size = max(1, most // max(1, len(members)))
+            for begin in range(0, len(points) if len(members) else 0, size):
+                rows = np.arange(begin, min(begin + size, len(points)))
+                yield rows, columns, self._lanes(points[rows], ready, members), ready.prepared
+        # Any other parameter may be tuned: lanes are made anew from the design.
+        for row, point in enumerate(() if self._at_once else points):
+            try:
+                drawn = drawn_lanes(put(self.design, self.tuned, point), self.draws)
+            except InputError:  # no rig at all
+                continue
+            for group in drawn.groups:
+                members = np.flatnonzero(np.isin(group.numbers, chosen))
+                if len(members):
+                    lanes = group.lanes[members]
+                    columns = np.searchsorted(chosen, group.numbers[members])
+                    prepared = prepare(lanes, group.design.tables.simulation)
+                    yield np.array([row]), columns, lanes, prepared
 
     def _lanes(self, points: Array, ready: Ready, members: Index) -> Lanes:
         """Every point at every member, point by point."""
@@ -134,25 +141,6 @@ class GainRuns:
         if "weight_on_bit.gain" in columns:
             weight = weight._replace(gain=columns["weight_on_bit.gain"])
         return replace(lanes, drive=lanes.drive._replace(**whole), weight=weight)
-
-    def _one_by_one(
-        self, point: Array, chosen: Index, result: dict[str, Array], row: int,
-        give_up: float,
-    ) -> None:  # fmt: skip
-        """A point whose lanes are made anew from the design: any parameter may be tuned."""
-        try:
-            drawn = drawn_lanes(put(self.design, self.tuned, point), self.draws)
-        except InputError:  # no rig at all
-            return
-        for group in drawn.groups:
-            members = np.flatnonzero(np.isin(group.numbers, chosen))
-            if len(members) == 0:
-                continue
-            lanes = group.lanes[members]
-            prepared = prepare(lanes, group.design.tables.simulation)
-            columns = np.searchsorted(chosen, group.numbers[members])
-            for name, values in _run(lanes, prepared, tuple(result), give_up).items():
-                result[name][row, columns] = values
 
 
 def _at_once(design: Design, tuned: tuple[Tuned, ...]) -> bool:

@@ -23,6 +23,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,7 @@ APART = 0.05
 FIRST_STEP, LAST_STEP = 0.01, 1e-3  # of the polish, over the bounds' width
 ROUNDS = 14  # most rounds of it
 
+_merit = attrgetter("merit")
 Note = Callable[[str, Point], None]
 """Receives the name of a stage that is over and the best point of it."""
 
@@ -89,10 +91,6 @@ def optimum(
     return best
 
 
-def _merit(point: Point) -> float:
-    return point.merit
-
-
 def _evolved(problem: GainProblem, points: Array) -> list[Point]:
     """A population after some generations, the best first."""
     # Differential evolution (Storn & Price, J. Global Optim. 11 (1997) 341-359), the variant that
@@ -117,15 +115,10 @@ def _apart(problem: GainProblem, points: list[Point], most: int) -> list[Point]:
     """The first of some points that are apart from each other."""
     chosen: list[Point] = []
     for point in points:
-        away = [
-            np.max(np.abs(problem.shares(point.values) - problem.shares(one.values)))
-            for one in chosen
-        ]
-        if all(distance > APART for distance in away):
+        at = problem.shares(point.values)
+        if all(np.max(np.abs(at - problem.shares(one.values))) > APART for one in chosen):
             chosen.append(point)
-        if len(chosen) == most:
-            break
-    return chosen
+    return chosen[:most]
 
 
 def polished(problem: GainProblem, start: Point) -> Point:

@@ -77,18 +77,11 @@ class Convergence(NamedTuple):
 
 def convergence(j1: Array, levels: tuple[float, ...], scatter: Scatter, seed: int) -> Convergence:
     """Areas of the inner regions at doubling numbers of realizations."""
-    counts, count = [], max(FEWEST, 2 * scatter.replicates)
-    while count < len(j1):
-        counts.append(count)
-        count *= 2
-    counts.append(len(j1))
-    rows = []
+    counts, rows = schedule(max(FEWEST, 2 * scatter.replicates), len(j1)), []
     for count in counts:
         asked = [(probability_map(j1[:count], level, scatter), INNER) for level in levels]
         rows.append(region_areas(j1[:count], asked, scatter, seed))
-    return Convergence(
-        tuple(counts), {level: tuple(row[k] for row in rows) for k, level in enumerate(levels)}
-    )
+    return Convergence(counts, dict(zip(levels, zip(*rows, strict=True), strict=True)))
 
 
 class Look(NamedTuple):
@@ -106,7 +99,7 @@ class Look(NamedTuple):
 
 
 def schedule(first: int, most: int) -> tuple[int, ...]:
-    """Numbers of realizations at which the area is looked at: doubling, up to the most."""
+    """Numbers of realizations: doubling, up to the most."""
     looks = []
     while first < most:
         looks.append(first)
@@ -372,12 +365,11 @@ class Uncertainty(Result, kind="uncertainty"):
     @property
     def known(self) -> dict[str, Array]:
         """Mean, 95 % quantile and tail mean in every cell (s); NaN where stopped lanes enter."""
-        results = {}
-        for name in (Mean().name, Quantile().name, TailMean().name):
-            one = self.values[name]
-            certain = np.where(one.certain, one.values, np.nan)
-            results[name] = certain.reshape(self.nominal.shape)
-        return results
+        shown = {one.name: self.values[one.name] for one in (Mean(), Quantile(), TailMean())}
+        return {
+            name: np.where(one.certain, one.values, np.nan).reshape(self.nominal.shape)
+            for name, one in shown.items()
+        }
 
     def derived(self) -> dict[str, Any]:
         """Counts and probabilities by level, moments, and draws with their units."""
