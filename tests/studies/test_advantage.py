@@ -325,7 +325,9 @@ def test_what_small_steps_carry_over_the_end_of_a_step_is_followed(design, monke
     monkeypatch.setattr(
         delays_module,
         "_objectives",
-        lambda policy, gains, draws: np.full(3, objective(policy, gains)),
+        lambda policy, gains, draws, delay: np.full(
+            3, objective(delays_module._late(policy, delay), gains)
+        ),
     )
     late = design.replace({"advantage.delays": ["0 s", "0.1 s", "0.5 s", "1 s", "1.5 s"]})
     compared = policies(late)
