@@ -41,7 +41,7 @@ RICHARDSON = PARTS**2 / (PARTS**2 - 1.0)
 MOVED = 0.2
 """Share of a tolerance by which the finer step moves what is excused. Where runs follow the step
 smoothly it moves them by their error; where a stick decides, one more or less at either step."""
-MOST_EXCUSED = 0.25  # largest share of cells that are excused
+MOST_EXCUSED = 0.25  # largest share of cells that are excused; one always may be
 AT_LEVELS = 0.25  # share of the audited cells that are those nearest to the levels
 
 Values = dict[str, Array]
@@ -122,7 +122,7 @@ class Audit:
         """`ok`, `check` when a cell differs too much or failed, `none` without audited cells."""
         if not len(self.cells):
             return "none"
-        often = self.beyond.mean() > MOST_EXCUSED
+        often = self.beyond.sum() > max(1.0, MOST_EXCUSED * len(self.cells))
         return "check" if self.failed.any() or self.wrong or often else "ok"
 
     @cached_property

@@ -156,6 +156,7 @@ def test_a_cell_on_the_verge_is_listed_and_does_not_fail_alone():
     assert found.verdict == "ok"
     assert "1 on the verge of another stick" in found.sentence("cells")
     assert of_j1(J1, reference, J1).verdict == "check"  # the engine is sure, and wrong
+    assert of_j1([40.0], [42.0], [41.0]).verdict == "ok"
 
 
 def test_a_step_that_is_too_long_is_no_verge():
