@@ -209,7 +209,7 @@ def _run(
     from drillctl.simulation import reference_run as r
 
     rig, state = numbers.rig, numbers.state
-    stiff = is_stiff(numbers) if stiff is None else stiff
+    stiff = is_stiff(design, rig) if stiff is None else stiff
     work = r.work_for(len(state))
     method, solver = r.method_for(stiff, design.string.nodes, len(state))
     clock = _clock(design, numbers, tolerance)
@@ -301,36 +301,28 @@ each stick would have to be followed all the same, at which explicit steps are b
 TURNS = 60  # of the power iteration: the fastest mode within a few per cent
 
 
-def is_stiff(numbers: Numbers) -> bool:
+def is_stiff(design: Design, rig: Any) -> bool:
     """Whether explicit steps would follow modes that have died out long before."""
-    rig = numbers.rig
     if rig["tolerance"][0] > 0.0 or rig["full"][0] or not rig["damped"][0]:
         return False
-    swing, decay = _fastest(numbers)
+    swing, decay = _fastest(design.string, rig)
     needed = max(swing / EXPLICIT_SWING, decay / EXPLICIT_DECAY)
     return needed > FEW and decay > 2.0 * RATIO * swing
 
 
-def _fastest(numbers: Numbers) -> tuple[float, float]:
+def _fastest(string: Drillstring, rig: Any) -> tuple[float, float]:
     """Largest frequency without damping (1/s), and largest rate of decay without springs (1/s)."""
-    from drillctl.simulation import reference_rates as f
+    from drillctl.simulation.reference_rates import accelerate
 
-    bands = numbers.arrays["bands"]
-    n = bands.shape[1]
+    order = np.arange(string.nodes)
+    # Of the fastest mode neighbours move apart; no symmetry may leave it out of the start.
+    start = np.where(order % 2, 1.0, -1.0) * (1.0 + order / string.nodes)
     largest = []
-    springs = np.concatenate([[0.0], bands[f.STIFFNESS, : n - 1], [0.0]])
-    for own, side in (
-        (springs[:-1] + springs[1:], -bands[f.STIFFNESS]),
-        (bands[f.DAMPING], bands[f.SIDE_DAMPING]),
-    ):
-        mode = np.where(np.arange(n) % 2, 1.0, -1.0) * (1.0 + np.arange(n) / n)
+    for matrix in (string.stiffness, string.damping):
+        mode = start
         for _ in range(TURNS):
-            mode /= np.linalg.norm(mode)
-            force = own * mode
-            force[:-1] += side[: n - 1] * mode[1:]
-            force[1:] += side[: n - 1] * mode[:-1]
-            f.accelerate(numbers.rig, force, n)
-            mode = force
+            mode = matrix @ (mode / np.linalg.norm(mode))
+            accelerate(rig, mode, string.nodes)
         largest.append(float(np.linalg.norm(mode)))
     return math.sqrt(largest[0]), largest[1]
 

@@ -24,7 +24,8 @@ WITHIN_STEP = 2e-3
 """Longest step (s) within the printed law's tolerance: a bit passes through it in milliseconds."""
 MOST_PHASES = 100_000
 """Give up beyond this many phases: the bit chatters and time no longer advances."""
-CLOSE = 4.0 * 2.220446049250313e-16  # to which an event is located, as a share of its step
+CLOSE = 4.0 * 2.220446049250313e-16
+"""To which an event is located, as a share of its step: four roundings of a share near 1."""
 
 DRIVE_PERIOD = SampledDrive._fields.index("period")
 
@@ -404,6 +405,7 @@ def _try_step(
     """Take a step within the tolerance; its length, 0 if there is none, and the bit torque."""
     now, phase = clock.now, clock.count[PHASE]
     time, end = now[TIME], now[STOP]
+    # A step of fewer units in the last place of the time would be mostly rounding.
     least = 10.0 * (math.nextafter(time, math.inf) - time)
     length, refused, torque = min(max(now[STEP], least), _longest(phase)), False, 0.0
     power = -1.0 / method.order

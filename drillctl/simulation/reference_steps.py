@@ -22,7 +22,9 @@ from drillctl.simulation.reference_rates import BEGIN, FIRST, LENGTH, compiled, 
 
 STAGES, DENSE_STAGES = 12, 16
 TOGETHER = 4  # stages that a sum takes in at once
-SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 10.0  # of a change of the step's length
+# Of a change of the step's length: aimed below the tolerance, as a refused step costs all of its
+# stages, and bounded, as an error estimate is no guide far from the step that it is of.
+SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 10.0
 
 
 class Tableau(NamedTuple):
@@ -162,6 +164,8 @@ def explicit_error(method: Any, work: Any, step: float, tolerance: float, state:
         third += (total[1, i] * scale) ** 2
     if fifth == 0.0 and third == 0.0:
         return 0.0
+    # The square of the estimate of order 5 (h^6) over that of order 3 (h^4) goes with h^8, as the
+    # error of the pair does; the former below too, lest the latter is zero by chance.
     return step * fifth / math.sqrt((fifth + 0.01 * third) * size)
 
 

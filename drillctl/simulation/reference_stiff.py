@@ -1,8 +1,9 @@
 """Linearly implicit steps of the reference solver, compiled, for stiff strings.
 
-Rodas5P of order 5(4), L-stable, with its dense output of order 4 (Steinebach, BIT Numer. Math.
-63, 27, 2023). Each stage solves (s I - J) u = r, s = 1 / (gamma h), with J of the whole rig: the
-string leaves a tridiagonal system of its speeds,
+Rodas5P of order 5(4) with its dense output of order 4 (Steinebach, BIT Numer. Math. 63, 27,
+2023). L-stable: fast modes that have died out stay out at any step. No Newton iteration: a law
+with a kink cannot make one fail. Each stage solves (s I - J) u = r, s = 1 / (gamma h), with J of
+the whole rig: the string leaves a tridiagonal system of its speeds,
 
     (s M + C + K / s) u = M r_v - K r_u / s + e_top dT_m - e_bit dT_b,
 
@@ -22,7 +23,9 @@ from drillctl.simulation.reference_steps import DENSE_STAGES, Dense
 
 STAGES = 8
 GAMMA = 0.21193756319429014
-DIFFERENCE = 1e-6  # of the differences that give J, over the size of what is moved
+DIFFERENCE = 1e-6
+"""Of the central differences that give J, over the size of what is moved: truncation, which goes
+with the square, and rounding over it are then both some 1e-10 of J, below any tolerance in use."""
 
 
 class StiffTableau(NamedTuple):
