@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from drillctl.cli import console
-from drillctl.cli.options import Common, Debug, DesignName, Json, Sets, command_of, loaded
+from drillctl.cli.options import (
+    Common,
+    Debug,
+    DesignName,
+    Json,
+    Sets,
+    command_of,
+    loaded,
+    warn,
+    with_warnings,
+)
 from drillctl.studies.base import Option
 
 if TYPE_CHECKING:
@@ -43,13 +53,15 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
     loaded_design = loaded(design, sets)
     if json:
         mesh = [one.summary() for one in loaded_design.mesh]
-        console.emit(to_tree(loaded_design.tables) | {"mesh": mesh})
+        tree = to_tree(loaded_design.tables) | {"mesh": mesh}
+        console.emit(with_warnings(tree, loaded_design))
     else:
         console.line(to_toml(loaded_design).rstrip())
         console.line("\n# Elements of the sections:")
         for one in loaded_design.mesh:
             count = f"{one.elements} of {one.length:.4g} m, " if one.length > 0.0 else ""
             console.line(f"# {one.name}: {count}{one.said}")
+    warn(loaded_design)
 
 
 def validate(
@@ -62,9 +74,11 @@ def validate(
     for study in studies().values():
         study.check(loaded_design)
     if json:
-        console.emit({"valid": True, "name": loaded_design.name, "path": loaded_design.origin})
+        found = {"valid": True, "name": loaded_design.name, "path": loaded_design.origin}
+        console.emit(with_warnings(found, loaded_design))
     else:
         console.line(f"{loaded_design.origin}: valid")
+    warn(loaded_design)
 
 
 def new(
@@ -105,13 +119,14 @@ def _report(design: Design, given: dict[str, Any], common: Common) -> None:
     for reason in result.unwritten.values():
         console.note(f"warning: {reason}")
     if common.json:
-        console.emit(result.summary())
+        console.emit(with_warnings(result.summary(), design))
         console.note(f"results: {result.folder}")
     else:
         console.line(f"the current setting {result.content['verdict']['current_setting']}")
         for path in result.files.values():
             console.line(f"report: {path}")
         console.line(f"results: {result.folder}")
+    warn(design)
     if result.interrupted:
         raise typer.Exit(130)
     if result.problems or result.unwritten:

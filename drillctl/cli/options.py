@@ -114,13 +114,21 @@ def _parameter(option: Option) -> inspect.Parameter:
 
 
 def loaded(name: str, sets: list[str] | None) -> Design:
-    """Load a design by name or path with the values set; print its warnings."""
+    """Load a design by name or path with the values set."""
     from drillctl.design import load, parse_setting
 
-    design = load(name, **dict(parse_setting(text) for text in sets or []))
+    return load(name, **dict(parse_setting(text) for text in sets or []))
+
+
+def warn(design: Design) -> None:
+    """Print the warnings of a design, after what was asked for and not beside an error."""
     for warning in design.warnings:
         console.note(f"warning: {warning}")
-    return design
+
+
+def with_warnings(summary: dict[str, Any], design: Design) -> dict[str, Any]:
+    """What JSON says of a design: a summary, and its warnings."""
+    return summary | {"warnings": [one._asdict() for one in design.warnings]}
 
 
 def with_axes(design: Design, axes: list[str] | None) -> Design:

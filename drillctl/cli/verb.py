@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from drillctl.cli import console
-from drillctl.cli.options import Common, command_of
+from drillctl.cli.options import Common, command_of, warn, with_warnings
 from drillctl.errors import InputError
 from drillctl.studies.base import Run, Study
 
@@ -53,7 +53,7 @@ def perform(study: Study, design: Design, options: dict[str, Any], common: Commo
         _write(study, result, folder, common)
         for note in study.notes(result):
             console.note(note)
-        summary = study.summary(result)
+        summary = with_warnings(study.summary(result), result.design)
         folder.finish(summary)
         _show(study, result, summary, common)
         (console.note if common.json else console.line)(f"results: {folder.path}")
@@ -92,9 +92,10 @@ def draw(figure: Figure, path: Path) -> None:
 
 
 def _show(study: Study, result: Any, summary: dict[str, Any], common: Common) -> None:
-    """Print the summary as JSON, or tables and remarks."""
+    """Print the summary as JSON, or tables and remarks; the warnings of the design."""
+    warn(result.design)
     if common.json:
-        console.emit(summary)
+        console.emit(with_warnings(summary, result.design))
         return
     title = result.design.tables.title or result.design.name
     for number, table in enumerate(one for one in study.tables(result) if one.shown):

@@ -5,6 +5,7 @@
 - `merging.py`: a design laid over its model; single values set by path.
 - `validation.py`: errors in the user's words.
 - `parts.py`: the physical parts and laws that the tables describe.
+- `warnings.py`: what a design allows and probably does not mean.
 - `design.py`: the `Design` itself.
 - `reading.py`, `paths.py`: files in, files out, values by dotted path; `starter.toml`: the file
   to begin with.

@@ -13,6 +13,7 @@ from drillctl.design import parts
 from drillctl.design.merging import Tree, with_values
 from drillctl.design.tables import DesignTables
 from drillctl.design.validation import validated
+from drillctl.design.warnings import DesignWarning, warnings_of
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.drillstring import Drillstring
@@ -136,9 +137,10 @@ class Design:
         return parts.program(self.tables)
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[DesignWarning, ...]:
         """What is allowed but probably not meant, reported once when a design is used."""
-        return parts.warnings_of(self.tables, self.bit_rock.static_torque(self._weight_at_rest))
+        line = parts.parts_of(self.tables)
+        return warnings_of(self.tables, line, self.bit_rock, self._weight_at_rest)
 
     @property
     def _weight_at_rest(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 from drillctl.design.tables import DesignTables, SectionTable
@@ -38,14 +39,19 @@ _assembled = lru_cache(maxsize=4)(assemble)
 def drillstring(tables: DesignTables) -> Drillstring:
     """Assemble the string of a design."""
     refuse_impossible_string(tables)
-    made = _parts(tables)
-    sections = meshed(made, _free(tables))
-    count = sum(one.elements for one in sections)
+    made = parts_of(tables)
+    count = sum(one.elements for one in made.sections)
     if count > MOST_ELEMENTS:
         raise InputError(
             f"{count} elements in all; allowed are {MOST_ELEMENTS}", "drillstring.sections"
         )
-    return _assembled(**(vars(made) | {"sections": sections}))
+    return _assembled(**vars(made))
+
+
+def parts_of(tables: DesignTables) -> Parts:
+    """Sections with their elements, and ends."""
+    made = _parts(tables)
+    return replace(made, sections=meshed(made, _free(tables)))
 
 
 def mesh(tables: DesignTables, string: Drillstring) -> tuple[MeshedSection, ...]:
@@ -286,14 +292,3 @@ def refuse_weak_drive(tables: DesignTables, string: Drillstring, torque: float) 
                 f"{needed / 1e3:.4g} kN*m that rock and drag take there",
                 f"controller.drive.{key}",
             )
-
-
-def warnings_of(tables: DesignTables, static: float) -> tuple[str, ...]:
-    """What a user should know of a drive: that it cannot free a stuck bit."""
-    limit = tables.controller.drive.torque_limit
-    if limit is None or limit >= static:
-        return ()
-    return (
-        f"controller.drive.torque_limit {limit / 1e3:.4g} kN*m is less than the static torque of "
-        f"the bit, {static / 1e3:.4g} kN*m: once stuck it cannot be freed (status stalled)",
-    )

@@ -145,7 +145,8 @@ def drillctl_json(result):
     """The summary of a result, as a command writes it."""
     from drillctl.store.json_files import strict as without_nan
 
-    return json.dumps(without_nan(result.summary()))
+    warnings = [one._asdict() for one in result.design.warnings]
+    return json.dumps(without_nan(result.summary() | {"warnings": warnings}))
 
 
 def test_the_same_again_is_shown_and_not_computed(ran):

@@ -56,7 +56,8 @@ def table(path):
 
 def test_json_has_the_keys_of_the_contract(call):
     code, out, err = call("uncertainty", PAPER, *FEW, "--seed", "7", "--json", "--out", "run")
-    assert (code, err) == (0, "results: run\n")
+    assert err.startswith("warning: the string has no damping")
+    assert (code, err.splitlines()[1:]) == (0, ["results: run"])
     found = strict(out)
     assert (found["realizations"], found["seed"]) == (12, 7)
     assert list(found["levels"]) == ["12", "15", "18"]
@@ -112,6 +113,7 @@ def test_what_is_saved_is_what_is_read(call):
     result = drillctl.open("run")
     again = result.summary()
     told = strict(out)
+    assert told.pop("warnings")
     assert strict(json.dumps(again, default=float).replace("NaN", "null")) == told
     assert told["looks"]
     saved = result.save("saved")
@@ -132,7 +134,8 @@ def test_a_result_of_python_is_saved_and_shown_by_the_command(call):
     })  # fmt: skip
     drillctl.uncertainty(design).save("run")
     code, _, err = call("uncertainty", PAPER, *FEW, "--out", "run")
-    assert (code, err) == (0, "already done: run\n")
+    assert err.startswith("warning: the string has no damping")
+    assert (code, err.splitlines()[1:]) == (0, ["already done: run"])
 
 
 def test_tables_for_people(call):
@@ -219,7 +222,7 @@ def test_more_realizations_add_the_missing_ones_only(call, monkeypatch):
     assert "holds a run of 21 realizations, 12 are requested" in err
     ran.clear()
     code, _, err = call("uncertainty", PAPER, *SHORT, "--realizations", "21", "--out", "run")
-    assert (code, err, ran) == (0, "already done: run\n", [])
+    assert (code, err.splitlines()[1:], ran) == (0, ["already done: run"], [])
 
 
 def folder_of(call, name, realizations):

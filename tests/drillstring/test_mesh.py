@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl import catalog
 from drillctl.design import parts
 from drillctl.rig.drillstring.frequencies import natural_frequencies
 
@@ -130,7 +131,7 @@ def test_what_was_done_is_said(rig):
     assert modes.summary()["mesh"] == [one.summary() for one in modes.design.mesh]
 
 
-@pytest.mark.parametrize("name", [m.name for m in drillctl.catalog.entries("models")])
+@pytest.mark.parametrize("name", [m.name for m in catalog.entries("models")])
 def test_shipped_models_name_their_elements(name):
     """Their numbers do not move with the rule by which elements are chosen."""
     assert not any(one.chosen for one in drillctl.load(name).mesh)

@@ -1,0 +1,146 @@
+"""What a design allows and probably does not mean: text, the key to set, and a usual value."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from drillctl.design.tables import DesignTables
+from drillctl.rig.bit_rock import BitRockLaw
+from drillctl.rig.drillstring import Parts
+from drillctl.rig.drillstring.mesh import off_the_line
+
+CHATTER = 0.03  # damping ratio that the rock may take from the fastest modes at the bit
+# Modes share the mobility of the bit: damping ends its chatter at a twentieth of what the rock
+# would take of one mode alone. Both numbers by sticks of the reference solver: docs/accuracy.md.
+SHARED = 20.0
+COARSE = 0.02  # error of the first five frequencies that no shipped mesh reaches
+MOST_VERIFIED = 1_000  # elements of a string up to which both engines are checked
+LONGEST_STEP = 0.05  # longest step (s) of the batch engine that is checked over a map
+
+
+class DesignWarning(NamedTuple):
+    """What is allowed but probably not meant.
+
+    Attributes
+    ----------
+    text : str
+        What it is and what follows.
+    key : str
+        Dotted path of the key to set.
+    usual : str
+        A usual value of it.
+    """
+
+    text: str
+    key: str
+    usual: str
+
+    def __str__(self) -> str:
+        """One line."""
+        return f"{self.text}; set {self.key}, usually {self.usual}"
+
+
+def warnings_of(
+    tables: DesignTables, parts: Parts, rock: BitRockLaw, at_rest: float
+) -> tuple[DesignWarning, ...]:
+    """Every warning of a design, of the weight (N) at rest of the bit."""
+    fall = float(rock.steepest_fall(tables.operating_point.weight_on_bit))
+    found = (
+        _weak_drive(tables, rock.static_torque(at_rest)),
+        _undamped(parts) if fall > 0.0 else None,
+        _light_bit(parts, fall),
+        _mesh(parts),
+        _step(tables),
+    )
+    return tuple(one for one in found if one is not None)
+
+
+def _weak_drive(tables: DesignTables, static: float) -> DesignWarning | None:
+    """A drive that cannot free a stuck bit."""
+    limit = tables.controller.drive.torque_limit
+    if limit is None or limit >= static:
+        return None
+    return DesignWarning(
+        f"controller.drive.torque_limit {limit / 1e3:.4g} kN*m is less than the static torque of "
+        f"the bit, {static / 1e3:.4g} kN*m: once stuck it cannot be freed (status stalled)",
+        "controller.drive.torque_limit",
+        f"more than {static / 1e3:.4g} kN*m",
+    )
+
+
+def _undamped(parts: Parts) -> DesignWarning | None:
+    """A mesh whose highest modes nothing in the string damps."""
+    sections = [x for x in parts.sections if x.inertia > 0.0]
+    damped = parts.modal_damping > 0.0 or any(
+        x.coupling_damping or x.stiffness_damping or x.mass_damping or x.drag
+        for x in parts.sections
+    )
+    if damped or not sections:
+        return None
+    return DesignWarning(
+        "the string has no damping: its highest modes decide the delay margin and short sticks, "
+        "that is, the mesh decides these figures",
+        f"drillstring.sections.{sections[0].name}.stiffness_damping",
+        "1e-3 s",
+    )
+
+
+def _light_bit(parts: Parts, fall: float) -> DesignWarning | None:
+    """A bit that the rock shakes in the fastest mode of the elements at it.
+
+    G is the mobility of the bit over the time of that mode: 1 / (inertia at the bit x frequency).
+    """
+    last = parts.sections[-1]
+    if last.inertia == 0.0 or fall <= 0.0:
+        return None
+    element, spring = last.inertia / last.elements, last.stiffness * last.elements
+    consistent = parts.mass == "consistent"
+    # What a chain of elements resists at its end at once, and its cut-off.
+    own = element * (1.0 / (2.0 * math.sqrt(3.0)) if consistent else 0.5)
+    fastest = math.sqrt((12.0 if consistent else 4.0) * spring / element)
+    inertia = parts.bit_inertia + last.end_inertia + own
+    gained = 0.5 * (fall - parts.bit_damping) / (inertia * fastest)
+    lost = 0.5 * fastest * (last.stiffness_damping + last.coupling_damping / last.stiffness)
+    if gained <= CHATTER + SHARED * (lost + parts.modal_damping):
+        return None
+    more = lost + parts.modal_damping > 0.0
+    return DesignWarning(
+        f"the bit is light: {inertia:.3g} kg*m^2 against a friction that falls by {fall:.4g} "
+        f"N*m*s/rad; it chatters with the fastest modes of the mesh, up to {fastest / 6.2832:.3g} "
+        "Hz",
+        "bha.inertia" if more else f"drillstring.sections.{last.name}.stiffness_damping",
+        "50 to 400 kg*m^2" if more else "1e-3 s",
+    )  # fmt: skip
+
+
+def _mesh(parts: Parts) -> DesignWarning | None:
+    """Elements so few, or so many, that nothing was checked with their like."""
+    count = sum(x.elements for x in parts.sections)
+    longest = max(parts.sections, key=lambda x: x.travel_time / x.elements)
+    key = f"drillstring.sections.{longest.name}.elements"
+    if count > MOST_VERIFIED:
+        return DesignWarning(
+            f"{count} elements: neither engine was checked beyond {MOST_VERIFIED}",
+            key, "left out: drillctl chooses",
+        )  # fmt: skip
+    if longest.inertia > 0.0 and off_the_line(parts, COARSE):
+        return DesignWarning(
+            f"the mesh is coarse: one of the first five frequencies is more than {COARSE:.0%} off "
+            "that of the exact string",
+            key, "left out: drillctl chooses",
+        )  # fmt: skip
+    return None
+
+
+def _step(tables: DesignTables) -> DesignWarning | None:
+    """A step that is longer than any that was checked over a map."""
+    step = tables.simulation.step
+    if step is None or step <= LONGEST_STEP:
+        return None
+    return DesignWarning(
+        f"simulation.step {step * 1e3:g} ms is longer than the {LONGEST_STEP * 1e3:g} ms up to "
+        "which the batch engine was checked",
+        "simulation.step",
+        "left out: simulation.accuracy decides",
+    )

@@ -1,0 +1,90 @@
+"""What a design allows and probably does not mean."""
+
+import json
+
+import pytest
+
+import drillctl
+from drillctl import catalog
+from drillctl.cli import run
+
+VERIFIES = {
+    "warnings of a design": "sticks of the reference solver on a light bit; each key that clears "
+    "its warning",
+}
+
+DESIGN = "monteiro-trindade-140kn"
+PIPE = "drillstring.sections.pipe"
+DAMPED = {f"{PIPE}.stiffness_damping": "1 ms"}
+HEAVY = {"bha.inertia": "300 kg*m^2"}
+
+
+def keys(**values):
+    return [one.key for one in drillctl.load(DESIGN, **values).warnings]
+
+
+@pytest.mark.parametrize("name", [one.name for one in catalog.entries("designs")])
+def test_a_shipped_design_has_one_warning_at_most(name):
+    design = drillctl.load(name)
+    undamped = [one for one in design.warnings if "the mesh decides" in one.text]
+    assert len(undamped) <= 1
+    others = [one for one in design.warnings if one not in undamped]
+    assert all(one.key == "controller.drive.torque_limit" for one in others)
+
+
+def test_a_string_without_damping():
+    (warning,) = drillctl.load(DESIGN).warnings
+    assert "the mesh decides" in warning.text
+    assert (warning.key, warning.usual) == (f"{PIPE}.stiffness_damping", "1e-3 s")
+    assert str(warning).endswith(f"set {warning.key}, usually {warning.usual}")
+    assert keys(**{warning.key: warning.usual}) == []
+    for key, value in (("damping", "1 N*m*s/rad"), ("mass_damping", "0.1 1/s"), ("drag", "1 N*s")):
+        text = f"{value}/rad" if key == "drag" else value
+        assert keys(**{f"{PIPE}.{key}": text}) == []
+    assert keys(**{"drillstring.modal_damping": 0.01}) == []
+    # A body at an end damps no mode of the string of its own.
+    assert len(keys(**{"bha.damping": "1 N*m*s/rad"})) == 1
+    assert drillctl.load("navarro-lopez-4dof").warnings == ()
+
+
+def test_a_light_bit_chatters_and_damping_or_inertia_ends_it():
+    """What the warning says, the reference solver shows: the bit sticks many times as often."""
+    light = {
+        "bha.inertia": "5 kg*m^2", "simulation.duration": "40 s", "operating_point.speed": "60 rpm",
+        "controller.kp": 800.0, "controller.ki": 250.0,
+    }  # fmt: skip
+    sticks = {}
+    for name, more in (("light", {}), ("damped", DAMPED), ("heavy", HEAVY)):
+        design = drillctl.load(DESIGN, **(light | more))
+        warned = any("light" in one.text for one in design.warnings)
+        assert warned == (name == "light")
+        events = drillctl.simulate(design, engine="reference").events
+        sticks[name] = sum(one.kind == "stick" for one in events)
+    assert sticks["light"] > 8 * max(sticks["damped"], sticks["heavy"], 1)
+
+
+def test_a_light_bit_that_damping_does_not_help_asks_for_inertia():
+    damped = {f"{PIPE}.stiffness_damping": "0.01 ms", "bha.inertia": "1 kg*m^2"}
+    (warning,) = drillctl.load(DESIGN, **damped).warnings
+    assert (warning.key, "chatters" in warning.text) == ("bha.inertia", True)
+
+
+def test_a_mesh_or_a_step_outside_what_was_verified():
+    assert keys(**DAMPED, **{f"{PIPE}.elements": 8}) == [f"{PIPE}.elements"]
+    assert keys(**DAMPED, **{f"{PIPE}.elements": 20}) == []
+    assert keys(**DAMPED, **{f"{PIPE}.elements": 2000}) == [f"{PIPE}.elements"]
+    assert keys(**DAMPED, **{"simulation.step": "60 ms"}) == ["simulation.step"]
+    assert keys(**DAMPED, **{"simulation.step": "50 ms"}) == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("validate",), ("show",), ("modes", "--out", "m"), ("loop", "--no-map", "--out", "l")],
+)
+def test_every_verb_says_them_once(command, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run([command[0], DESIGN, *command[1:], "--json"]) == 0
+    said = capsys.readouterr()
+    (warning,) = drillctl.load(DESIGN).warnings
+    assert said.err.count(f"warning: {warning}\n") == 1
+    assert json.loads(said.out)["warnings"] == [warning._asdict()]
