@@ -142,6 +142,6 @@ def test_a_finer_mesh_of_a_report_leaves_lumped_pieces_where_they_are(rig):
     from drillctl.studies.base import Requested
 
     design = rig(*TALLY)
-    finer = simulate._finer_mesh(4)(Requested(design, None, {}))
+    finer = simulate._finer_mesh(4, Requested(design, None, {}))
     assert finer.mesh[0].elements == 4 * design.mesh[0].elements
     assert len(finer.string.parts.sections) >= len(design.string.parts.sections)
