@@ -18,7 +18,7 @@ def test_json_and_folder(call):
     found = json.loads(out)
     assert found.keys() == {
         "verdict", "refused", "advice", "engine", "scheme", "estimate", "audit", "speed", "axes",
-        "total_seconds",
+        "total_seconds", "warnings",
     }  # fmt: skip
     assert found["audit"]["cells"] == found["audit"]["asked"] == 1
     assert {p.name for p in Path("d").iterdir()} == {

@@ -263,9 +263,12 @@ def test_a_run_that_nobody_can_mean_is_refused_with_the_count():
         measured(paper(600, 100, 140, **sampled))
 
 
+# A shell that starts the tests in the background has them ignore the interruption.
 _LONG_RUN = """
+import signal
 import time
 import drillctl
+signal.signal(signal.SIGINT, signal.default_int_handler)
 design = drillctl.load("monteiro-trindade-140kn", **{"simulation.duration": "1 s"})
 drillctl.simulate(design, "batch")  # compiled
 print("ready", flush=True)
