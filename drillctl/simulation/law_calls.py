@@ -36,11 +36,23 @@ def on_disk(function: Any) -> Any:
 
 @cache
 def version() -> str:
-    """Hash of every source that is compiled into the reference solver."""
+    """Hash of every source that is compiled into the reference solver; laws are apart from it."""
     here = Path(__file__).resolve().parent
+    rig = here.parent / "rig"
     own = [here / "law_calls.py", *here.glob("reference_*.py")]
+    return _hash([*own, rig / "program.py", rig / "top_drive/real_drive.py"])
+
+
+@cache
+def _version_of_laws() -> str:
+    """Hash of every source of a law, and of how it is called."""
+    here = Path(__file__).resolve().parent
+    return _hash([here / "law_calls.py", *here.parent.glob("rig/**/*.py")])
+
+
+def _hash(paths: list[Path]) -> str:
     digest = hashlib.sha256()
-    for path in sorted([*own, *here.parent.glob("rig/**/*.py")]):
+    for path in sorted(paths):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -69,7 +81,7 @@ def address(law: Any, method: str) -> int:
 
 @cache
 def _compiled(kind: Any, method: str) -> Any:
-    name = f"{kind.__name__}_{method}_{version()}"
+    name = f"{kind.__name__}_{method}_{_version_of_laws()}"
     fields = ", ".join(f"p[{k}]" for k in range(len(kind._fields)))
     text = (
         f"def {name}(rig, numbers, a, b, c, d):\n"

@@ -93,9 +93,8 @@ class Motion:
     # shape (pieces, 4): begin and end (s), phase and first step of each stretch of one phase
     pieces: Array
     changes: Array  # shape (changes, 4): time (s), 1 for a release, direction, 1 if it is an event
-    crossings: (
-        Array  # shape (crossings, 2): when the bit turns at the set speed (s), its angle (rad)
-    )
+    # shape (crossings, 2): when the bit turns at the set speed (s), its angle (rad)
+    crossings: Array
     extremes: Array  # shape (extremes, 2): when its speed has an extreme (s), and that (rad/s)
     energy: EnergyAudit  # over the whole run
     tolerance: float  # relative and absolute tolerance of the steps

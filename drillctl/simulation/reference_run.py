@@ -57,7 +57,7 @@ PHASE, IN_PIECE, PIECES, CHANGES, CROSSINGS, EXTREMES, REFUSED = range(7)
 
 
 @f.compiled
-def direction_of(rig: Any, phase: int) -> int:
+def direction_of(phase: int) -> int:
     """Direction of slip; 0 where the bit counts as stuck."""
     return phase if abs(phase) == 1 else 0
 
@@ -362,10 +362,10 @@ def _end_piece(rig: Any, clock: Any, work: Any, state: Any, by_itself: bool) -> 
     if after == phase and not by_itself:
         return
     count[PHASE] = after
-    change, direction = clock.changes[count[CHANGES]], direction_of(rig, after)
+    change, direction = clock.changes[count[CHANGES]], direction_of(after)
     change[0], change[1], change[2] = time, direction != 0, direction
     # A change between two phases of a bit that counts as stuck is none for the user.
-    change[3] = direction != 0 or direction_of(rig, phase) != 0
+    change[3] = direction != 0 or direction_of(phase) != 0
     count[CHANGES] += 1
 
 
