@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.peers.reference.printed import PrintedSystem
-from benchmarks.peers.reference.system import WORKS, Method, System, integrate, stored_energy
+from benchmarks.peers.reference.system import WORKS, Method, System, stored_energy
 from drillctl.design import Design
 from drillctl.errors import SimulationError
 from drillctl.rig.bit_rock import PrintedThreeBranch
+from drillctl.simulation.limit_cycle.flow import integrate
 from drillctl.simulation.reference import EnergyAudit, Event
 
 Array = NDArray[np.float64]

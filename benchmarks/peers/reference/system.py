@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from benchmarks.peers.reference.laws_in_time import Moment, Top, drive_in_time, weight_in_time
 from drillctl.design import Design
-from drillctl.errors import SimulationError
 from drillctl.linear.observer import observer_of
 from drillctl.rig.bit_rock import contact
 from drillctl.rig.drillstring import Drillstring
 from drillctl.simulation.lanes import start
+from drillctl.simulation.limit_cycle.flow import LONGEST_STEP, ending
 from drillctl.simulation.phases import Phase, slip_phase, stick_phase
 
 Array = NDArray[np.float64]
@@ -23,7 +23,6 @@ Method = Literal["DOP853", "RK45", "Radau", "BDF"]
 """Integrators of SciPy; not LSODA, whose dense output does not meet its own steps closely
 enough to locate events on."""
 
-LONGEST_STEP = 0.05  # longest step (s): a touch of zero speed shorter than that could go unseen
 WORKS = 3  # integrals of power that every state carries: work of the drive, of the bit, of damping
 
 
@@ -323,23 +322,6 @@ def _exp(x: float) -> float:
     return math.exp(min(x, 100.0))
 
 
-def integrate(*arguments: Any, longest_step: float = LONGEST_STEP, **options: Any) -> Any:
-    """`solve_ivp` with steps of at most `longest_step` (s); a little shorter if an event is missed.
-
-    SciPy finds events on its dense output, which at the ends of a step may differ from the step
-    itself by rounding; an event that lies just there is then not bracketed. Other steps move it
-    inside.
-    """
-    from scipy.integrate import solve_ivp  # a third of a second that maps need not wait for
-
-    for share in (1.0, 0.83, 0.71, 0.59, 0.47):
-        try:
-            return solve_ivp(*arguments, max_step=share * longest_step, **options)
-        except ValueError as error:
-            failure = error
-    raise SimulationError(f"an event could not be located: {failure}") from failure
-
-
 class Equations:
     """Right-hand side and events of one phase; the first event ends it."""
 
@@ -353,13 +335,6 @@ class Equations:
         self.rates = rates
         self.events = [end, *others]
         self.longest_step = longest_step
-
-
-def ending(event: Any) -> Any:
-    """Mark an event as the end of its phase, reached from above."""
-    event.terminal = True
-    event.direction = -1
-    return event
 
 
 def damping_power(string: Drillstring) -> Callable[[Array], float]:

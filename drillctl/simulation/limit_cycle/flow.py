@@ -179,7 +179,7 @@ class Flow:
             return np.concatenate([own, grown.ravel()])
 
         both = state if near is None else np.concatenate([state, near.ravel()])
-        result = _integrate(
+        result = integrate(
             rates, (begin, end), both, method="DOP853", rtol=self.tolerance, atol=self.tolerance,
             events=self._events(direction), dense_output=dense,
         )  # fmt: skip
@@ -205,7 +205,7 @@ class Flow:
         def extreme(time: float, both: Array) -> float:
             return float(self.rates(both[:size], direction)[-1])
 
-        return [_ending(comes_to_rest), extreme] if direction else [_ending(breaks_loose)]
+        return [ending(comes_to_rest), extreme] if direction else [ending(breaks_loose)]
 
     def _salted(self, state: Array, near: Array, before: int, after: int) -> Array:
         """Neighbours after a change of phase."""
@@ -233,8 +233,8 @@ def _exp(x: float) -> float:
     return math.exp(min(x, 100.0))
 
 
-def _integrate(*arguments: Any, **options: Any) -> Any:
-    """`solve_ivp` with steps that are not too long; a little shorter if an event is missed.
+def integrate(*arguments: Any, longest_step: float = LONGEST_STEP, **options: Any) -> Any:
+    """`solve_ivp` with steps of at most `longest_step` (s); a little shorter if an event is missed.
 
     SciPy finds events on its dense output, which at the ends of a step may differ from the step
     itself by rounding; an event that lies just there is then not bracketed. Other steps move it
@@ -244,13 +244,13 @@ def _integrate(*arguments: Any, **options: Any) -> Any:
 
     for share in (1.0, 0.83, 0.71, 0.59, 0.47):
         try:
-            return solve_ivp(*arguments, max_step=share * LONGEST_STEP, **options)
+            return solve_ivp(*arguments, max_step=share * longest_step, **options)
         except ValueError as error:
             failure = error
     raise SimulationError(f"an event could not be located: {failure}") from failure
 
 
-def _ending(event: Any) -> Any:
+def ending(event: Any) -> Any:
     """Mark an event as the end of its phase, reached from above."""
     event.terminal = True
     event.direction = -1
