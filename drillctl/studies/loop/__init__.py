@@ -116,9 +116,9 @@ def remarks(result: LoopAnalysis, system: units.System) -> Iterator[str]:
         yield "The loop is not stable: it has no margins at the top torque."
     if result.mesh_limited:
         yield (
-            "Mesh-limited: the last modes of the mesh decide this figure; other elements give "
-            "another. Damping of the string (drillstring.sections.NAME.stiffness_damping, usually "
-            "1e-3 s) or the exact string, where it has such a value, decides in their place."
+            "Figures marked mesh-limited are decided by the last modes of the mesh: with other "
+            "elements they change. Use the value of the exact string beside them, or give the "
+            "string its damping (drillstring.sections.NAME.stiffness_damping, usually 1e-3 s)."
         )
     drive = result.design.tables.controller.drive
     if drive.torque_rate_limit is not None and drive.lag < SHORTEST_LAG:
