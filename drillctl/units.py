@@ -108,7 +108,10 @@ def registry() -> Any:
     """The pint registry, made on first use since importing pint is slow."""
     import pint
 
-    units = pint.UnitRegistry(cache_folder=":auto:")
+    try:
+        units = pint.UnitRegistry(cache_folder=":auto:")
+    except Exception:  # whatever an unwritable folder, or a damaged entry in it, may raise
+        units = pint.UnitRegistry()
     units.define("rev = revolution")
     units.define("klbf = 1000 * force_pound")
     units.define("tf = 1000 * kilogram * standard_gravity")

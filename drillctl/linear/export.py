@@ -79,6 +79,7 @@ def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearI
         outputs=[*LOOP_OUTPUTS, "bit_torque"],
         states=state_names(design.string.nodes, ki),
         name="regularised_loop",
+        dt=0,
     )
 
 

@@ -178,6 +178,8 @@ def named(
     """A system of python-control with named signals."""
     import control
 
+    # dt and the states are given, so that no default of the user's `control.config` counts.
     return control.StateSpace(
-        *matrices, name=name, inputs=list(inputs), outputs=list(outputs), states=states
-    )
+        *matrices, dt=0, remove_useless_states=False,
+        name=name, inputs=list(inputs), outputs=list(outputs), states=states,
+    )  # fmt: skip

@@ -17,6 +17,8 @@ from typing import Any
 import numba
 from numba import types
 
+from drillctl.simulation import kernel_cache
+
 OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 STATE = types.CPointer(types.float64)  # how an array is passed
 CALL = (STATE, *[types.float64] * 4)  # numbers of a law, and four more, used or not
@@ -31,7 +33,7 @@ def on_disk(function: Any) -> Any:
     So that a change in any of them is noticed: numba looks at the date of one file only.
     """
     function.__name__ = function.__qualname__ = f"{function.__name__}_{version()}"
-    return numba.njit(cache=True, nogil=True, fastmath={"contract"}, **OPTIONS)(function)
+    return kernel_cache.njit(function, nogil=True, fastmath={"contract"}, **OPTIONS)
 
 
 @cache
@@ -96,7 +98,8 @@ def _compiled(kind: Any, method: str) -> Any:
     # Under the name of this file, next to which numba keeps what it compiles.
     exec(compile(text, __file__, "exec"), scope)
     ours = kind.__module__.startswith("drillctl.")
-    return numba.cfunc(types.float64(types.voidptr, *CALL), cache=ours, **OPTIONS)(scope[name])
+    signature = types.float64(types.voidptr, *CALL)
+    return kernel_cache.cfunc(signature, scope[name], cache=ours, **OPTIONS)
 
 
 def jitted(function: Any) -> Any:

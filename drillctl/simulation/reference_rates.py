@@ -25,6 +25,7 @@ from drillctl.arrays import Array
 from drillctl.rig.program import Ramp
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.top_drive.real_drive import MEMORY, SAMPLED_MEMORY, respond, respond_held, sample
+from drillctl.simulation import kernel_cache
 from drillctl.simulation.law_calls import (
     CALL,
     OPTIONS,
@@ -177,7 +178,7 @@ def callable_at(function: Any, *kinds: Any) -> int:
     )
     exec(compile(text, __file__, "exec"), scope)
     signature = types.float64(types.CPointer(numba.from_dtype(RIG)), *kinds)
-    made = numba.cfunc(signature, cache=True, **OPTIONS, fastmath={"contract"})(scope[name])
+    made = kernel_cache.cfunc(signature, scope[name], **OPTIONS, fastmath={"contract"})
     _alive.append(made)
     return int(made.address)
 

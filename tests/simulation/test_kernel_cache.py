@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from drillctl.simulation import kernel_cache
+
 CODE = """
 import drillctl
 from drillctl.simulation.kernels.advance import run
@@ -84,3 +86,50 @@ def test_a_law_from_outside_is_never_stale_and_leaves_nothing_behind(tmp_path):
     assert abs(j1(OUTSIDE, LAW.replace("FACTOR", "1.0")) / steep - 1.0) > 0.01
     (tmp_path / "outside_law.py").unlink()
     assert not list((tmp_path / "kept").rglob("*.nb?"))
+
+
+def twice(x):
+    return 2.0 * x
+
+
+def kept_in(folder, monkeypatch):
+    """What the cache does for a function of its own: misses and hits of two processes."""
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(folder))
+    made = kernel_cache.njit(twice)
+    assert made(2.0) == 4.0
+    return sum(made.stats.cache_misses.values()), sum(made.stats.cache_hits.values())
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize("left", [0, 40])
+def test_a_damaged_entry_is_compiled_again(tmp_path, monkeypatch, caplog, kind, left):
+    assert kept_in(tmp_path, monkeypatch) == (1, 0)
+    assert kept_in(tmp_path, monkeypatch) == (0, 1)
+    (file,) = tmp_path.rglob(f"*.{kind}")
+    file.write_bytes(file.read_bytes()[:left])
+    with caplog.at_level("INFO", logger="drillctl"):
+        assert kept_in(tmp_path, monkeypatch) == (1, 0)
+    assert "damaged" in caplog.text
+    assert kept_in(tmp_path, monkeypatch) == (0, 1)
+
+
+def test_without_a_writable_folder_functions_are_kept_among_temporary_files(tmp_path, monkeypatch):
+    nowhere = kernel_cache._Entries._locator_classes[-1:]
+    monkeypatch.setattr(kernel_cache._Entries, "_locator_classes", nowhere)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert kept_in("", monkeypatch) == (1, 0)
+    assert kept_in("", monkeypatch) == (0, 1)
+    (own,) = tmp_path.iterdir()
+    assert own.stat().st_mode & 0o777 == 0o700
+    own.chmod(0o777)  # others could plant code
+    assert kernel_cache.njit(twice)._cache.cache_path is None
+    assert kernel_cache.cfunc("f8(f8)", twice).ctypes(3.0) == 6.0
+
+
+def test_no_folder_of_the_user_is_needed(tmp_path):
+    environment = {**os.environ, "HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null"}
+    code = "import drillctl.units as u; print(u.parse('1 yard', u.LENGTH))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False
+    )
+    assert (done.stdout.strip(), done.stderr) == ("0.9144", "")

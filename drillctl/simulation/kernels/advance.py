@@ -14,9 +14,8 @@ import hashlib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from numba import njit
-
 from drillctl.rig.bit_rock import contact
+from drillctl.simulation.kernel_cache import njit
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import (
     OPTIONS,
@@ -319,7 +318,7 @@ def _compile(on_disk: bool) -> Any:
     # no list is read that names modules which are no more.
     run.__name__ = run.__qualname__ = f"run_{version}"
     # Threads are the caller's: numba's own loop in parallel compiles everything twice.
-    return njit(nogil=True, cache=on_disk, **OPTIONS)(run)
+    return njit(run, cache=on_disk, nogil=True, **OPTIONS)
 
 
 def sources() -> list[Path]:
