@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated, Any, get_args
 
 import typer
@@ -12,6 +16,9 @@ from drillctl import __version__
 from drillctl.cli import console
 from drillctl.errors import DrillctlError, InputError
 from drillctl.studies.base import Group
+
+INTERRUPTED = 128 + signal.SIGINT
+DEBUG = "--debug prints the traceback"
 
 
 class GroupedCommands(TyperGroup):
@@ -33,7 +40,6 @@ app = typer.Typer(
     cls=GroupedCommands,
     help="Control design against torsional stick-slip of oil-well drillstrings.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help: rich would double the time it takes to appear
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -42,28 +48,61 @@ app = typer.Typer(
 
 def run(arguments: list[str]) -> int:
     """Run a command line and return its exit code; an error prints one message."""
+    with _terminated_as_interrupted() as terminated:
+        code, message = _outcome(arguments)
+    if code == INTERRUPTED and terminated:
+        code, message = 128 + signal.SIGTERM, "terminated"
+    if message:
+        console.note(f"drillctl: {message}")
+    return code
+
+
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[list[int]]:
+    """Let a request to terminate end a command as Ctrl-C does; yields such requests."""
+    came: list[int] = []
+
+    def stop(number: int, frame: Any) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():  # signals are the main one's
+        yield came
+        return
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield came
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _outcome(arguments: list[str]) -> tuple[int, str]:
+    """Exit code of a command line, and a message if it failed."""
     usage_error: Any = typer.BadParameter.__mro__[1]
     try:
         code = app(arguments or ["--help"], prog_name="drillctl", standalone_mode=False)
+        console.flush()
         # Some versions of typer return 130 on an interruption, others raise Abort.
-        return _failed("interrupted", 130) if code == 130 else int(code or 0)
+        return int(code or 0), "interrupted" if code == INTERRUPTED else ""
     except typer.Exit as stop:
-        return int(stop.exit_code)
-    except (KeyboardInterrupt, typer.Abort):
-        return _failed("interrupted", 130)
+        return int(stop.exit_code), ""
+    except (KeyboardInterrupt, typer.Abort) as stop:
+        if isinstance(stop.__cause__, EOFError):  # typer takes the end of a file for Ctrl-C
+            return 1, f"a file ends too early: {stop.__cause__} ({DEBUG})"
+        return INTERRUPTED, "interrupted"
     except usage_error as error:
-        return _failed(error.format_message(), 2)
+        return 2, error.format_message()
+    except BrokenPipeError:  # whoever reads the output has left; typer, too, answers with 1
+        console.silence()
+        return 1, ""
     except Exception as error:
         if "--debug" in arguments:
             traceback.print_exc()
         if isinstance(error, DrillctlError):
-            return _failed(str(error), 2 if isinstance(error, InputError) else 1)
-        return _failed(f"{type(error).__name__}: {error} (--debug prints the traceback)", 1)
-
-
-def _failed(message: str, code: int) -> int:
-    console.note(f"drillctl: {message}")
-    return code
+            return 2 if isinstance(error, InputError) else 1, str(error)
+        if isinstance(error, OSError) and error.strerror:
+            return 1, f"{error.filename or 'the output'}: {error.strerror} ({DEBUG})"
+        return 1, f"{type(error).__name__}: {error} ({DEBUG})"
 
 
 def _version(requested: bool) -> None:
@@ -75,7 +114,10 @@ def _version(requested: bool) -> None:
 @app.callback()
 def common(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+        bool,
+        typer.Option(
+            "-V", "--version", callback=_version, is_eager=True, help="Print the version."
+        ),
     ] = False,
 ) -> None:
     """Control design against torsional stick-slip of oil-well drillstrings."""

@@ -7,8 +7,9 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
+from drillctl.errors import StoreError
 from drillctl.progress import SILENT, Progress
 
 if TYPE_CHECKING:
@@ -23,16 +24,34 @@ def note(text: str) -> None:
     print(text, file=sys.stderr)  # noqa: T201
 
 
+def _output() -> TextIO:
+    """Where answers go; refused (`StoreError`) if the caller closed it."""
+    if sys.stdout is None:
+        raise StoreError("the standard output is closed: nothing can be printed")
+    return sys.stdout
+
+
+def flush() -> None:
+    """Write what is still in memory, while its failure can be reported."""
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def silence() -> None:
+    """Drop what is still to be printed, after whoever reads it has left."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+
 def emit(summary: dict[str, Any]) -> None:
     """Print one strict JSON object on stdout."""
     from drillctl.store.json_files import strict
 
-    print(json.dumps(strict(summary), allow_nan=False))  # noqa: T201
+    print(json.dumps(strict(summary), allow_nan=False), file=_output())
 
 
 def line(text: str) -> None:
     """Print a line on stdout."""
-    print(text)  # noqa: T201
+    print(text, file=_output())
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -46,7 +65,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
     for row in rows:
         made.add_row(*row)
     # Titles and names come from the user: brackets and colons in them are not markup.
-    console = Console(markup=False, emoji=False, highlight=False)
+    console = Console(file=_output(), markup=False, emoji=False, highlight=False)
     if not console.is_terminal:
         console.width = PIPED_WIDTH
     # Rich would wrap a title of the table at the width of the table.
@@ -110,7 +129,7 @@ def library_output_on_stderr() -> Iterator[None]:
     """Send what libraries print, from C or Python, to stderr: stdout is reserved for JSON."""
     import ctypes
 
-    sys.stdout.flush()
+    flush()
     kept = os.dup(1)
     os.dup2(2, 1)
     try:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import logging
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,6 +63,9 @@ def common_options(
     """Options of every command that computes; `app.run` reads `debug`."""
     if threads is not None:
         _use(threads)
+    if verbose:
+        logging.basicConfig(format="%(message)s", stream=sys.stderr)
+        logging.getLogger("drillctl").setLevel(logging.INFO)
     return Common(out, json, units, verbose)
 
 

@@ -24,7 +24,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from drillctl.arrays import Array
+from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design, Parameter, parameter
 from drillctl.design.tables import DistributionTable
 from drillctl.design.uncertain_tables import UncertaintyTable
@@ -232,6 +232,7 @@ class Draws:
         return len(next(iter(self.values.values())))
 
 
+@own_errstate()
 def draw(design: Design, count: int, seed: int, first: int = 0) -> Draws:
     """Draw the uncertain parameters of a design.
 

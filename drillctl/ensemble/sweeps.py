@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.arrays import Array, Index, Mask
+from drillctl.arrays import Array, Index, Mask, own_errstate
 from drillctl.design import Design
 from drillctl.ensemble import audit as auditing
 from drillctl.ensemble.grid import (
@@ -197,6 +197,7 @@ class Sweep(Result, kind="map"):
         return self.design, settings
 
 
+@own_errstate()
 def sweep(
     design: Design,
     axes: tuple[Axis, ...] | None = None,
@@ -382,6 +383,7 @@ class Cells:
         return held[1], held[2]
 
 
+@own_errstate()
 def responses(result: Sweep, count: int = 4) -> list[Simulation]:
     """Simulate some cells of growing J1, by the batch engine.
 

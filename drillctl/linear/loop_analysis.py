@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array, ComplexArray
+from drillctl.arrays import Array, ComplexArray, own_errstate
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import BitSide, bit_side, ends_of, weight_path
@@ -116,6 +116,7 @@ class LoopAnalysis(Result, kind="loop"):
         return self.design, {"no_map": True}
 
 
+@own_errstate()
 def loop(design: Design) -> LoopAnalysis:
     """Analyse the loop of a design about steady drilling.
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.linalg
 
-from drillctl.arrays import Array, ComplexArray
+from drillctl.arrays import Array, ComplexArray, own_errstate
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.transmission import EndMobility, FromMobility
@@ -192,6 +192,7 @@ class Modes(Result, kind="modes"):
         return self.design, {} if self.count == COUNT else {"count": self.count}
 
 
+@own_errstate()
 def modes(subject: Design | Drillstring, count: int = COUNT) -> Modes:
     """Modes of a string, without control and without bit-rock contact.
 

@@ -10,14 +10,16 @@ from __future__ import annotations
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
-from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize, same_color, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
@@ -78,6 +80,10 @@ def picture(raises: str = "", **about: str) -> Callable[[Drawing], Drawing]:
     """
 
     def completed(draw: Drawing) -> Drawing:
+        @wraps(draw)
+        def drawn(*given: Any, **named: Any) -> Figure:
+            return _readable(draw(*given, **named))
+
         lines = [inspect.cleandoc(draw.__doc__ or ""), "", "Parameters", "----------"]
         for name, one in inspect.signature(draw).parameters.items():
             kind = str(one.annotation) + ", optional" * (one.default in (None, ()))
@@ -90,10 +96,34 @@ def picture(raises: str = "", **about: str) -> Callable[[Drawing], Drawing]:
         lines += ["", "Returns", "-------", "Figure", "    The picture, not shown."]
         if raises:
             lines += ["", "Raises", "------", "InputError", f"    {raises}"]
-        draw.__doc__ = "\n".join(lines)
-        return draw
+        drawn.__doc__ = "\n".join(lines)
+        return cast("Drawing", drawn)
 
     return completed
+
+
+def _readable(figure: Figure) -> Figure:
+    """The figure with its black lines in white where the user's style has a dark background."""
+    for ax in figure.axes:
+        red, green, blue, _ = to_rgba(ax.get_facecolor())
+        if 0.3 * red + 0.6 * green + 0.1 * blue > 0.5:
+            continue
+        legend = ax.get_legend()
+        for line in (*ax.lines, *(legend.get_lines() if legend else ())):
+            if same_color(line.get_color(), BLACK):
+                line.set_color("white")
+    return figure
+
+
+@contextmanager
+def default_look(more: Any) -> Iterator[None]:
+    """Draw as matplotlib does by default, with `more` settings, whatever the user has set."""
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(more)
+        yield
 
 
 def figure(width: float = 7.0, height: float = 4.5) -> Figure:

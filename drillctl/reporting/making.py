@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import drillctl
 from drillctl import store
+from drillctl.arrays import own_errstate
 from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError, nearest
 from drillctl.progress import SILENT, Progress
@@ -158,6 +159,7 @@ class Report:
         return self.content
 
 
+@own_errstate()
 def report(
     design: Design,
     folder: str | Path | None = None,

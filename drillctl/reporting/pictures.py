@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl.errors import DrillctlError, InputError
-from drillctl.plots.style import axes_or_new
+from drillctl.plots.style import axes_or_new, default_look
 from drillctl.reporting.blocks import Document, Figure, InteractiveMap
 from drillctl.reporting.gather import Gathered
 from drillctl.store.json_files import read_json, write_json, write_text
@@ -93,17 +93,18 @@ class FigureFiles:
         return Picture(name, held["width"], held["height"], tuple(held["box"]), self._folder)
 
     def _draw(self, figure: Figure) -> Picture:
-        from matplotlib import rc_context
+        # A fixed salt: the same figure gives the same file.
+        with default_look({"svg.hashsalt": figure.name, "svg.fonttype": "path"}):
+            return self._saved(figure)
 
+    def _saved(self, figure: Figure) -> Picture:
         drawn = figure.draw()
         for ax in drawn.axes:
             for crowd in ax.collections:
                 crowd.set_rasterized(crowd.get_rasterized() or len(crowd.get_paths()) > MOST_SHAPES)
         svg = self._folder / f"{figure.name}.svg"
         part = svg.with_suffix(".part")
-        # A fixed salt: the same figure gives the same file.
-        with rc_context({"svg.hashsalt": figure.name, "svg.fonttype": "path"}):
-            drawn.savefig(part, format="svg", dpi=DPI, metadata={"Date": None})
+        drawn.savefig(part, format="svg", dpi=DPI, metadata={"Date": None})
         write_text(svg, _small(part.read_text(encoding="utf-8")))
         part.unlink(missing_ok=True)
         place = drawn.axes[0].get_position()

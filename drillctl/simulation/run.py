@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from drillctl.arrays import Array
+from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation import measures as m
@@ -235,6 +235,7 @@ def _extremes(motion: Motion, since: float, samples: Array) -> tuple[float, floa
     return float(values.min()), float(values.max())
 
 
+@own_errstate()
 def simulate(
     design: Design,
     engine: Literal["reference", "batch"] | None = None,

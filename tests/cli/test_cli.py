@@ -814,3 +814,58 @@ def test_interrupted_by_a_signal():
     out, err = process.communicate(timeout=30)
     assert (process.returncode, out) == (130, "")
     assert "Traceback" not in err
+
+
+# --- what surrounds a command -----------------------------------------------------------------
+
+
+def shell(text, **options):
+    """A command line through the shell, with `drillctl` as a word of it."""
+    text = text.replace("drillctl", f"{sys.executable} -m drillctl")
+    return subprocess.run(
+        ["bash", "-c", text], capture_output=True, text=True, check=False, timeout=120, **options
+    )
+
+
+@pytest.mark.parametrize(
+    ("ending", "said"), [(">&-", "closed: nothing can be printed"), (">/dev/full", "No space left")]
+)
+def test_output_that_cannot_be_written_is_no_success(ending, said):
+    done = shell(f"drillctl validate {DESIGN} --json {ending}")
+    assert done.returncode == 1
+    assert said in done.stderr
+
+
+def test_without_stderr_the_answer_is_the_same():
+    done = shell(f"drillctl validate {DESIGN} --json 2>&-")
+    assert done.returncode == 0
+    assert parsed(done.stdout)["valid"]
+
+
+def test_a_reader_that_leaves_and_a_poor_terminal():
+    assert shell(f"drillctl show {DESIGN} | head -1").stdout == "schema = 1\n"
+    done = shell(f"PYTHONIOENCODING=ascii drillctl validate {DESIGN} --set 'title=\"\u2300 8 in\"'")
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_request_to_terminate_says_how_to_resume(tmp_path):
+    words = [
+        "map",
+        DESIGN,
+        "--axis",
+        "controller.kp=0:1000:300",
+        "--axis",
+        "controller.ki=0:500:300",
+    ]
+    with subprocess.Popen(
+        [sys.executable, "-m", "drillctl", *words, "--audit", "0", "--out", str(tmp_path / "run")],
+        stderr=subprocess.PIPE, text=True,
+    ) as running:  # fmt: skip
+        while not any((tmp_path / "run").glob("blocks/*.npz")):
+            assert running.poll() is None
+            time.sleep(0.02)
+        running.send_signal(signal.SIGTERM)
+        _, said = running.communicate(timeout=60)
+    assert running.returncode == 143
+    assert "to resume, repeat with --out" in said
+    assert "drillctl: terminated" in said

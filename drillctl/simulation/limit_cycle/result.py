@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from drillctl.arrays import own_errstate
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import PrintedThreeBranch
@@ -77,6 +78,7 @@ class LimitCycle(Result, kind="cycle"):
         return self.design, self.settings
 
 
+@own_errstate()
 def limit_cycle(
     design: Design,
     periods: int = PERIODS,

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array, Mask
+from drillctl.arrays import Array, Mask, own_errstate
 from drillctl.design import Design
 from drillctl.ensemble.cases import Crossing, Estimate, percentile_estimate, resampled_crossing
 from drillctl.ensemble.draws import CommonDraws
@@ -483,6 +483,7 @@ def _chart_summary(result: Chart) -> Any:
     return strict({"weights": result.weights, "speeds": result.speeds, "policies": policies})
 
 
+@own_errstate()
 def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
     """Compare PI with a constant weight on bit and PI with one that follows the bit speed.
 

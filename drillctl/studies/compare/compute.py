@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array
+from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design, parameter, to_toml
 from drillctl.ensemble.audit import Audit, audited, choose_cells, kept, unaudited
 from drillctl.ensemble.cases import Estimate, Runs
@@ -276,6 +276,7 @@ class Comparison(Result, kind="compare"):
         return self.design, {"cases": {name: to_toml(case) for name, case in cases.items()}}
 
 
+@own_errstate()
 def compare(
     cases: Design | Mapping[str, Design],
     realizations: int | None = None,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.arrays import Array
+from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design
 from drillctl.ensemble.cases import (
     Crossing,
@@ -234,6 +234,7 @@ class WeightDelay(Result, Runs, kind="delay"):
         }
 
 
+@own_errstate()
 def weight_delay(
     design: Design,
     gains: Sequence[float | str] | None = None,

@@ -19,7 +19,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.arrays import Array, Index
+from drillctl.arrays import Array, Index, own_errstate
 from drillctl.design import Design
 from drillctl.design.tables import SimulationTable
 from drillctl.ensemble import audit as auditing
@@ -336,6 +336,7 @@ class Doctor(Result, kind="doctor"):
         return self.design, audit
 
 
+@own_errstate()
 def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILENT) -> Doctor:
     """Examine what the batch engine does with a design.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from drillctl.arrays import Array, ComplexArray, Mask
+from drillctl.arrays import Array, ComplexArray, Mask, own_errstate
 from drillctl.design import Design
 from drillctl.ensemble.grid import (
     Axis,
@@ -92,6 +92,7 @@ class LoopMap(Result, kind="loop-map"):
         return self.design, some | other_axes(self)
 
 
+@own_errstate()
 def loop_map(
     design: Design,
     axes: tuple[Axis, ...] | None = None,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array
+from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design
 from drillctl.design.parts import weight_moves
 from drillctl.ensemble.grid import Axis, axes_of, other_axes, span
@@ -83,6 +83,7 @@ class Regularisation(Result, kind="regularisation"):
         return self.design, other_axes(self) | widths
 
 
+@own_errstate()
 def regularisation(
     design: Design,
     widths: tuple[float, ...] = WIDTHS,

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from drillctl.arrays import Array, Mask
+from drillctl.arrays import Array, Mask, own_errstate
 from drillctl.design import Design
 from drillctl.ensemble.grid import (
     Axis,
@@ -243,6 +243,7 @@ class ThreeRegions(Result, kind="regions"):
         return self.design, other_axes(self) | level
 
 
+@own_errstate()
 def three_regions(
     design: Design,
     axes: tuple[Axis, ...] | None = None,

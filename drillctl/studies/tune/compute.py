@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from drillctl.arrays import Array
+from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design, load, parameter
 from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.sweeps import sweep
@@ -100,6 +100,7 @@ class Tune(Result, kind="tune"):
         return self.design, {"exhaustive": True} if grid else {}
 
 
+@own_errstate()
 def tune(
     design: Design, exhaustive: bool = False, progress: Progress = SILENT, verbose: bool = False
 ) -> Tune:

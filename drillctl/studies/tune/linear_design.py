@@ -33,7 +33,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from drillctl.arrays import Array
+from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
@@ -403,6 +403,7 @@ class LinearDesign(TunedGains):
         return dict(strict(figures))
 
 
+@own_errstate()
 def linear_design(
     design: Design,
     strings: int = 0,

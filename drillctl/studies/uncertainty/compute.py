@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array
+from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design, parameter
 from drillctl.design.uncertain_tables import SensitivityTable
 from drillctl.ensemble import audit as auditing
@@ -45,6 +45,7 @@ SoFar = Callable[[], Uncertainty | None]
 COPIES = 4  # of what is kept of a lane, that are held at one time at most
 
 
+@own_errstate()
 def uncertainty(
     design: Design,
     axes: tuple[Axis, ...] | None = None,
