@@ -89,9 +89,9 @@ def catalog(json: Json = False, debug: Debug = False) -> None:
     if json:
         console.emit({"components": rows, "grades": GRADES})
         return
-    heads = ["name", "od", "id", "kg/m", "with joints", "inertia x", "stiffness x", "S-135 yield"]
+    heads = ["name", "od", "id", "kg/m", "with joints", "inertia x", "stiffness x", "yield"]
     console.table(
-        "components: in mm; the catalogue's tool joints for S-135 or the highest grade; kN m",
+        "components: mm; with tool joints of the highest grade listed; yield of S-135, kN m",
         heads,
         [
             [

@@ -70,8 +70,8 @@ def test_a_pipe_with_its_joints_weighs_what_is_printed(name, grade, printed):
     ("written", "name"),
     [("4.5 in 16.60 lb/ft", "4 1/2 in 16.6 lb/ft"), ('5-1/2" 21.9#', "5 1/2 in 21.9 lb/ft"),
      ("5 in 19.5 lb/ft", "5 in 19.5 lb/ft"), ('5" heavy weight', "5 in HWDP"),
-     ("6.75 in x 2.8125 in collar", "6 3/4 in x 2 13/16 in collar"), ("6 3/4 in mwd", "6 3/4 in MWD"),
-     ("7 in 30 lb/ft", None), ("pipe", None)],
+     ("6.75 in x 2.8125 in collar", "6 3/4 in x 2 13/16 in collar"),
+     ("6 3/4 in mwd", "6 3/4 in MWD"), ("7 in 30 lb/ft", None), ("pipe", None)],
 )  # fmt: skip
 def test_a_component_is_found_however_it_is_spelt(written, name):
     assert find(written) == name
@@ -109,8 +109,8 @@ def test_tool_joints_are_those_of_a_string_that_resolves_each(rig):
         exact = natural_frequencies(theirs, "wave", 6, held, bisections=40)
         np.testing.assert_allclose(made, exact, rtol=3e-4)
     bare = rig(line + f'length = "{200 * pipe.joint_spacing} m"').string
-    without = natural_frequencies(replace(bare.parts, bit_inertia=300.0), "wave", 6)
-    assert abs(without[1] / natural_frequencies(theirs, "wave", 6, bisections=40)[1] - 1) > 0.02
+    without = natural_frequencies(replace(bare.parts, bit_inertia=300.0), "wave", 6, True)
+    assert without[5] / exact[5] > 1.05  # the joints count
 
 
 def test_joints_by_their_own_numbers_are_those_of_the_catalogue(rig):

@@ -1,8 +1,8 @@
 """The drillstring as torsional finite elements.
 
 `section.py` holds a `Section` and its yield; `catalogue.py` pipes, collars and tools by name, and
-tool joints; `assembly.py` puts sections, top drive and BHA together into M, C and K; `frequencies.py` counts
-natural frequencies.
+tool joints; `assembly.py` puts sections, top drive and BHA together into M, C and K;
+`frequencies.py` counts natural frequencies.
 
 Node 0 is the top drive, the last node the BHA with the bit. Angles are absolute (rad).
 """
