@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
+from drillctl import units
 from drillctl.design.paths import kind_of
 from drillctl.design.tables import DesignTables
 from drillctl.rig.table import Table
@@ -59,7 +60,17 @@ def main() -> None:
 
 def page() -> str:
     """The whole page."""
-    return "\n".join([HEAD, *(_section(name, table) for table, name in tables().items())])
+    return "\n".join([HEAD, _units(), *(_section(name, table) for table, name in tables().items())])
+
+
+def _units() -> str:
+    """Every spelling of a unit, by what is measured."""
+    kinds = {kind.si: kind for kind in vars(units).values() if isinstance(kind, units.Kind)}
+    lines = ["## Units", "", "| quantity | read as |", "|---|---|"]
+    for kind in kinds.values():
+        written = ", ".join(f"`{unit}`" for unit in units.spellings(kind))
+        lines.append(f"| {kind.name} | {written} |")
+    return "\n".join([*lines, ""])
 
 
 def _section(name: str, table: type[Table]) -> str:
@@ -79,8 +90,6 @@ def _values(annotation: Any) -> str:
 
 
 def _default(info: Any, kind: Any) -> str:
-    from drillctl import units
-
     if info.is_required():
         return "required"
     value = info.default

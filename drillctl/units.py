@@ -34,22 +34,27 @@ class Kind:
         SI unit in which values are held.
     examples : tuple of str
         Units in which a value is written for people, the preferred one first.
+    usual : tuple of float
+        Least and largest value (SI) of a rig; what lies outside is probably a slip of the pen.
     """
 
     name: str
     si: str
     examples: tuple[str, ...]
+    usual: tuple[float, float] = (0.0, math.inf)
 
 
-SPEED = Kind("speed", "rad/s", ("rpm", "rev/min", "rad/s", "deg/s"))
-FORCE = Kind("force", "N", ("kN", "N", "klbf", "tf"))
-TORQUE = Kind("torque", "N*m", ("kN*m", "N*m", "klbf*ft"))
-LENGTH = Kind("length", "m", ("m", "ft"))
-DIAMETER = Kind("length", "m", ("mm", "in", "m"))
+SPEED = Kind("speed", "rad/s", ("rpm", "rev/min", "rad/s", "deg/s"), (0.0, 400 * RPM))
+FORCE = Kind("force", "N", ("kN", "N", "klbf", "tf"), (0.0, 1e6))
+TORQUE = Kind("torque", "N*m", ("kN*m", "N*m", "klbf*ft"), (0.0, 150e3))
+LENGTH = Kind("length", "m", ("m", "ft"), (0.05, 15e3))
+DIAMETER = Kind("length", "m", ("mm", "in", "m"), (0.012, 1.0))
 TIME = Kind("time", "s", ("s", "ms", "min"))
 RATE = Kind("rate", "1/s", ("1/s",))
 INERTIA = Kind("inertia", "kg*m^2", ("kg*m^2",))
-DENSITY = Kind("density", "kg/m^3", ("kg/m^3",))
+DENSITY = Kind("density", "kg/m^3", ("kg/m^3",), (700.0, 20e3))
+LINEAR_MASS = Kind("mass per length", "kg/m", ("kg/m", "lb/ft"))
+VISCOSITY = Kind("viscosity", "Pa*s", ("cP", "Pa*s"), (1e-4, 1.0))
 MODULUS = Kind("modulus", "Pa", ("GPa", "Pa", "psi"))
 POLAR_MOMENT = Kind("polar moment of area", "m^4", ("m^4", "in^4"))
 STIFFNESS = Kind("torsional stiffness", "N*m/rad", ("N*m/rad",))
@@ -83,7 +88,9 @@ _KNOWN: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0},
     "1/s": {"1/s": 1.0},
     "kg*m^2": {"kg*m^2": 1.0},
-    "kg/m^3": {"kg/m^3": 1.0},
+    "kg/m^3": {"kg/m^3": 1.0, "g/cm^3": 1e3, "lb/gal": 119.82642731689667},
+    "kg/m": {"kg/m": 1.0, "lb/ft": 1.488163943569554},
+    "Pa*s": {"Pa*s": 1.0, "mPa*s": 1e-3, "cP": 1e-3},
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": 6894.7572931683635},
     "m^4": {"m^4": 1.0, "in^4": 4.1623142559999997e-07},
     "N*m/rad": {"N*m/rad": 1.0},
@@ -94,6 +101,36 @@ _KNOWN: dict[str, dict[str, float]] = {
     "N*m/s": {"N*m/s": 1.0, "kN*m/s": 1e3},
     "N/s": {"N/s": 1.0, "kN/s": 1e3},
 }  # fmt: skip
+
+# How drillers spell them, by what each is in SI; a thousand pounds are never a mass here.
+_SPELLED: dict[str, dict[str, str]] = {
+    "N": {"klb": "klbf", "klbs": "klbf", "kip": "klbf", "t": "tf", "tonf": "tf", "tonnef": "tf"},
+    "N*m": {
+        **dict.fromkeys(("lbf-ft", "ft-lbf", "ft-lb", "ft-lbs", "ft*lbf", "lbf.ft"), "lbf*ft"),
+        **dict.fromkeys(
+            ("klbf-ft", "kft-lbf", "kft-lb", "kft-lbs", "kft*lbf", "klbf.ft", "klb-ft"), "klbf*ft"
+        ),
+        "kNm": "kN*m", "kN-m": "kN*m", "kN.m": "kN*m", "kN m": "kN*m",
+        "Nm": "N*m", "N-m": "N*m", "N.m": "N*m", "N m": "N*m",
+    },
+    "m": {
+        **dict.fromkeys(('"', "\u2033", "\u201d", "''", "inch", "inches", "IN", "in."), "in"),
+        **dict.fromkeys(("'", "\u2032", "\u2019", "feet", "FT", "ft."), "ft"),
+    },
+    "kg/m^3": {"ppg": "lb/gal", "lbm/gal": "lb/gal", "SG": "g/cm^3", "sg": "g/cm^3"},
+    "kg/m": {"ppf": "lb/ft", "lbs/ft": "lb/ft", "lbm/ft": "lb/ft", "lbf/ft": "lb/ft"},
+    "Pa*s": {"cp": "cP", "mPa.s": "mPa*s"},
+}  # fmt: skip
+
+_AMBIGUOUS = {
+    **dict.fromkeys(
+        ("lb", "lbs"), 'pound-force ("lbf") or a mass of 0.4536 kg; thousands are "klbf"'
+    ),
+    **dict.fromkeys(
+        ("ton", "tons"), 'metric ton-force ("tf", 9.807 kN) or short ton-force, 2 klbf (8.896 kN)'
+    ),
+}
+"""Units of two meanings."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _TEXT = re.compile(
@@ -123,6 +160,9 @@ def _factor(unit: str, kind: Kind) -> float:
     """SI value of one `unit`, refused (`InputError`) if it does not measure `kind`."""
     if kind is SPEED and unit not in SPEED.examples:
         raise InputError(f"a speed is given in {_join(SPEED.examples)}, not in {unit!r}")
+    if unit in _AMBIGUOUS:
+        raise InputError(f"{unit!r} has two meanings: {_AMBIGUOUS[unit]}")
+    unit = _SPELLED.get(kind.si, {}).get(unit, unit)
     known = _KNOWN[kind.si].get(unit)
     return _by_pint(unit, kind) if known is None else known
 
@@ -217,7 +257,13 @@ def _bare(number: float, kind: Kind) -> float:
     if not math.isfinite(value):
         raise _no_quantity(value, kind)
     short = f"{value:.15g}"
-    raise InputError(f'{short} has no unit; did you mean "{short} {kind.examples[0]}"?')
+    likely = (
+        unit
+        for unit in kind.examples
+        if kind.usual[0] <= abs(value) * _factor(unit, kind) <= kind.usual[1]
+    )
+    unit = next(likely, kind.examples[0])
+    raise InputError(f'{short} has no unit; did you mean "{short} {unit}"?')
 
 
 def write(value: float, kind: Kind) -> str:
@@ -245,6 +291,11 @@ def write(value: float, kind: Kind) -> str:
             if parse(text, kind) == value:
                 return text
     return f"{value!r} {kind.si}"
+
+
+def spellings(kind: Kind) -> list[str]:
+    """Every unit that a kind is read in without a search, the usual ones first."""
+    return list(dict.fromkeys([*kind.examples, *_KNOWN[kind.si], *_SPELLED.get(kind.si, {})]))
 
 
 System = Literal["si", "field"]  # units people read: rpm, kN, kN m, m; or rpm, klbf, klbf ft, ft

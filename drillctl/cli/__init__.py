@@ -15,6 +15,7 @@ from drillctl.studies.base import Group, studies
 VERBS: dict[str, tuple[Callable[..., None], Group]] = {
     "models": (files.models, "Describe a rig"),
     "designs": (files.designs, "Describe a rig"),
+    "catalog": (files.catalog, "Describe a rig"),
     "new": (files.new, "Describe a rig"),
     "show": (files.show, "Describe a rig"),
     "validate": (files.validate, "Describe a rig"),

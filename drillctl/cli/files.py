@@ -22,6 +22,7 @@ from drillctl.studies.base import Option
 
 if TYPE_CHECKING:
     from drillctl.design import Design
+    from drillctl.rig.drillstring.catalogue import Homogenised
 
 
 def _listed(kind: Literal["models", "designs"], as_json: bool) -> None:
@@ -52,16 +53,64 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
 
     loaded_design = loaded(design, sets)
     if json:
-        mesh = [one.summary() for one in loaded_design.mesh]
-        tree = to_tree(loaded_design.tables) | {"mesh": mesh}
-        console.emit(with_warnings(tree, loaded_design))
+        found = {
+            "mesh": [one.summary() for one in loaded_design.mesh],
+            "tool_joints": {name: vars(one) for name, one in _joints(loaded_design)},
+        }
+        console.emit(with_warnings(to_tree(loaded_design.tables) | found, loaded_design))
     else:
         console.line(to_toml(loaded_design).rstrip())
         console.line("\n# Elements of the sections:")
         for one in loaded_design.mesh:
             count = f"{one.elements} of {one.length:.4g} m, " if one.length > 0.0 else ""
             console.line(f"# {one.name}: {count}{one.said}")
+        for name, factors in _joints(loaded_design):
+            console.line(
+                f"# tool joints of {name}: inertia of the body x {factors.inertia:.4f}, "
+                f"stiffness x {factors.stiffness:.4f}"
+            )
     warn(loaded_design)
+
+
+def _joints(design: Design) -> list[tuple[str, Homogenised]]:
+    """Sections with tool joints, and what these make of the body."""
+    from drillctl.design.parts import joint_factors
+
+    made = ((one.name, joint_factors(one)) for one in design.tables.drillstring.sections)
+    return [(name, factors) for name, factors in made if factors is not None]
+
+
+def catalog(json: Json = False, debug: Debug = False) -> None:
+    """List pipes, collars and tools known by name."""
+    from drillctl.rig.drillstring import GRADES, PIPES
+    from drillctl.rig.drillstring.catalogue import CATALOGUE, summary
+
+    rows = [{"name": name} | summary(pipe) for name, pipe in PIPES.items()]
+    if json:
+        console.emit({"components": rows, "grades": GRADES})
+        return
+    heads = ["name", "od", "id", "kg/m", "with joints", "inertia x", "stiffness x", "yield"]
+    console.table(
+        "components: mm; with tool joints of the highest grade listed; yield of S-135, kN m",
+        heads,
+        [
+            [
+                row["name"], f"{row['outer_diameter'] * 1e3:.1f}",
+                f"{row['inner_diameter'] * 1e3:.1f}", f"{row['mass_per_length']:.1f}",
+                *(
+                    "" if row[key] is None else f"{row[key] * scale:{form}}"
+                    for key, scale, form in (
+                        ("mass_per_length_with_joints", 1.0, ".1f"),
+                        ("inertia_factor", 1.0, ".3f"), ("stiffness_factor", 1.0, ".3f"),
+                        ("yield_torque", 1e-3, ".1f"),
+                    )
+                ),
+            ]
+            for row in rows
+        ],
+    )  # fmt: skip
+    console.line(f"Sources and what was checked of each: {CATALOGUE}")
+    console.line(f"Grades: {', '.join(GRADES)}")
 
 
 def validate(

@@ -18,6 +18,7 @@ _ALTERNATIVES: dict[str, tuple[tuple[tuple[str, ...], ...], ...]] = {
     "drillstring.sections": (
         (("pipe",), ("outer_diameter", "inner_diameter"), ("polar_moment",), ("stiffness",)),
         (("shear_modulus",), ("youngs_modulus", "poisson_ratio")),
+        (("tool_joints",), ("joint_outer_diameter", "joint_inner_diameter", "joint_length")),
     ),
 }
 

@@ -19,6 +19,7 @@ from drillctl.rig.drillstring import (
     assemble,
     polar_moment,
 )
+from drillctl.rig.drillstring.catalogue import HWDP_YIELD, Homogenised, homogenised
 from drillctl.rig.drillstring.mesh import MeshedSection, meshed, what_was_done
 from drillctl.rig.drillstring.section import torsional_yield
 from drillctl.rig.program import STILL, Program, Ramp
@@ -56,20 +57,32 @@ def parts_of(tables: DesignTables) -> Parts:
 
 def mesh(tables: DesignTables, string: Drillstring) -> tuple[MeshedSection, ...]:
     """How many elements each section has, and which pieces were lumped."""
-    names = (s.name for s in tables.drillstring.sections)
+    names = (s.name for s in pieces(tables))
     return what_was_done(string.parts.sections, names, _free(tables))
 
 
 def _free(tables: DesignTables) -> tuple[bool, ...]:
     """Whether the elements of each section are to be chosen."""
-    return tuple(s.elements is None and s.stiffness is None for s in tables.drillstring.sections)
+    return tuple(s.elements is None and s.stiffness is None for s in pieces(tables))
+
+
+def pieces(tables: DesignTables) -> tuple[SectionTable, ...]:
+    """Sections from top to bottom, equal ones with something at their ends one by one."""
+    table = tables.drillstring
+    return tuple(
+        piece
+        if piece.stiffness_damping is not None
+        else piece.model_copy(update={"stiffness_damping": table.stiffness_damping})
+        for one in table.sections
+        for piece in one.pieces
+    )
 
 
 def _parts(tables: DesignTables) -> Parts:
     """Sections as they stand, each of one element where the design does not say how many."""
     table = tables.drillstring
     return Parts(
-        sections=tuple(section(s) for s in table.sections),
+        sections=tuple(section(s) for s in pieces(tables)),
         top_inertia=tables.top_drive.inertia,
         bit_inertia=tables.bha.inertia,
         top_damping=tables.top_drive.damping,
@@ -81,6 +94,7 @@ def _parts(tables: DesignTables) -> Parts:
 
 def section(table: SectionTable) -> Section:
     """The physical section that a table describes; of one element where it does not say."""
+    damping = table.stiffness_damping or 0.0
     if table.stiffness is not None:
         return Section(
             name=table.name,
@@ -88,24 +102,50 @@ def section(table: SectionTable) -> Section:
             stiffness=table.stiffness,
             end_inertia=table.inertia or 0.0,
             coupling_damping=table.damping,
-            stiffness_damping=table.stiffness_damping,
+            stiffness_damping=damping,
             mass_damping=table.mass_damping,
         )
-    assert table.length is not None
-    moment, yield_torque = _cross_section(table)
-    density = STEEL_DENSITY if table.density is None else table.density
+    stiffness, inertia = _body(table)
     return Section(
         name=table.name,
         elements=table.elements or 1,
-        stiffness=shear_modulus(table) * moment / table.length,
-        inertia=density * moment * table.length * table.tool_joint_factor,
-        length=table.length,
+        stiffness=stiffness,
+        inertia=inertia * table.tool_joint_factor,
+        end_inertia=table.inertia or 0.0,
+        length=table.span,
         coupling_damping=table.damping,
-        stiffness_damping=table.stiffness_damping,
+        stiffness_damping=damping,
         mass_damping=table.mass_damping,
-        drag=table.drag * table.length,
-        yield_torque=yield_torque,
+        drag=table.drag * table.span,
+        yield_torque=_yield_torque(table),
     )
+
+
+def _body(table: SectionTable) -> tuple[float, float]:
+    """Stiffness (N m/rad) and inertia (kg m2) of a run of pipe with its tool joints."""
+    tool = PIPES[table.pipe] if table.pipe is not None else None
+    if tool is not None and tool.stiffness:  # as listed: mass and stiffness of no one cross-section
+        share = table.span / tool.length
+        return tool.stiffness / share, tool.inertia * share
+    if table.polar_moment is not None:
+        moment = table.polar_moment
+    else:
+        assert table.diameters is not None
+        moment = polar_moment(*table.diameters)
+    density = STEEL_DENSITY if table.density is None else table.density
+    stiffness = shear_modulus(table) * moment / table.span
+    inertia = density * moment * table.span
+    factors = joint_factors(table)
+    if factors is None:
+        return stiffness, inertia
+    return stiffness * factors.stiffness, inertia * factors.inertia
+
+
+def joint_factors(table: SectionTable) -> Homogenised | None:
+    """What its tool joints make of stiffness and inertia of a section's body; None without."""
+    if not table.joint or table.diameters is None:
+        return None
+    return homogenised(*table.diameters, table.spacing, table.joint)
 
 
 def shear_modulus(table: SectionTable) -> float:
@@ -118,20 +158,14 @@ def shear_modulus(table: SectionTable) -> float:
     return STEEL_SHEAR_MODULUS
 
 
-def _cross_section(table: SectionTable) -> tuple[float, float]:
-    """Polar moment (m^4) and torsional yield (N m), the latter infinite without a grade."""
-    if table.polar_moment is not None:
-        return table.polar_moment, math.inf
-    if table.pipe is not None:
-        outer, inner = PIPES[table.pipe].outer_diameter, PIPES[table.pipe].inner_diameter
-    else:
-        assert table.outer_diameter is not None
-        assert table.inner_diameter is not None
-        outer, inner = table.outer_diameter, table.inner_diameter
-    limit = math.inf
-    if table.grade is not None:
-        limit = torsional_yield(outer, inner, GRADES[table.grade])
-    return polar_moment(outer, inner), limit
+def _yield_torque(table: SectionTable) -> float:
+    """Torsional yield of the body (N m), infinite without a grade."""
+    strength = GRADES[table.grade] if table.grade is not None else math.inf
+    if table.pipe is not None and PIPES[table.pipe].kind == "HWDP":
+        strength = HWDP_YIELD  # its tube is of no grade
+    if table.diameters is None or math.isinf(strength):
+        return math.inf
+    return torsional_yield(*table.diameters, strength)
 
 
 def refuse_impossible_string(tables: DesignTables) -> None:
@@ -140,7 +174,7 @@ def refuse_impossible_string(tables: DesignTables) -> None:
     A node without inertia (its equation of motion would be singular), a section so extreme
     that its stiffness or inertia is no number, or more elements than fit.
     """
-    for table in tables.drillstring.sections:
+    for table in pieces(tables):
         where = f"drillstring.sections.{table.name}"
         try:
             made = section(table)
@@ -150,7 +184,7 @@ def refuse_impossible_string(tables: DesignTables) -> None:
             least = math.inf if table.stiffness is None or name == "stiffness" else -1.0
             if not math.isfinite(value) or (value == 0.0 and least > 0.0):
                 raise InputError(f"its dimensions give a {name} of {value:g}", where)
-    count = sum(section(table).elements for table in tables.drillstring.sections)
+    count = sum(section(table).elements for table in pieces(tables))
     if count > MOST_ELEMENTS:
         raise InputError(
             f"{count} elements in all; allowed are {MOST_ELEMENTS}", "drillstring.sections"
@@ -162,7 +196,7 @@ def refuse_massless_node(tables: DesignTables) -> None:
     """Refuse a node without inertia (`InputError`): its equation of motion would be singular."""
     above = tables.top_drive.inertia
     where = "top_drive.inertia"
-    for section_ in map(section, tables.drillstring.sections):
+    for section_ in map(section, pieces(tables)):
         if above == 0.0 and section_.inertia == 0.0:
             raise InputError("0 leaves a node without inertia; give it more than 0", where)
         above = section_.end_inertia + section_.inertia

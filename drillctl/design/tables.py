@@ -22,7 +22,8 @@ from drillctl.design.uncertain_tables import (
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig import table as q
 from drillctl.rig.bit_rock.law import friction_laws
-from drillctl.rig.drillstring import GRADES, PIPES
+from drillctl.rig.drillstring import GRADES, PIPES, Joint
+from drillctl.rig.drillstring.catalogue import FOOT, find
 from drillctl.rig.table import Table, one_of
 from drillctl.rig.top_drive.ideal import PITable
 from drillctl.rig.top_drive.law import drive_laws
@@ -45,22 +46,36 @@ class OperatingPoint(Table):
     weight_on_bit: q.Weight = 120e3
 
 
+RANGE_2 = 31.0 * FOOT  # length (m) of a joint of pipe where nothing else is given
+JOINT = ("joint_outer_diameter", "joint_inner_diameter", "joint_length")
+
+
 class SectionTable(Table):
-    """A section: a pipe by API name, or geometry, or polar moment, or a lumped spring.
+    """A section: a component by name, or geometry, or polar moment, or a lumped spring.
 
     Without `elements` they are chosen: the first five frequencies of the string, top free and
     held, are those of the exact line to 0.3 %, and short pieces are lumped into neighbours that
-    name no elements either.
+    name no elements either. `pipe` is a name of `drillctl catalog`, sizes spelt in any way; a tool
+    has its length there. `length` is that of one piece, of which there are `repeat`. `inertia` is a
+    point inertia at the lower end of each. Tool joints, one in each `joint_spacing` (a piece, or
+    31 ft), enter by their compliance and inertia: those given, or with `tool_joints` those of the
+    catalogue for this pipe and grade. `tool_joint_factor` multiplies the inertia by hand.
     """
 
     name: str
     elements: q.Count | None = None
     length: q.Length | None = None
+    repeat: q.Count = 1
     pipe: str | None = None
     grade: str | None = None
     outer_diameter: q.Diameter | None = None
     inner_diameter: q.Bore | None = None
     polar_moment: q.PolarMoment | None = None
+    tool_joints: bool = False
+    joint_outer_diameter: q.Diameter | None = None
+    joint_inner_diameter: q.Bore | None = None
+    joint_length: q.Length | None = None
+    joint_spacing: q.Length | None = None
     shear_modulus: q.Modulus | None = None
     youngs_modulus: q.Modulus | None = None
     poisson_ratio: q.Number | None = None
@@ -69,9 +84,63 @@ class SectionTable(Table):
     stiffness: q.Stiffness | None = None
     inertia: q.Inertia | None = None
     damping: q.Damping = 0.0
-    stiffness_damping: q.TimeOrZero = 0.0
+    stiffness_damping: q.TimeOrZero | None = None
     mass_damping: q.Rate = 0.0
     drag: q.Drag = 0.0
+
+    @property
+    def span(self) -> float:
+        """Length of all its pieces (m); 0 for a lumped spring."""
+        return (self.length or 0.0) * self.repeat
+
+    @property
+    def diameters(self) -> tuple[float, float] | None:
+        """Outer and inner diameter of the body (m), where it has them."""
+        if self.pipe is not None:
+            return PIPES[self.pipe].outer_diameter, PIPES[self.pipe].inner_diameter
+        if self.outer_diameter is None or self.inner_diameter is None:
+            return None
+        return self.outer_diameter, self.inner_diameter
+
+    @property
+    def pieces(self) -> tuple[SectionTable, ...]:
+        """Sections of their own: equal pieces with something at their ends, else the one run."""
+        if self.repeat == 1 or (self.stiffness is None and self.inertia is None):
+            return (self,)
+        numbers = range(1, self.repeat + 1)
+        return tuple(
+            self.model_copy(update={"name": f"{self.name} {n}", "repeat": 1}) for n in numbers
+        )
+
+    @property
+    def joint(self) -> tuple[Joint, ...]:
+        """What is thicker than the body in each joint spacing: tool joint and upset."""
+        if self.tool_joints:
+            return PIPES[self.pipe or ""].thick(self.grade)
+        if self.joint_length is None:
+            return ()
+        assert self.joint_outer_diameter is not None
+        assert self.joint_inner_diameter is not None
+        return (Joint(self.joint_outer_diameter, self.joint_inner_diameter, self.joint_length),)
+
+    @property
+    def spacing(self) -> float:
+        """Length of a joint of pipe (m)."""
+        if self.joint_spacing is not None:
+            return self.joint_spacing
+        own = PIPES[self.pipe].joint_spacing if self.pipe else RANGE_2
+        return (self.length or own) if self.repeat > 1 else min(own, self.length or own)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_name(cls, data: Any) -> Any:
+        """The component's own name, and its length where it has one."""
+        name = data.get("pipe") if isinstance(data, dict) else None
+        found = find(name) if isinstance(name, str) else None
+        if found is None:
+            return data
+        length = PIPES[found].length
+        return {**({"length": units.SI(length)} if length else {}), **data, "pipe": found}
 
     @field_validator("pipe")
     @classmethod
@@ -103,16 +172,20 @@ class SectionTable(Table):
             self._only_lumped_keys()
         else:
             self._enough_geometry()
+            self._whole_joints()
+        if len(self.name) and self.repeat > MOST_PIECES:
+            raise InputError(f"repeat {self.repeat} is not allowed: at most {MOST_PIECES}")
         return self
 
     def _only_lumped_keys(self) -> None:
         distributed = (
             "length", "grade", "inner_diameter", "shear_modulus", "youngs_modulus",
-            "poisson_ratio", "density",
+            "poisson_ratio", "density", *JOINT, "joint_spacing",
         )  # fmt: skip
         given = [key for key in distributed if getattr(self, key) is not None]
         given += ["drag"] if self.drag else []
         given += ["tool_joint_factor"] if self.tool_joint_factor != 1.0 else []
+        given += ["tool_joints"] if self.tool_joints else []
         for key in given:
             raise InputError(f"{key} is not allowed with stiffness (a lumped spring)")
         if (self.elements or 1) != 1:
@@ -121,18 +194,12 @@ class SectionTable(Table):
     def _enough_geometry(self) -> None:
         if self.length is None:
             raise InputError('length is missing, e.g. length = "3000 m"')
-        if self.inertia is not None:
-            raise InputError("inertia requires stiffness (a lumped spring)")
         if self.outer_diameter is None and self.inner_diameter is not None:
             raise InputError("inner_diameter requires outer_diameter")
         if self.outer_diameter is not None:
             if self.inner_diameter is None:
                 raise InputError('inner_diameter is missing ("0 mm" for a solid bar)')
-            if self.inner_diameter >= self.outer_diameter:
-                raise InputError(
-                    f"inner_diameter {self.inner_diameter * 1e3:g} mm must be less than "
-                    f"outer_diameter {self.outer_diameter * 1e3:g} mm"
-                )
+            _refuse_thick("", self.outer_diameter, self.inner_diameter)
         if self.grade is not None and self.polar_moment is not None:
             raise InputError("grade needs pipe or outer_diameter, not polar_moment")
         if self.shear_modulus is not None and self.youngs_modulus is not None:
@@ -141,6 +208,37 @@ class SectionTable(Table):
             raise InputError("poisson_ratio requires youngs_modulus")
         if self.poisson_ratio is not None and not -1.0 < self.poisson_ratio < 0.5:
             raise InputError(f"poisson_ratio {self.poisson_ratio:g} must lie between -1 and 0.5")
+
+    def _whole_joints(self) -> None:
+        given = [key for key in JOINT if getattr(self, key) is not None]
+        if given and len(given) < len(JOINT):
+            missing = next(key for key in JOINT if key not in given)
+            raise InputError(f"{missing} is missing: a tool joint has {', '.join(JOINT)}")
+        if self.joint_spacing is not None and not (given or self.tool_joints):
+            raise InputError("joint_spacing is of tool joints: give them, or tool_joints = true")
+        if given and (self.diameters is None or self.tool_joints):
+            other = "tool_joints = true" if self.tool_joints else "polar_moment"
+            raise InputError(f"{given[0]} is not allowed with {other}")
+        if self.tool_joints and (self.pipe is None or not self.joint):
+            raise InputError("tool_joints = true needs a pipe that has some in the catalogue")
+        for one in self.joint:
+            _refuse_thick("joint_", one.outer_diameter, one.inner_diameter)
+        length = sum(one.length for one in self.joint)
+        if self.joint and length >= self.spacing:
+            raise InputError(
+                f"joint_length {length:g} m must be less than joint_spacing {self.spacing:g} m"
+            )
+
+
+MOST_PIECES = 10_000  # equal pieces of a section
+
+
+def _refuse_thick(prefix: str, outer: float, inner: float) -> None:
+    if inner >= outer:
+        raise InputError(
+            f"{prefix}inner_diameter {inner * 1e3:g} mm must be less than "
+            f"{prefix}outer_diameter {outer * 1e3:g} mm"
+        )
 
 
 def refuse_same_names(names: list[str], where: str = "") -> None:
@@ -151,10 +249,14 @@ def refuse_same_names(names: list[str], where: str = "") -> None:
 
 
 class DrillstringTable(Table):
-    """The string: its sections from top to bottom."""
+    """The string: its sections from top to bottom.
+
+    `stiffness_damping`: of every section that gives none of its own.
+    """
 
     mass: Literal["consistent", "lumped"] = "consistent"
     modal_damping: q.NonNegativeNumber = 0.0
+    stiffness_damping: q.TimeOrZero = 0.0
     sections: tuple[SectionTable, ...]
 
     @field_validator("sections")
@@ -163,6 +265,8 @@ class DrillstringTable(Table):
         if not sections:
             raise InputError("a drillstring needs at least one section")
         refuse_same_names([section.name for section in sections])
+        if any(section.repeat > 1 for section in sections):
+            refuse_same_names([piece.name for section in sections for piece in section.pieces])
         return sections
 
 

@@ -271,8 +271,8 @@ def test_axis_of_another_form(text):
         (rig(operating_point='[operating_point]\nspeed = "1.667 Hz"\n'),
          "operating_point.speed: '1.667 Hz': a speed is given in rpm, rev/min, rad/s or deg/s, "
          "not in 'Hz'"),
-        (rig(operating_point='[operating_point]\nweight_on_bit = "14 t"\n'),
-         "operating_point.weight_on_bit: '14 t': 't' is not a unit of force; "
+        (rig(operating_point='[operating_point]\nweight_on_bit = "14 kg"\n'),
+         "operating_point.weight_on_bit: '14 kg': 'kg' is not a unit of force; "
          "use kN, N, klbf or tf"),
         (rig(operating_point='[operating_point]\nweight_on_bit = "140 kNn"\n'),
          "operating_point.weight_on_bit: '140 kNn': 'kNn' is not a known unit; "

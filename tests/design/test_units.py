@@ -65,6 +65,21 @@ def bits(value):
         ("100 N*m", units.INTEGRAL_GAIN, 100.0),
         ("0.2 1/s", units.RATE, 0.2),
         ("0.1 s/rad", units.SLOWNESS, 0.1),
+        ("20 klb", units.FORCE, 20e3 * 4.4482216152605),
+        ("12 t", units.FORCE, 12e3 * 9.80665),
+        ("12 tonf", units.FORCE, 12e3 * 9.80665),
+        ("10 kft-lb", units.TORQUE, 10e3 * 4.4482216152605 * 0.3048),
+        ("10 kft-lbf", units.TORQUE, 10e3 * 4.4482216152605 * 0.3048),
+        ("10 ft-lbf", units.TORQUE, 10 * 4.4482216152605 * 0.3048),
+        ("10 lbf-ft", units.TORQUE, 10 * 4.4482216152605 * 0.3048),
+        ("10 kNm", units.TORQUE, 10e3),
+        ('5 7/8"', units.DIAMETER, 5.875 * 0.0254),
+        ("13360'", units.LENGTH, 13360 * 0.3048),
+        ("10 ppg", units.DENSITY, 10 * 0.45359237 / 0.003785411784),
+        ("1.2 sg", units.DENSITY, 1200.0),
+        ("20 cP", units.VISCOSITY, 0.02),
+        ("16.6 lb/ft", units.LINEAR_MASS, 16.6 * 0.45359237 / 0.3048),
+        ("16.6 ppf", units.LINEAR_MASS, 16.6 * 0.45359237 / 0.3048),
     ],
 )
 def test_text_is_read_in_its_unit(text, kind, si):
@@ -89,6 +104,15 @@ def test_a_mass_is_no_force():
     assert str(caught.value) == "'140 kg': 'kg' is not a unit of force; use kN, N, klbf or tf"
 
 
+@pytest.mark.parametrize(
+    ("text", "meanings"), [("20 lb", ("lbf", "0.4536 kg")), ("12 ton", ("tf", "short ton-force"))]
+)
+def test_a_unit_of_two_meanings_is_refused_with_both(text, meanings):
+    with pytest.raises(InputError, match="two meanings") as caught:
+        units.parse(text, units.FORCE)
+    assert all(meaning in str(caught.value) for meaning in meanings)
+
+
 @pytest.mark.parametrize("text", ["3 furlongz", "3 m**", "3 $", "3 2 m", "-1/2 in", "3 /m", "3 m)"])
 def test_what_is_no_unit_is_refused(text):
     with pytest.raises(InputError, match=r"not a known unit; use m or ft"):
@@ -104,7 +128,9 @@ def test_what_is_no_unit_is_refused(text):
         (140, units.FORCE, '"140 kN"'),
         (0.5, units.TIME, '"0.5 s"'),
         (3000, units.LENGTH, '"3000 m"'),
-        ("4 1/2", units.DIAMETER, '"4.5 mm"'),
+        ("4 1/2", units.DIAMETER, '"4.5 in"'),
+        (5.875, units.DIAMETER, '"5.875 in"'),
+        (127, units.DIAMETER, '"127 mm"'),
         (10, units.TORQUE, '"10 kN*m"'),
         (1234567.25, units.LENGTH, '"1234567.25 m"'),
         (-3, units.LENGTH, '"-3 m"'),

@@ -14,12 +14,11 @@ from matplotlib.figure import Figure as Drawn
 from matplotlib.patches import Polygon, Rectangle
 
 from drillctl.design import Design
-from drillctl.design.parts import section
+from drillctl.design.parts import pieces, section
 from drillctl.design.tables import SectionTable
 from drillctl.plots import style
 from drillctl.reporting.blocks import Block, Figure, Table, Text, Words
 from drillctl.reporting.gather import Gathered
-from drillctl.rig.drillstring import PIPES
 from drillctl.store.tables import NOTHING, number
 
 LUMPED = 0.12  # height of a lumped spring as a share of the drawing
@@ -44,7 +43,7 @@ def rig_drawing(design: Design, words: Words) -> Drawn:
     depth = 0.0
     for number_, part in enumerate(parts):
         _section(ax, part, number_, words)
-        depth += part.table.length or 0.0
+        depth += part.table.span
         if part.table.length:
             shown = words.quantity(depth, "m")
             ax.text(-0.22, part.bottom, shown, ha="right", va="center", fontsize=style.SMALL)
@@ -58,7 +57,7 @@ def rig_drawing(design: Design, words: Words) -> Drawn:
 def _parts(design: Design) -> list[_Part]:
     """Sections between 0 and 1, by length, each high enough for its name."""
     tables = design.tables.drillstring.sections
-    lengths = [table.length or 0.0 for table in tables]
+    lengths = [table.span for table in tables]
     total = sum(lengths) or 1.0
     shares = [max(LEAST, length / total) if length else LUMPED for length in lengths]
     if not any(lengths):
@@ -75,9 +74,7 @@ def _parts(design: Design) -> list[_Part]:
 
 
 def _outer(table: SectionTable) -> float:
-    if table.pipe is not None:
-        return PIPES[table.pipe].outer_diameter
-    return table.outer_diameter or 0.1
+    return table.diameters[0] if table.diameters else 0.1
 
 
 def _section(ax: Axes, part: _Part, order: int, words: Words) -> None:
@@ -93,7 +90,7 @@ def _section(ax: Axes, part: _Part, order: int, words: Words) -> None:
                 alpha=0.35, edgecolor=colour, linewidth=1.4,
             )
         )  # fmt: skip
-        text = f"{table.name}: {words.quantity(table.length, 'm')}"
+        text = f"{table.name}: {words.quantity(table.span, 'm')}"
         if table.pipe is not None:
             text += f", {table.pipe}"
         elif table.outer_diameter is not None:
@@ -130,12 +127,12 @@ def _ends(ax: Axes, design: Design, words: Words) -> None:
 def build(gathered: Gathered) -> tuple[Block, ...]:
     """Drawing, sections, bodies, source."""
     design, words = gathered.design, gathered.words
-    tables = design.tables.drillstring.sections
+    tables = pieces(design.tables)
     rows = tuple(
         (
             table.name, _kind(table),
-            words.quantity(table.length, "m") if table.length else NOTHING,
-            words.diameter(_diameters(table)[0]), words.diameter(_diameters(table)[1]),
+            words.quantity(table.span, "m") if table.span else NOTHING,
+            *(words.diameter(x) for x in table.diameters or (None, None)),
             f"{number(part.stiffness)}", f"{number(part.inertia + part.end_inertia)}",
             made.said if made.lumped_into else str(made.elements),
         )
@@ -173,16 +170,10 @@ def _kind(table: SectionTable) -> str:
     return "diameters" if table.outer_diameter is not None else "polar moment"
 
 
-def _diameters(table: SectionTable) -> tuple[float | None, float | None]:
-    if table.pipe is not None:
-        return PIPES[table.pipe].outer_diameter, PIPES[table.pipe].inner_diameter
-    return table.outer_diameter, table.inner_diameter
-
-
 def _alt(gathered: Gathered) -> str:
     words: Words = gathered.words
     names = [
-        f"{table.name} {words.quantity(table.length, 'm')}" if table.length else table.name
+        f"{table.name} {words.quantity(table.span, 'm')}" if table.length else table.name
         for table in gathered.design.tables.drillstring.sections
     ]
     return f"Drawing of the drillstring from top drive to bit: {', '.join(names)}."

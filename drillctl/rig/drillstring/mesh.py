@@ -139,8 +139,10 @@ def _of_elements(
 
 def _shortest(made: list[tuple[Section, bool]], least: float) -> int | None:
     """Upper of the two neighbours to lump next: the shortest piece with its shorter neighbour."""
-    pairs = [i for i in range(len(made) - 1) if made[i][1] and made[i + 1][1]]
     times = [x.travel_time for x, _ in made]
+    pairs = [i for i in range(len(made) - 1) if made[i][1] and made[i + 1][1]]
+    # An inertia between two pieces goes to the end of both, where that is near.
+    pairs = [i for i in pairs if made[i][0].end_inertia == 0.0 or times[i + 1] < times[i]]
     short = [i for i in pairs if min(times[i], times[i + 1]) < least]
     return min(
         short,
@@ -162,6 +164,7 @@ def _one(upper: Section, lower: Section) -> Section:
         elements=1,
         stiffness=stiffness,
         inertia=inertia,
+        end_inertia=upper.end_inertia + lower.end_inertia,
         length=upper.length + lower.length,
         coupling_damping=sum(
             x.coupling_damping * part**2 for x, part in zip(pieces, share, strict=True)
@@ -171,6 +174,6 @@ def _one(upper: Section, lower: Section) -> Section:
         ),
         mass_damping=sum(x.mass_damping * x.inertia for x in pieces) / inertia,
         drag=upper.drag + lower.drag,
-        yield_torque=upper.yield_torque,
+        yield_torque=min(x.yield_torque for x in pieces),
         lumped=(*longer.lumped, other.name, *other.lumped),
     )

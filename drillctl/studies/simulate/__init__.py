@@ -102,6 +102,11 @@ def _finer_mesh(parts: int, request: Requested) -> Design:
     if parts == 1:
         return design
     counts = {part.name: part.elements for part in design.string.parts.sections}
+    counts |= {  # of equal pieces with something at their ends: of each
+        table.name: counts[table.pieces[0].name]
+        for table in design.tables.drillstring.sections
+        if table.pieces[0].name in counts
+    }
     return design.replace({
         f"drillstring.sections.{table.name}.elements": parts * counts[table.name]
         for table in design.tables.drillstring.sections
