@@ -28,7 +28,7 @@ def exact_j1(design: Design, tolerance: float = TOLERANCE) -> float:
 
 def main() -> None:
     design = drillctl.load(DESIGN)
-    axes = axes_of(design, design.tables.map.axes)
+    axes = axes_of(design)
     j1, moved = {}, {}
     for cell in CELLS:
         one = cell_design(design, axes, cell)

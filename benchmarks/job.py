@@ -104,7 +104,7 @@ def load_job() -> Job:
         The cached values belong to another map.
     """
     design = drillctl.load(DESIGN)
-    axes = axes_of(design, design.tables.map.axes)
+    axes = axes_of(design)
     known = json.loads(EXACT.read_text(encoding="utf-8"))
     same = known["gains"] == gains(design, axes)
     if not same or known["duration"] != design.tables.simulation.duration:

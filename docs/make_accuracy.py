@@ -33,7 +33,7 @@ def map_j1(**simulation: Any) -> tuple[np.ndarray, Scheme]:
     """J1 of all cells of the paper's map, flat, and the scheme it was computed with."""
     values = {f"simulation.{key}": value for key, value in simulation.items()}
     design = drillctl.load(DESIGN, **values)
-    (group,) = groups(design, axes_of(design, design.tables.map.axes))
+    (group,) = groups(design, axes_of(design))
     prepared = prepare(group.telling, design.tables.simulation)
     return run_batch(group.lanes, prepared).measures["j1"], prepared.scheme
 

@@ -12,7 +12,17 @@
 """
 
 from drillctl.design.design import Design
-from drillctl.design.paths import Parameter, parameter, parameters
+from drillctl.design.paths import Parameter, axis_tables, parameter, parameters, tuned_ranges
 from drillctl.design.reading import load, parse_setting, to_toml
 
-__all__ = ["Design", "Parameter", "load", "parameter", "parameters", "parse_setting", "to_toml"]
+__all__ = [
+    "Design",
+    "Parameter",
+    "axis_tables",
+    "load",
+    "parameter",
+    "parameters",
+    "parse_setting",
+    "to_toml",
+    "tuned_ranges",
+]

@@ -31,6 +31,8 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
     changes, drops what belonged to the old one; the drive around a controller and the path of a
     weight law stay.
     """
+    if not path and _changed(base.get("controller", DEFAULT), top.get("controller", {}), "law"):
+        base = _without_gains(base)
     if path == "start" and _changed(base, top, "kind", "turning"):
         return dict(top)
     if _changed(base, top, "law"):
@@ -56,6 +58,27 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
         else:
             merged[key] = value
     return merged
+
+
+DEFAULT = {"law": "pi"}  # of a design that names no controller
+
+
+def _without_gains(base: Tree) -> Tree:
+    """Without axes and bounds of search over gains, which another drive law does not have."""
+    result = dict(base)
+    if any(_is_gain(axis.get("path")) for axis in base.get("map", {}).get("axes", ())):
+        result["map"] = {key: value for key, value in base["map"].items() if key != "axes"}
+    bounds = base.get("tune", {}).get("parameters", {})
+    if any(map(_is_gain, bounds)):
+        left = {path: value for path, value in bounds.items() if not _is_gain(path)}
+        result["tune"] = {**base["tune"], "parameters": left}
+    return result
+
+
+def _is_gain(path: object) -> bool:
+    """Whether a path is that of a number of the law, not of the drive that it acts through."""
+    text = str(path)
+    return text.startswith("controller.") and not text.startswith("controller.drive.")
 
 
 def _changed(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -10,9 +12,10 @@ from pydantic import BeforeValidator
 
 from drillctl import units
 from drillctl.design.design import Design
-from drillctl.design.tables import Table, settings_of_studies
+from drillctl.design.tables import AxisTable, Table, settings_of_studies
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig.table import number
+from drillctl.rig.top_drive.law import drive_laws
 from drillctl.units import Kind
 
 _HIDDEN = (
@@ -166,3 +169,52 @@ def _kind_inside(annotation: Any) -> Kind | None:
         if inner is not None:
             return inner
     return None
+
+
+# What a drive law is tuned by, for this rig.
+
+MAP_POINTS = 41  # of each axis of a map that a design does not describe
+AROUND_THE_SPEED = (0.5, 1.5)  # share of the set speed over which a map runs by default
+
+
+def tuned_ranges(design: Design) -> dict[str, tuple[float, float]]:
+    """Least and largest value (SI) by path of what the drive's law is tuned by on this rig."""
+    table = design.tables.controller
+    ranges = drive_laws()[table.law].ranges(table, design.string)
+    return {
+        f"controller.{key}": (_rounded(low, math.floor), _rounded(high, math.ceil))
+        for key, (low, high) in ranges.items()
+    }
+
+
+def _rounded(value: float, to_whole: Callable[[float], int]) -> float:
+    """To two digits, outwards: an axis ends where a person would end it."""
+    if value == 0.0:
+        return 0.0
+    digit = 10.0 ** (math.floor(math.log10(abs(value))) - 1)
+    # Rounded as a decimal first: 0.05 is not to become 0.049 or 0.051.
+    return float(f"{to_whole(round(value / digit, 9)) * digit:.12g}")
+
+
+def axis_tables(design: Design) -> tuple[AxisTable, ...]:
+    """Axes of a map: those of the design, else two that fit its drive law and its rig."""
+    if design.tables.map.axes:
+        return design.tables.map.axes
+    ranges = itertools.islice(tuned_ranges(design).items(), 2)
+    ends = {path: tuple(_written(design, path, end) for end in pair) for path, pair in ranges}
+    if len(ends) < 2:
+        least, most = AROUND_THE_SPEED
+        speed = design.speed / units.RPM
+        ends["operating_point.speed"] = (
+            f"{_rounded(least * speed, math.floor):g} rpm",
+            f"{_rounded(most * speed, math.ceil):g} rpm",
+        )
+    return tuple(
+        AxisTable(path=path, min=low, max=high, points=MAP_POINTS)
+        for path, (low, high) in ends.items()
+    )
+
+
+def _written(design: Design, path: str, value: float) -> float | str:
+    kind = parameter(design, path).kind
+    return value if kind is None else units.write(value, kind)

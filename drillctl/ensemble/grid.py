@@ -21,7 +21,7 @@ import numpy as np
 
 from drillctl import units
 from drillctl.arrays import Array, Index
-from drillctl.design import Design, parameter
+from drillctl.design import Design, axis_tables, parameter
 from drillctl.design.tables import AxisTable
 from drillctl.errors import InputError
 from drillctl.rig.top_drive.law import tracking
@@ -176,9 +176,10 @@ def axis(design: Design, table: AxisTable) -> Axis:
 
 
 def axes_of(
-    design: Design, tables: tuple[AxisTable, ...], kept: int = len(BATCH_MEASURES)
+    design: Design, tables: tuple[AxisTable, ...] | None = None, kept: int = len(BATCH_MEASURES)
 ) -> tuple[Axis, ...]:
-    """All axes of a grid; see `axis`. `kept`: how many measures are kept of each cell."""
+    """All axes of a grid, by default those of the map; `kept` measures are kept of each cell."""
+    tables = axis_tables(design) if tables is None else tables
     refuse_too_large([table.points for table in tables], kept=kept)
     return tuple(axis(design, table) for table in tables)
 
@@ -414,7 +415,7 @@ def other_axes(
     """Axes of a result where they are not those that its design gives (`own`)."""
     axes = [[axis.path, axis.values.tolist()] for axis in result.axes]
     try:
-        given = own(result.design) if own else axes_of(result.design, result.design.tables.map.axes)
+        given = own(result.design) if own else axes_of(result.design)
     except InputError:  # the default ones do not fit every law
         return {"axes": axes}
     return {} if axes == [[axis.path, axis.values.tolist()] for axis in given] else {"axes": axes}

@@ -242,7 +242,7 @@ def sweep(
     """
     begin = time.perf_counter()
     table, kept = design.tables.map, kept_measures(measures)
-    axes = axes_of(design, table.axes, len(kept)) if axes is None else axes
+    axes = axes_of(design, kept=len(kept)) if axes is None else axes
     refuse_too_large(shape_of(axes), kept=len(kept))
     job = Cells(design, axes, kept)
     blocks = (store or in_memory)("map", job)
@@ -294,7 +294,8 @@ def stability_map(design: Design, **options: Any) -> Sweep:
     Parameters
     ----------
     design : Design
-        By default the map runs over the gains, kp 0-1000 and ki 0-500.
+        Without `[map]` axes the map runs over what its drive law is tuned by, in the ranges that
+        fit the rig.
     **options
         As for `sweep`.
 
@@ -304,7 +305,7 @@ def stability_map(design: Design, **options: Any) -> Sweep:
         The map does not run over exactly two parameters.
     """
     kept = len(kept_measures(options.get("measures")))
-    axes = options.pop("axes", None) or axes_of(design, design.tables.map.axes, kept)
+    axes = options.pop("axes", None) or axes_of(design, kept=kept)
     if len(axes) != 2:
         raise InputError(f"a map runs over 2 parameters, got {len(axes)}; use sweep", "map.axes")
     return sweep(design, axes, **options)

@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 
 import drillctl
 from drillctl import store
-from drillctl.design import Design
+from drillctl.design import Design, axis_tables
 from drillctl.errors import DrillctlError, InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.reporting.blocks import Block, Text, Words, block, figure
@@ -44,13 +44,13 @@ class Profile:
     def applied(self, design: Design) -> Design:
         """The design with map and draws reduced to the limits of the profile."""
         values: dict[str, Any] = {}
-        if self.points is not None and any(a.points > self.points for a in design.tables.map.axes):
+        if self.points is not None and any(a.points > self.points for a in axis_tables(design)):
             values["map.axes"] = [
                 {
                     "path": axis.path, "min": axis.min, "max": axis.max,
                     "points": min(axis.points, self.points),
                 }
-                for axis in design.tables.map.axes
+                for axis in axis_tables(design)
             ]  # fmt: skip
         if self.audited is not None:
             values["map.audit_cells"] = min(self.audited, design.tables.map.audit_cells)
@@ -66,7 +66,7 @@ class Profile:
         """Number of draws within the limits of draws and lanes."""
         table = design.tables.uncertainty
         cells = 1
-        for axis in (*design.tables.map.axes, *table.axes):
+        for axis in (*axis_tables(design), *table.axes):
             cells *= axis.points
         most = max(2, self.lanes // cells)
         if self.realizations is not None:

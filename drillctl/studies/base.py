@@ -265,7 +265,7 @@ def fitting_map(request: Requested) -> str:
     from drillctl.errors import InputError
 
     try:
-        axes_of(request.design, request.design.tables.map.axes)
+        axes_of(request.design)
     except InputError as error:
         return f"its map does not fit this design ({error.problem}); name other axes in [map]"
     return ""
@@ -278,11 +278,12 @@ def mapped_in_batch(request: Requested) -> str:
 
 def over_two_axes(request: Requested) -> str:
     """Why no map over two parameters applies."""
-    reason = fitting_map(request)
-    count = len(request.design.tables.map.axes)
-    if not reason and count != 2:
-        return f"it is shown over two parameters, the map of this design has {count}"
-    return reason
+    from drillctl.design import axis_tables
+
+    if reason := fitting_map(request):
+        return reason
+    count = len(axis_tables(request.design))
+    return "" if count == 2 else f"it is shown over two parameters, this map has {count}"
 
 
 def in_batch(request: Requested) -> str:

@@ -32,7 +32,7 @@ def exact_j1(design: Design, tolerance: float) -> float:
 
 def main() -> None:
     design = drillctl.load(DESIGN)
-    axes = axes_of(design, design.tables.map.axes)
+    axes = axes_of(design)
     count = int(np.prod(shape_of(axes)))
     cells = sorted(np.random.default_rng(SEED).choice(count, CELLS, replace=False).tolist())
     designs = [cell_design(design, axes, cell) for cell in cells]

@@ -12,6 +12,7 @@ from small_report import TINY, TITLE, small_design
 
 import drillctl
 from drillctl.cli import run
+from drillctl.design import axis_tables
 from drillctl.errors import InputError, SimulationError
 from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, gather, making
 from drillctl.reporting import pages as pdf
@@ -232,8 +233,8 @@ def test_a_line_of_cells_and_a_drive_without_gains(tmp_path):
 def test_a_profile_cuts_map_and_draws():
     design = drillctl.load("monteiro-trindade-fig6-10000")
     quick = QUICK.applied(design)
-    assert [axis.points for axis in quick.tables.map.axes] == [21, 21]
-    assert quick.tables.map.axes[0].max == 800
+    assert [axis.points for axis in axis_tables(quick)] == [21, 21]
+    assert axis_tables(quick)[0].max == 800
     assert quick.tables.uncertainty.realizations == 200
     assert quick.tables.map.audit_cells == 4
     standard = STANDARD.applied(design)

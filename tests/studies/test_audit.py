@@ -197,7 +197,7 @@ def test_a_reference_that_fails_is_a_verdict_not_an_exception(design, monkeypatc
 
     monkeypatch.setattr("drillctl.simulation.reference.solve", fail)
     assert np.isnan(list(by_reference(design).values())).all()
-    rig = cell_design(design, axes_of(design, design.tables.map.axes), 4)
+    rig = cell_design(design, axes_of(design), 4)
     found = audited(np.array([4]), {"j1": np.array([5.0])}, [rig])
     assert (found.verdict, found.worst, found.wrong) == ("check", None, [])
     assert found.batch["j1"].tolist() == [5.0]

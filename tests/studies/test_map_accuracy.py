@@ -36,7 +36,7 @@ def map_j1(cells=None, **simulation):
     design = drillctl.load(
         KNOWN["design"], **{f"simulation.{key}": value for key, value in simulation.items()}
     )
-    axes = axes_of(design, design.tables.map.axes)
+    axes = axes_of(design)
     assert [len(axis) for axis in axes] == KNOWN["shape"]
     (group,) = groups(design, axes)
     lanes = group.lanes if cells is None else group.some(CELLS)

@@ -199,7 +199,7 @@ def test_a_job_goes_by_post():
     import pickle
 
     design = small()
-    axes = axes_of(design, design.tables.map.axes)
+    axes = axes_of(design)
     job = Realizations(design, axes, 2012, ("j1", "stuck_time"), None)
     prepared = job.prepared(lambda number, make: make())
     here = prepared.run(3, 2)
@@ -221,7 +221,7 @@ def test_pieces_are_cut_at_blocks():
 
 def test_kept_in_memory_grows():
     design = small()
-    axes = axes_of(design, design.tables.map.axes)
+    axes = axes_of(design)
     job = Realizations(design, axes, 1, ("j1",), None)
     kept = MemoryBlocks(job)
     for first, count in kept.missing(3):
@@ -258,7 +258,7 @@ def test_draws_impossible_at_some_cells_fail_there_alone():
     laws = {A2: {"distribution": "uniform", "min": 0.3, "max": 0.5}}
     design = small(uncertain=laws, **{"map.axes": axes})
     result = uncertainty(design, realizations=8)
-    a1 = design.bit_rock.a1 * axes_of(design, design.tables.map.axes)[1].values
+    a1 = design.bit_rock.a1 * axes_of(design)[1].values
     a2 = design.bit_rock.a2 * result.drawn[A2]
     expected = a2[:, None, None] < a1[None, None, :]
     assert expected.any()

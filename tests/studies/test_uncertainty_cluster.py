@@ -176,7 +176,7 @@ class Completed(list):
 def job(monkeypatch):
     monkeypatch.setattr(distributed, "as_completed", Completed)
     one = design()
-    return Realizations(one, axes_of(one, one.tables.map.axes), 1, ("j1",), None)
+    return Realizations(one, axes_of(one), 1, ("j1",), None)
 
 
 def here():

@@ -66,6 +66,8 @@ def _measures(result: Comparison) -> Table:
 
 
 def _shares(result: Comparison) -> Table:
+    from drillctl.design import axis_tables
+
     maps = any(case.nominal.map is not None for case in result.cases)
     columns = (
         Column("level", "J1 at or under", "s"), Column("case"), Column("draws", hidden=True),
@@ -79,7 +81,7 @@ def _shares(result: Comparison) -> Table:
             share, inside = case.share(level), case.region(level)
             area = (None, None) if inside is None else (inside.cells, inside.area_fraction)
             rows.append([level, case.name, share.hits, share.estimate, *area])
-    over = ", ".join(table.path for table in result.design.tables.map.axes)
+    over = ", ".join(table.path for table in axis_tables(result.design))
     title = "Draws at or under each level of J1 (95 % interval)" + (f"; map over {over}" * maps)
     return Table("shares", title, columns, rows)
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from drillctl import units
 from drillctl.arrays import Array, own_errstate
-from drillctl.design import Design, parameter, to_toml
+from drillctl.design import Design, axis_tables, parameter, to_toml
 from drillctl.ensemble.audit import Audit, audited, choose_cells, kept, unaudited
 from drillctl.ensemble.cases import Estimate, Runs
 from drillctl.ensemble.draws import (
@@ -333,7 +333,7 @@ def compare(
     table, equal = design.tables.uncertainty, design.tables.compare.equal_mean_weight
     refuse_dependent(design)
     refuse_too_large([table.realizations, len(named)], "uncertainty.realizations")
-    axes = design.tables.map.axes if design.tables.compare.maps else None
+    axes = axis_tables(design) if design.tables.compare.maps else None
     if axes:
         refuse_too_large([len(named), *(one.points for one in axes)])
     progress.begin("simulating cases", (table.realizations + cells_of(axes)) * len(named))

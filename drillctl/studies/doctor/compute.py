@@ -412,7 +412,7 @@ def _refused(design: Design, begin: float) -> Doctor:
 def _cells_of(design: Design) -> tuple[tuple[Axis, ...], list[Group]]:
     """The map's axes and groups; of a design that the default map does not fit, itself alone."""
     try:
-        axes = axes_of(design, design.tables.map.axes)
+        axes = axes_of(design)
         return axes, list(groups(design, axes))
     except InputError:
         if "axes" in design.tree.get("map", {}):

@@ -59,7 +59,7 @@ def mapped_loop(design: Design, progress: Progress) -> MappedLoop:
 
 def _map(design: Design, progress: Progress) -> tuple[LoopMap | None, str]:
     try:
-        axes = axes_of(design, design.tables.map.axes)
+        axes = axes_of(design)
     except InputError as error:
         named = "axes" in design.tree.get("map", {})  # the default ones fit no drive without gains
         return None, str(error) if named else ""

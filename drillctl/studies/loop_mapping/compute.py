@@ -121,7 +121,7 @@ def loop_map(
     for name in quantities:
         if name not in QUANTITIES:
             raise InputError(f"no quantity {name!r}; allowed: {', '.join(QUANTITIES)}")
-    axes = axes_of(design, design.tables.map.axes) if axes is None else axes
+    axes = axes_of(design) if axes is None else axes
     shape = shape_of(axes)
     wanted = {"slope", "slope_margin", "deciding_frequency", *quantities}
     values = {name: np.full(int(np.prod(shape)), np.nan) for name in QUANTITIES if name in wanted}

@@ -132,7 +132,7 @@ def check(design: Design) -> None:
     if "axes" in design.tree.get("map", {}):
         from drillctl.ensemble.grid import axes_of
 
-        axes_of(design, design.tables.map.axes)
+        axes_of(design)
 
 
 STUDY = Study(

@@ -122,7 +122,7 @@ def regularisation(
         raise InputError("friction under a weight that moves is not regularised", "weight_on_bit")
     if design.tables.bit_rock.regularised_over is not None:
         raise InputError("is compared with the set-valued law: leave it out", WIDTH_PATH)
-    axes = axes_of(design, design.tables.map.axes) if axes is None else axes
+    axes = axes_of(design) if axes is None else axes
     reference = sweep(design, axes, audit_cells=0, progress=progress)
     ordered = np.array(sorted(widths, reverse=True))
     smoothed = [

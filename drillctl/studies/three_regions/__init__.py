@@ -42,9 +42,10 @@ MEANINGS = {
 
 def computed(design: Design, run: Run) -> ThreeRegions:
     """The regions over the two axes of the map."""
+    from drillctl.design import axis_tables
     from drillctl.studies.three_regions.compute import three_regions
 
-    count = len(design.tables.map.axes)
+    count = len(axis_tables(design))
     if count != 2:
         raise InputError(f"regions are shown over 2 parameters, got {count}", "map.axes")
     return three_regions(design, progress=run.progress)

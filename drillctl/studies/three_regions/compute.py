@@ -279,7 +279,7 @@ def three_regions(
     level = PAPER_LEVEL if level is None else float(level)
     if not (np.isfinite(level) and level > 0.0):
         raise InputError(f"{level:g} must be positive and finite", "level")
-    axes = axes_of(design, design.tables.map.axes) if axes is None else axes
+    axes = axes_of(design) if axes is None else axes
     swept = sweep(design, axes, audit_cells=0, progress=progress)
     cells = swept.j1.size
     fields = {name: np.full(cells, np.nan) for name in FIELDS if name != "j1"}

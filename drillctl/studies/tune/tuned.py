@@ -17,7 +17,7 @@ import numpy as np
 
 from drillctl import units
 from drillctl.arrays import Array
-from drillctl.design import Design, parameter, to_toml
+from drillctl.design import Design, parameter, to_toml, tuned_ranges
 from drillctl.ensemble.parameters import Draws
 from drillctl.errors import InputError, nearest
 from drillctl.rig.drillstring import Drillstring
@@ -80,12 +80,9 @@ def _read(design: Design, path: str, entry: RangeTable) -> Tuned:
 
 
 def _defaults(design: Design) -> tuple[Tuned, ...]:
-    table = design.tables.controller
-    law = drive_laws()[table.law]
-    bounds = law.ranges(table, design.string)
     return tuple(
-        Tuned(f"controller.{key}", parameter(design, f"controller.{key}").si_unit, low, high)
-        for key, (low, high) in bounds.items()
+        Tuned(path, parameter(design, path).si_unit, low, high)
+        for path, (low, high) in tuned_ranges(design).items()
     )
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from drillctl import units
 from drillctl.arrays import Array, Index, Mask
-from drillctl.design import Design
+from drillctl.design import Design, axis_tables
 from drillctl.design.uncertain_tables import UntilTable
 from drillctl.ensemble.audit import Audit, choose_cells, unaudited
 from drillctl.ensemble.cases import CONFIDENCE, Interval
@@ -490,7 +490,7 @@ class Uncertainty(Result, kind="uncertainty"):
 
 def map_axes(design: Design) -> tuple[Axis, ...]:
     """Axes of the map under uncertainty: those of `[map]`, then those of `[uncertainty]`."""
-    tables = (*design.tables.map.axes, *design.tables.uncertainty.axes)
+    tables = (*axis_tables(design), *design.tables.uncertainty.axes)
     paths = [table.path for table in tables]
     for path in paths:
         if paths.count(path) > 1:
