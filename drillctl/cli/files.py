@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -162,6 +163,7 @@ def _report(design: Design, given: dict[str, Any], common: Common) -> None:
             formats=given["format"] or ["html"],
             system=common.units,
             progress=bar,
+            processes=os.cpu_count() or 1,
         )
     for problem in result.problems:
         console.note(f"warning: {problem}")
