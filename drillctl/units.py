@@ -118,7 +118,7 @@ _SPELLED: dict[str, dict[str, str]] = {
         **dict.fromkeys(("'", "\u2032", "\u2019", "feet", "FT", "ft."), "ft"),
     },
     "kg/m^3": {"ppg": "lb/gal", "lbm/gal": "lb/gal", "SG": "g/cm^3", "sg": "g/cm^3"},
-    "kg/m": {"ppf": "lb/ft", "lbs/ft": "lb/ft", "lbm/ft": "lb/ft", "lbf/ft": "lb/ft"},
+    "kg/m": dict.fromkeys(("#", "#/ft", "ppf", "lbs/ft", "lbm/ft", "lbf/ft"), "lb/ft"),
     "Pa*s": {"cp": "cP", "mPa.s": "mPa*s"},
 }  # fmt: skip
 
@@ -223,6 +223,12 @@ def parse(value: object, kind: Kind) -> float:
         return number * _factor(match["unit"], kind)
     except InputError as error:
         raise InputError(f"{shown(value)}: {error.problem}") from None
+
+
+def bare(text: str) -> bool:
+    """Whether a text is a number without a unit."""
+    match = _TEXT.match(text)
+    return match is not None and not match["unit"]
 
 
 def _no_quantity(value: object, kind: Kind) -> InputError:

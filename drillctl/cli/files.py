@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -18,6 +20,7 @@ from drillctl.cli.options import (
     warn,
     with_warnings,
 )
+from drillctl.errors import InputError
 from drillctl.studies.base import Option
 
 if TYPE_CHECKING:
@@ -132,12 +135,41 @@ def validate(
 
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name or path of the new file.")],
+    tally: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Take the string from a CSV or .xlsx tally.")
+    ] = None,
+    begins: Annotated[
+        str | None,
+        typer.Option("--from", metavar="top|bit", help="End that the tally's first line is at."),
+    ] = None,
+    like: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Begin with a shipped model or design.")
+    ] = None,
     debug: Debug = False,
 ) -> None:
     """Write a commented design file to start from."""
-    from drillctl.design.reading import write_starter
+    from drillctl.design.reading import load, write_starter
+    from drillctl.design.tally import read
 
-    console.line(f"written: {write_starter(name)}")
+    if tally is None:
+        if begins is not None:
+            raise InputError("is of a --tally, and there is none", "--from")
+        console.line(f"written: {write_starter(name, like=like)}")
+        return
+    if like is not None:
+        raise InputError("is not allowed with --tally: add the tally to the new file", "--like")
+    made = read(tally, begins, Path(), "--from")
+    path = write_starter(name, made)
+    console.table(f"columns of {tally}", ["column", "read as", "unit"], list(made.columns))
+    for note in made.notes:
+        console.line(note)
+    design = load(path)
+    sections = design.tables.drillstring.sections
+    console.line(
+        f"{len(sections)} sections from the top, {sections[0].name}, to {sections[-1].name}, "
+        f"{sum(one.span for one in sections):.1f} m in all"
+    )
+    console.line(f"written: {path}")
 
 
 OPTIONS = (
@@ -162,6 +194,7 @@ def _report(design: Design, given: dict[str, Any], common: Common) -> None:
             formats=given["format"] or ["html"],
             system=common.units,
             progress=bar,
+            processes=os.cpu_count() or 1,
         )
     for problem in result.problems:
         console.note(f"warning: {problem}")

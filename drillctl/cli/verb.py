@@ -86,7 +86,10 @@ def _write(study: Study, result: Any, folder: RunFolder, common: Common) -> None
 
 def draw(figure: Figure, path: Path) -> None:
     """Write a figure atomically."""
+    from drillctl.plots.style import lay_out
+
     part = path.with_suffix(".part")
+    lay_out(figure, DPI)
     figure.savefig(part, dpi=DPI, format="png")
     part.replace(path)
 

@@ -5,6 +5,8 @@ Designs out: the resolved design as TOML that reads back to the same object.
 
 from __future__ import annotations
 
+import json
+import re
 import tomllib
 from contextlib import suppress
 from pathlib import Path
@@ -15,6 +17,7 @@ from drillctl.design.design import Design
 from drillctl.design.merging import Tree, overlay, with_values
 from drillctl.design.paths import kind_of
 from drillctl.design.tables import Table
+from drillctl.design.tally import Tally, with_tally
 from drillctl.design.uncertain_tables import with_samples
 from drillctl.design.validation import validated
 from drillctl.errors import InputError, shown
@@ -42,8 +45,10 @@ def load(name_or_path: str | Path, **values: Any) -> Design:
     """
     path = catalog.find(str(name_or_path))
     tree = _merged(path, seen=())
+    if "drillstring.tally" in values:
+        tree = _without_sections(tree)
     try:
-        tree = with_samples(with_values(tree, values), Path())
+        tree = with_tally(with_samples(with_values(tree, values), Path()), Path())
     except InputError as error:
         raise error.within(str(path)) from None
     return Design(path.stem, validated(tree, str(path)), tree, str(path))
@@ -53,6 +58,9 @@ def _merged(path: Path, seen: tuple[Path, ...]) -> Tree:
     """Contents of a file laid over those of the model it names."""
     try:
         tree = with_samples(_read(path), path.parent)
+        string = tree.get("drillstring")
+        whole = isinstance(string, dict) and "tally" in string
+        tree = with_tally(tree, path.parent)
     except InputError as error:
         raise (error if error.where.startswith(str(path)) else error.within(str(path))) from None
     model = tree.pop("model", None)
@@ -69,10 +77,19 @@ def _merged(path: Path, seen: tuple[Path, ...]) -> Tree:
     if below in (*seen, path.resolve()):
         raise InputError(f"{model!r} leads back to this file", f"{path}: model")
     base = _merged(below, (*seen, path.resolve()))
+    if whole:  # a tally is a string of its own
+        base = _without_sections(base)
     try:
         return overlay(base, tree)
     except InputError as error:
         raise error.within(str(path)) from None
+
+
+def _without_sections(tree: Tree) -> Tree:
+    string = tree.get("drillstring")
+    if not isinstance(string, dict):
+        return tree
+    return {**tree, "drillstring": {key: string[key] for key in string if key != "sections"}}
 
 
 def _model_path(model: str, design: Path) -> Path:
@@ -165,19 +182,48 @@ def _plain(value: Any, kind: units.Kind | None) -> Any:
     return value
 
 
-def write_starter(name: str) -> Path:
-    """Write a commented file to start one's own rig from."""
+def write_starter(name: str, tally: Tally | None = None, like: str | None = None) -> Path:
+    """Write a commented file to start one's own rig from: with its tally, or like a shipped one."""
     path = Path(name)
     if not path.name or not name.isprintable():
         raise InputError(f"{shown(name)} is not a file name")
     path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
+    source = Path(__file__).with_name("starter.toml") if like is None else catalog.find(like)
+    text = source.read_text(encoding="utf-8")
+    if tally is not None:
+        text = _BLOCK.sub(lambda _: _with_lines(tally), text)
+        text = _BODY.sub(
+            '[bha]\ninertia = "0 kg*m^2"              # all of it is in the tally\n', text
+        )
+        text = _BODY.sub(
+            '[bha]\ninertia = "0 kg*m^2"              # all of it is in the tally\n', text
+        )
     title = path.stem.replace("\\", "").replace('"', "")
-    text = Path(__file__).with_name("starter.toml").read_text(encoding="utf-8")
+    text = re.sub(r'^title = ".*"$', lambda _: f'title = "{title}"', text, count=1, flags=re.M)
     try:
         with path.open("x", encoding="utf-8") as stream:
-            stream.write(text.replace("{name}", title))
+            stream.write(re.sub("^# string: (begin|end)\n", "", text, flags=re.M))
     except FileExistsError:
         raise InputError("exists already; it is not overwritten", str(path)) from None
     except OSError as error:
         raise InputError(f"cannot be written: {error.strerror}", str(path)) from None
     return path
+
+
+_BLOCK = re.compile("^# string: begin\n.*^# string: end\n", flags=re.M | re.S)
+_BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
+_BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
+_DAMPING = re.compile("^# Typical internal damping.*?^stiffness_damping.*?\n", flags=re.M | re.S)
+
+
+def _with_lines(tally: Tally) -> str:
+    """The string of a new file: the tally as it came, with the usual damping and its reason."""
+    starter = Path(__file__).with_name("starter.toml").read_text(encoding="utf-8")
+    damping = _DAMPING.search(starter)
+    assert damping is not None
+    plain = "'''" not in tally.text
+    quoted = f"'''\n{tally.text}'''" if plain else json.dumps(tally.text)
+    return (
+        "# The tally as it came; [[drillstring.sections]] with a name of it changes that section.\n"
+        f'[drillstring]\n{damping[0]}tally_from = "{tally.begins}"\ntally = {quoted}\n'
+    )

@@ -251,12 +251,16 @@ def refuse_same_names(names: list[str], where: str = "") -> None:
 class DrillstringTable(Table):
     """The string: its sections from top to bottom.
 
-    `stiffness_damping`: of every section that gives none of its own.
+    `stiffness_damping`: of every section that gives none of its own. `tally`: a file (CSV or .xlsx)
+    or its lines, which are read into sections; those under `sections` are laid over them by name.
+    `tally_from`: which end its first line is at.
     """
 
     mass: Literal["consistent", "lumped"] = "consistent"
     modal_damping: q.NonNegativeNumber = 0.0
     stiffness_damping: q.TimeOrZero = 0.0
+    tally: str | None = None
+    tally_from: Literal["top", "bit"] | None = None
     sections: tuple[SectionTable, ...]
 
     @field_validator("sections")

@@ -131,6 +131,15 @@ def figure(width: float = 7.0, height: float = 4.5) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def lay_out(figure: Figure, dpi: float) -> None:
+    """Lay out a figure for good: each file of it would else take another draw for that alone."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        figure.set_dpi(dpi)
+        engine.execute(figure)
+        figure.set_layout_engine(None)
+
+
 def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.5) -> tuple[Figure, Axes]:
     """The axes given and their figure, or new ones."""
     if ax is None:

@@ -59,7 +59,8 @@ class Figure:
     name: str  # of its files
     caption: str  # what it shows
     alt: str  # text alternative
-    draw: Callable[[], Drawn] = field(repr=False, compare=False)  # makes the figure
+    # makes the figure, in any process: to be pickled
+    draw: Callable[[], Drawn] = field(repr=False, compare=False)
     # studies that it shows: the file is reused while they are unchanged
     of: tuple[str, ...] = ()
     paper: bool = False  # whether it needs a light background, like maps with dark contours
@@ -108,12 +109,9 @@ class Document:
     left_out: tuple[tuple[str, str], ...]  # titles of omitted sections, with reasons
 
 
-def figure(picture: Picture, name: str, system: units.System) -> Figure:
+def figure(picture: Picture, name: str, draw: Callable[[], Drawn]) -> Figure:
     """A picture of a study as a block of a report."""
-    return Figure(
-        picture.name, picture.caption, picture.alt, lambda: picture.draw(system), (name,),
-        picture.paper,
-    )  # fmt: skip
+    return Figure(picture.name, picture.caption, picture.alt, draw, (name,), picture.paper)
 
 
 def block(table: Results, system: units.System) -> Table:

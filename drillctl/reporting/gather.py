@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import drillctl
 from drillctl import store
@@ -20,6 +20,11 @@ from drillctl.store.json_files import read_json
 from drillctl.store.result import Result
 from drillctl.studies.base import Check, Recipe, Requested, Run, studies
 from drillctl.studies.base import Study as Kind
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from drillctl import units
 
 
 @dataclass(frozen=True)
@@ -142,13 +147,27 @@ class Study:
     @cached_property
     def result(self) -> Any:
         """The whole result, read back."""
-        return store.open(self.folder)
+        return opened(self.folder, self.key)
 
     @property
     def key(self) -> str:
         """Identifies the run: identity, count of draws."""
         about = read_json(self.folder / "run.json")
         return f"{about['identity']}{about.get('count', '')}"
+
+
+@lru_cache(4)
+def opened(folder: Path, key: str) -> Any:
+    """A result on disk; `key` says which it is."""
+    return store.open(folder)
+
+
+def drawn(pictures: Any, folder: Path, key: str, name: str, system: units.System) -> Figure:
+    """A picture of a result on disk, one of those that a study makes of it."""
+    found: Figure = next(
+        one.draw(system) for one in pictures(opened(folder, key)) if one.name == name
+    )
+    return found
 
 
 class Shown(NamedTuple):
@@ -190,7 +209,11 @@ class Gathered:
             return Shown(tuple(map(Text, recipe.says(study.summary))), (), ())
         result, system = study.result, self.words.system
         said = tuple(Text(remark) for remark in kind.remarks(result, system))
-        pictures = [(one.name, figure(one, name, system), True) for one in kind.pictures(result)]
+        draw = partial(drawn, kind.pictures, study.folder, study.key, system=system)
+        pictures = [
+            (one.name, figure(one, name, partial(draw, name=one.name)), True)
+            for one in kind.pictures(result)
+        ]
         tables = [(one.name, block(one, system), one.shown) for one in kind.tables(result)]
         return Shown(said, tuple(kind.checks(result)), (*pictures, *tables))
 

@@ -25,7 +25,7 @@ from drillctl.reporting.gather import (
     gather,
 )
 from drillctl.reporting.pages import html_page, markdown_page, printed
-from drillctl.reporting.pictures import FigureFiles
+from drillctl.reporting.pictures import FigureFiles, drawing_helpers
 from drillctl.reporting.sections import SECTIONS
 from drillctl.reporting.sections.summary import summary as verdict_summary
 from drillctl.reporting.sections.summary import verdict
@@ -169,6 +169,7 @@ def report(
     formats: Iterable[str] = ("html",),
     system: units.System = "field",
     progress: Progress = SILENT,
+    processes: int = 1,
 ) -> Report:
     """Write the report of a design; finished studies in its folder are read, not run again.
 
@@ -191,6 +192,9 @@ def report(
         Units of tables and pictures.
     progress : Progress
         Receives tasks and finished parts.
+    processes : int
+        How many draw the pictures. More than this one import its main module again: a script
+        that asks for them does its work below `if __name__ == "__main__"`.
 
     Returns
     -------
@@ -212,12 +216,13 @@ def report(
     run = store.claim("report", design, folder, profile=spent.name)
     words = Words(system)
     studies = studies_of(wanted)
-    gathered = gather(design, spent, run.path / "studies", studies, words, progress)
-    interrupted = any(one.why == INTERRUPTED for one in gathered.studies.values())
-    progress.begin("writing the report", 1)
-    document = compose(gathered, wanted, title)
-    files = FigureFiles(run.path / "figures", gathered)
-    problems = (*gathered.problems, *files.collect(document))
+    with drawing_helpers(processes - 1) as helpers:
+        gathered = gather(design, spent, run.path / "studies", studies, words, progress)
+        interrupted = any(one.why == INTERRUPTED for one in gathered.studies.values())
+        progress.begin("writing the report", 1)
+        document = compose(gathered, wanted, title)
+        files = FigureFiles(run.path / "figures", gathered)
+        problems = (*gathered.problems, *files.collect(document, helpers))
     document = replace(document, problems=problems)
     written, unwritten = write(document, files, run.path, kinds)
     if not written:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
+import signal
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl.errors import DrillctlError, InputError
-from drillctl.plots.style import axes_or_new, default_look
+from drillctl.plots.style import axes_or_new, default_look, lay_out
 from drillctl.reporting.blocks import Document, Figure, InteractiveMap
 from drillctl.reporting.gather import Gathered
 from drillctl.store.json_files import read_json, write_json, write_text
@@ -54,7 +59,6 @@ class FigureFiles:
     def __init__(self, folder: Path, gathered: Gathered) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder, self._gathered = folder, gathered
-        self._problems: list[str] = []
         self._index: dict[str, Any] = {}
         if (folder / INDEX).is_file():
             try:
@@ -62,59 +66,99 @@ class FigureFiles:
             except InputError:  # an unreadable index: draw all figures again
                 self._index = {}
 
-    def collect(self, document: Document) -> tuple[str, ...]:
+    def collect(self, document: Document, helpers: Executor | None = None) -> tuple[str, ...]:
         """Draw the missing figures of a document; return the errors."""
-        for section in document.sections:
-            for block in section.blocks:
-                if isinstance(block, Figure):
-                    self.picture(block)
-                elif isinstance(block, InteractiveMap):
-                    self.picture(block.figure)
-        return tuple(self._problems)
+        blocks = (block for section in document.sections for block in section.blocks)
+        figures = [b.figure if isinstance(b, InteractiveMap) else b for b in blocks]
+        missing = [b for b in figures if isinstance(b, Figure) and self._held(b) is None]
+        return tuple(self._draw_all(missing, helpers))
 
     def picture(self, figure: Figure) -> Picture:
         """The file of a figure, drawn if it is missing."""
-        key = self._gathered.key(figure.of)
-        held = self._index.get(figure.name, {})
+        return self._held(figure) or _draw(self._folder, replace(figure, draw=_blank))
+
+    def _held(self, figure: Figure) -> Picture | None:
+        about = self._index.get(figure.name, {})
         there = all((self._folder / f"{figure.name}.{kind}").is_file() for kind in ("svg", "png"))
-        if held.get("key") == key and there:
-            return self._made(figure.name, held)
-        try:
-            made = self._draw(figure)
-        except (DrillctlError, ArithmeticError, ValueError, LookupError) as error:
-            self._problems.append(f"Figure {figure.name} could not be drawn: {error}")
-            return self._draw(replace(figure, draw=_blank))
+        if not there or about.get("key") != self._gathered.key(figure.of):
+            return None
+        box = tuple(about["box"])
+        return Picture(figure.name, about["width"], about["height"], box, self._folder)
+
+    def _draw_all(self, figures: list[Figure], helpers: Executor | None) -> Iterator[str]:
+        """Draw figures, this process from the first on and helpers from the last; the errors."""
+        asked: list[Future[Picture | str]] = [Future() for _ in figures]
+        if helpers is not None:
+            asked = [helpers.submit(_draw_or_say, self._folder, one) for one in figures[::-1]][::-1]
+        others = []
+        for figure, one in zip(figures, asked, strict=True):
+            if one.cancel():  # no helper has begun it
+                yield from self._kept(figure, _draw_or_say(self._folder, figure))
+            else:
+                others.append((figure, one))
+        for figure, one in others:
+            yield from self._kept(figure, one.result())
+
+    def _kept(self, figure: Figure, made: Picture | str) -> Iterator[str]:
+        if isinstance(made, str):
+            yield f"Figure {figure.name} could not be drawn: {made}"
+            return
         about = {k: v for k, v in asdict(made).items() if k not in ("name", "folder")}
-        self._index[figure.name] = about | {"key": key}
+        self._index[figure.name] = about | {"key": self._gathered.key(figure.of)}
         write_json(self._folder / INDEX, self._index)
-        return made
 
-    def _made(self, name: str, held: dict[str, Any]) -> Picture:
-        return Picture(name, held["width"], held["height"], tuple(held["box"]), self._folder)
 
-    def _draw(self, figure: Figure) -> Picture:
-        # A fixed salt: the same figure gives the same file.
-        with default_look({"svg.hashsalt": figure.name, "svg.fonttype": "path"}):
-            return self._saved(figure)
+@contextmanager
+def drawing_helpers(count: int) -> Iterator[Executor | None]:
+    """Other processes that draw, started at once: they load while this one computes."""
+    if count < 1:
+        yield None
+        return
+    # A fork would not be safe with the threads of the engines.
+    with ProcessPoolExecutor(count, get_context("spawn"), _left_alone) as helpers:
+        helpers.submit(int)
+        try:
+            yield helpers
+        finally:
+            helpers.shutdown(cancel_futures=True)
 
-    def _saved(self, figure: Figure) -> Picture:
-        drawn = figure.draw()
-        for ax in drawn.axes:
-            for crowd in ax.collections:
-                crowd.set_rasterized(crowd.get_rasterized() or len(crowd.get_paths()) > MOST_SHAPES)
-        svg = self._folder / f"{figure.name}.svg"
-        part = svg.with_suffix(".part")
-        drawn.savefig(part, format="svg", dpi=DPI, metadata={"Date": None})
-        write_text(svg, _small(part.read_text(encoding="utf-8")))
-        part.unlink(missing_ok=True)
-        place = drawn.axes[0].get_position()
-        drawn.set_layout_engine("none")  # laid out already
-        drawn.savefig(part, format="png", dpi=DPI)
-        part.replace(svg.with_suffix(".png"))
-        width, height = (72.0 * float(inches) for inches in drawn.get_size_inches())
-        left, up = float(place.x0), 1.0 - float(place.y1)
-        box = (left, up, float(place.width), float(place.height))
-        return Picture(figure.name, width, height, box, self._folder)
+
+def _left_alone() -> None:
+    """An interruption is for the process that asks."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _draw_or_say(folder: Path, figure: Figure) -> Picture | str:
+    try:
+        return _draw(folder, figure)
+    except (DrillctlError, ArithmeticError, ValueError, LookupError) as error:
+        return str(error)
+
+
+def _draw(folder: Path, figure: Figure) -> Picture:
+    # A fixed salt: the same figure gives the same file.
+    with default_look({"svg.hashsalt": figure.name, "svg.fonttype": "path"}):
+        return _saved(folder, figure)
+
+
+def _saved(folder: Path, figure: Figure) -> Picture:
+    drawn = figure.draw()
+    for ax in drawn.axes:
+        for crowd in ax.collections:
+            crowd.set_rasterized(crowd.get_rasterized() or len(crowd.get_paths()) > MOST_SHAPES)
+    lay_out(drawn, DPI)
+    svg = folder / f"{figure.name}.svg"
+    part = svg.with_suffix(".part")
+    drawn.savefig(part, format="svg", dpi=DPI, metadata={"Date": None})
+    write_text(svg, _small(part.read_text(encoding="utf-8")))
+    part.unlink(missing_ok=True)
+    place = drawn.axes[0].get_position()
+    drawn.savefig(part, format="png", dpi=DPI)
+    part.replace(svg.with_suffix(".png"))
+    width, height = (72.0 * float(inches) for inches in drawn.get_size_inches())
+    left, up = float(place.x0), 1.0 - float(place.y1)
+    box = (left, up, float(place.width), float(place.height))
+    return Picture(figure.name, width, height, box, folder)
 
 
 def _blank() -> Drawn:

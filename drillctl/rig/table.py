@@ -174,6 +174,10 @@ class Table(BaseModel):
     # A table inside another is never validated alone: half of the validators need not be built.
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Table:
+        """Itself, as it is frozen: a default is handed to each of thousands of draws."""
+        return self
+
 
 def law_name(table: type[Table]) -> str:
     """The law that a table is of: the one word that its `law` allows."""

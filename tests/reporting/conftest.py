@@ -13,7 +13,7 @@ from drillctl.reporting import Report
 def small(tmp_path_factory: pytest.TempPathFactory) -> Report:
     """Its report as HTML and Markdown."""
     folder = tmp_path_factory.mktemp("report") / "small"
-    return drillctl.report(small_design(), folder, TINY, formats=("html", "md"))
+    return drillctl.report(small_design(), folder, TINY, formats=("html", "md"), processes=2)
 
 
 @pytest.fixture(scope="session")

@@ -69,7 +69,7 @@ def test_saved_studies_and_pictures_are_read_not_done_again(small, monkeypatch):
 
     monkeypatch.setattr("drillctl.store.result.Result.write", refuse)
     monkeypatch.setattr("drillctl.reporting.cells.traced", refuse)
-    monkeypatch.setattr("drillctl.reporting.pictures.FigureFiles._draw", refuse)
+    monkeypatch.setattr("drillctl.reporting.pictures._draw", refuse)
     before = small.files["html"].read_text(encoding="utf-8")
     again = drillctl.report(small_design(), small.folder, TINY, formats=("html", "md"))
     assert again.content == small.content

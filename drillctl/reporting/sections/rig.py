@@ -6,6 +6,7 @@ The rig: a drawing by depth and tables of its parts; the glossary.
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -150,7 +151,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     blocks: list[Block] = [
         Figure(
             "rig", "The rig: sections by depth; widths are not to scale.",
-            _alt(gathered), lambda: rig_drawing(design, words),
+            _alt(gathered), partial(rig_drawing, design, words),
         ),
         Table("sections", "Sections from top to bottom", heads, rows),
         Table("bodies", "Bodies at the ends", ("body", "inertia (kg m²)",

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from drillctl import plots
 from drillctl.design import parameter, to_toml
 from drillctl.provenance import provenance
 from drillctl.reporting.blocks import Block, Checks, Code, Figure, Table, Words
-from drillctl.reporting.gather import Gathered, NotThereError, Study
+from drillctl.reporting.gather import Gathered, NotThereError, Study, opened
 from drillctl.simulation.measures import MEASURES, Measure
 from drillctl.store.tables import NOTHING, number, percent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawn
 
 NAMES = {"simulate": "current", "best": "best of the map", "bad": "a bad cell"}
 SHOWN = (
@@ -38,10 +43,14 @@ def build_responses(gathered: Gathered) -> tuple[Block, ...]:
         "Speeds of bit and top drive at the current, the best and a bad setting, in this order; "
         "grey: bit at rest.",
         _alt(runs),
-        lambda: plots.time_response([one.result for one in runs.values()], paths=paths),
+        partial(_drawn, [(one.folder, one.key) for one in runs.values()], paths),
         tuple(runs),
     )
     return figure, table
+
+
+def _drawn(runs: list[tuple[Path, str]], paths: list[str]) -> Drawn:
+    return plots.time_response([opened(*one) for one in runs], paths=paths)
 
 
 def _value(study: Study, one: Measure, words: Words) -> str:

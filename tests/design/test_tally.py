@@ -1,0 +1,212 @@
+"""Tallies of drillers become strings: what is read, numbered, concluded, refused."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import drillctl
+from drillctl.design.tally import read
+from drillctl.errors import InputError
+
+HEADS = "Component,No. of joints,Length (m),O.D.,I.D.,Weight [lb/ft],TJ OD,TJ ID,TJ length,Grade"
+LINES = f'''{HEADS},Cum. length
+Bit,1,0.3,8 1/2 in,,,,,,,0.3
+Bit sub,1,0.5,171 mm,71 mm,,,,,,0.8
+Near bit stab,1,1.2,6 3/4 in,2 13/16 in,,,,,,2.0
+Motor,1,7.2,171 mm,90 mm,,,,,,9.2
+Sub,1,0.4,171 mm,71.4 mm,,,,,,9.6
+Filter,1,0.4,6.75 in,71.4 mm,,,,,,10.0
+MWD,1,8.5,171 mm,100 mm,,,,,,18.5
+Collar,9,9.1,6 3/4 in,,100.5,,,,4145H,
+HWDP,6,9.3,"5""",3 in,49.3 lb/ft,6 5/8 in,3 1/16 in,48 in,,
+Jar,1,9.6,165 mm,70 mm,,,,,,
+HWDP,12,9.3,5 in,3 in,49.3,6 5/8 in,3 1/16 in,48 in,,
+Drill pipe,120,31 ft,5 in,4.276 in,19.5,6 5/8 in,2 3/4 in,21 in,S-135,
+Drill pipe,300,31',127 mm,108.6 mm,19.5,6 5/8 in,2 3/4 in,21 in,G105,
+'''
+"""Like those of public simulators: cells with their own units, lines of one name, short pieces."""
+
+INCH, FOOT = 0.0254, 0.3048
+# From the top: pieces, length, outer and inner diameter, tool joint (length, outer, inner); in m.
+STRING = [
+    (300, 31 * FOOT, 0.127, 0.1086, (21 * INCH, 6.625 * INCH, 2.75 * INCH)),
+    (120, 31 * FOOT, 0.127, 4.276 * INCH, (21 * INCH, 6.625 * INCH, 2.75 * INCH)),
+    (12, 9.3, 0.127, 3 * INCH, (48 * INCH, 6.625 * INCH, 3.0625 * INCH)),
+    (1, 9.6, 0.165, 0.07, None),
+    (6, 9.3, 0.127, 3 * INCH, (48 * INCH, 6.625 * INCH, 3.0625 * INCH)),
+    (9, 9.1, 6.75 * INCH, 0.0716727, None),
+    (1, 8.5, 0.171, 0.1, None),
+    (1, 0.4, 6.75 * INCH, 0.0714, None),
+    (1, 0.4, 0.171, 0.0714, None),
+    (1, 7.2, 0.171, 0.09, None),
+    (1, 1.2, 6.75 * INCH, 2.8125 * INCH, None),
+    (1, 0.5, 0.171, 0.071, None),
+    (1, 0.3, 8.5 * INCH, 0.0, None),
+]
+
+
+def torque_at_the_bit(omega):
+    """Of a string held at the top, per torque there: transfer matrices, each joint resolved."""
+    angle, torque = np.zeros_like(omega), np.ones_like(omega)
+    for count, length, outer, inner, joint in STRING:
+        pieces = [(length - (joint[0] if joint else 0.0), outer, inner)]
+        pieces += [joint] if joint else []
+        for _ in range(count):
+            for run, od, bore in pieces:
+                moment = np.pi / 32 * (od**4 - bore**4)
+                phase = omega * run / np.sqrt(79.3e9 / 7850.0)
+                zeta = omega * moment * np.sqrt(79.3e9 * 7850.0)
+                angle, torque = (
+                    np.cos(phase) * angle + np.sin(phase) / zeta * torque,
+                    np.cos(phase) * torque - zeta * np.sin(phase) * angle,
+                )
+    return torque
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("tally")
+    (place / "tally.csv").write_text(LINES, encoding="utf-8")
+    return place
+
+
+@pytest.fixture(scope="module")
+def new(folder):
+    """`drillctl new` with this tally: what it says, and what it wrote."""
+    words = ("new", "my-rig", "--tally", "tally.csv", "--from", "bit")
+    done = subprocess.run(
+        [sys.executable, "-m", "drillctl", *words],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout, drillctl.load(folder / "my-rig.toml")
+
+
+def test_frequencies_are_those_of_transfer_matrices_without_any_editing(new):
+    _, design = new
+    computed = [mode.frequency_hz for mode in drillctl.modes(design).fixed_top[:5]]
+    omega = np.linspace(0.05, 12.0, 240)
+    values = torque_at_the_bit(omega)
+    exact = [
+        brentq(torque_at_the_bit, low, high, xtol=1e-5) / (2 * np.pi)
+        for low, high, a, b in zip(omega, omega[1:], values, values[1:], strict=False)
+        if a * b < 0.0
+    ]
+    np.testing.assert_allclose(computed, exact[:5], rtol=3e-3)
+
+
+def test_how_each_column_was_read_is_told(new):
+    said, design = new
+    for head, field in (("O.D.", "od"), ("TJ length", "joint length"), ("Cum. length", "not used")):
+        assert any(head in line and field in line for line in said.splitlines())
+    assert "line 9, Collar: no inner diameter: 71.7 mm by its weight" in said
+    assert "'HWDP' once more: called 'HWDP 2'" in said
+    names = [section.name for section in design.tables.drillstring.sections]
+    assert (names[0], names[1], names[-1]) == ("Drill pipe", "Drill pipe 2", "Bit")
+    assert design.tables.bha.inertia == 0.0
+
+
+def test_what_is_written_carries_damping_with_its_reason(new, folder):
+    _, design = new
+    text = (folder / "my-rig.toml").read_text(encoding="utf-8")
+    assert "# Typical internal damping" in text
+    assert {x.stiffness_damping for x in design.string.parts.sections} == {1e-3}
+    invented = [line for line in text.splitlines() if line.endswith('kg*m^2"') or "a1 =" in line]
+    assert all("typical" in line for line in invented)
+
+
+@pytest.mark.parametrize(
+    ("lines", "same"),
+    [
+        ("name;count;length [m];OD [mm];ID [mm]\np;2;9,5;127;108,6\n", "delimiter and comma"),
+        ("name,count,length,od,id\n,,m,mm,mm\np,2,9.5,127,108.6\n", "units in a row"),
+        (
+            "Item\tQty\tLength_m\tBody OD, mm\tBore mm\np\t2 jts\t9.5\t127\t108.6\n",
+            "units as words",
+        ),
+        ("#,Component,Total length (m),OD (mm),ID (mm),No\n1,p,19,127,108.6,2\n", "total length"),
+        (
+            "name,quantity,length per joint (m),OD,ID\np,2,9.5 m,127 mm,108.6 mm\nTotal,,19,,\n",
+            "sum",
+        ),
+    ],
+)
+def test_ways_of_writing_the_same(tmp_path, lines, same):
+    (section,) = read(lines, "top", tmp_path).sections
+    made = drillctl.load(
+        "monteiro-trindade-2012", **{"drillstring.tally": lines, "drillstring.tally_from": "top"}
+    ).string.parts.sections[0]
+    assert section["name"] == "p", same
+    assert made.length == pytest.approx(19.0)
+    assert made.stiffness == pytest.approx(79.3e9 * np.pi / 32 * (0.127**4 - 0.1086**4) / 19.0)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ("name,length,OD,ID\np,9 m,5,4 in\n", r"line 2, column 'OD': 5 has no unit.*5 in"),
+        ("name,length [m],OD [in],ID [in]\np,9,5,5.5\n", r"line 2.*must be less than"),
+        ("name,length [m],OD [in],ID [in]\np,x,5,4\n", r"line 2, column 'length \[m\]'"),
+        ('name,length [ft],OD [in],ID [in]\np,"13,360",5,4\n', "13360 or 13.360"),
+        ("name,length [m],OD [in],ID [in],count\np,9,5,4,some\n", "not a number of pieces"),
+        ("name,length [m],bore [in]\np,9,4\n", r"line 1: no column is the od"),
+        ("name,length [m],OD [in],diameter [in],ID [in]\np,9,5,5,4\n", "both read as od"),
+        ("name,length [m],OD [in],ID [in]\np,9,5,-\n", "no inner diameter"),
+        (
+            "name,length [m],OD [in],ID [in]\nbit,0.3,8.5,0\np,9,5,4\n",
+            "first line.*begin at the top",
+        ),
+    ],
+)
+def test_what_cannot_be_read_is_named_by_line_and_column(tmp_path, lines, message):
+    path = tmp_path / "tally.csv"
+    path.write_text(lines, encoding="utf-8")
+    with pytest.raises(InputError, match=message) as caught:
+        read(str(path), "top", tmp_path)
+    assert str(path) in str(caught.value)
+
+
+def test_the_end_it_begins_at_is_told_never_guessed(folder):
+    with pytest.raises(InputError, match=r'tally_from: is missing.*"top" or at the "bit"'):
+        read("tally.csv", None, folder)
+
+
+def test_a_workbook_is_read_like_its_lines(tmp_path, folder):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (("name", "length [m]", "OD [in]", "ID [in]"), ("p", 9.5, "4 1/2", 3.826)):
+        book.active.append(row)
+    book.save(tmp_path / "tally.xlsx")
+    (section,) = read("tally.xlsx", "top", tmp_path).sections
+    assert section == {
+        "name": "p", "length": "9.5 m", "outer_diameter": "4 1/2 in", "inner_diameter": "3.826 in",
+    }  # fmt: skip
+
+
+def test_a_section_of_the_design_is_laid_over_that_of_its_tally(folder):
+    path = folder / "laid.toml"
+    path.write_text(
+        'schema = 1\nmodel = "monteiro-trindade-2012"\n[drillstring]\ntally = "tally.csv"\n'
+        'tally_from = "bit"\n[[drillstring.sections]]\nname = "Jar"\ninertia = "2 kg*m^2"\n',
+        encoding="utf-8",
+    )
+    sections = drillctl.load(path).tables.drillstring.sections
+    assert len(sections) == 13  # those of the model are gone
+    assert {x.name: x.inertia for x in sections if x.inertia} == {"Jar": 2.0}
+
+
+@pytest.mark.parametrize("name", ["typical-land", "typical-offshore", "typical-slim"])
+def test_a_new_rig_like_a_typical_one(name, tmp_path, monkeypatch):
+    from drillctl.design.reading import write_starter
+
+    monkeypatch.chdir(tmp_path)
+    mine, model = drillctl.load(write_starter("mine", like=name)), drillctl.load(name)
+    assert mine.tables.title == "mine"
+    assert mine.string.parts == model.string.parts
+    assert model.tables.status == "typical"
+    assert not model.warnings
