@@ -24,7 +24,13 @@ that names a model.
 
 A key with a unit takes text with any unit of the same kind. Gains may be bare numbers. Sections of
 a design and of its model are merged by name. A table whose `law` changes drops the numbers of the
-old law; `controller.drive` and `weight_on_bit.path` are kept.
+old law, and of a drive law also the axes of the map and the bounds of `tune` over them;
+`controller.drive` and `weight_on_bit.path` are kept. `tune.parameters` of a design replace those of
+its model.
+
+Without `map.axes` a map runs over the two numbers that the drive law is tuned by, in ranges that
+follow from pipe and drive (a PI: kp to 6 zeta, ki to 1.5 w_s^2 J_d); over one and the set speed
+where the law has one. `tune` searches the same ranges by default.
 """
 
 

@@ -22,6 +22,9 @@ _ALTERNATIVES: dict[str, tuple[tuple[tuple[str, ...], ...], ...]] = {
     ),
 }
 
+WHOLE = ("tune.parameters",)
+"""Tables that say what there is to do: the upper layer's stands in place of the lower one's."""
+
 
 def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
     """Return `base` with `top` laid over it.
@@ -29,7 +32,7 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
     Tables merge key by key, sections by name (a new name is added at the bottom). A table
     whose `law` changes, a start whose `kind` or an uncertain parameter whose `distribution`
     changes, drops what belonged to the old one; the drive around a controller and the path of a
-    weight law stay.
+    weight law stay. What is tuned is that of the upper layer alone.
     """
     if not path and _changed(base.get("controller", DEFAULT), top.get("controller", {}), "law"):
         base = _without_gains(base)
@@ -53,6 +56,8 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
         below = merged.get(key)
         if place == "drillstring.sections" and isinstance(value, list):
             merged[key] = _overlay_sections(below, value)
+        elif place in WHOLE:
+            merged[key] = value
         elif isinstance(value, Mapping) and isinstance(below, Mapping):
             merged[key] = overlay(dict(below), value, place)
         else:

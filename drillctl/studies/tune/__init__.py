@@ -208,7 +208,8 @@ def checks(result: Tune) -> Iterator[Check]:
 
 
 def notes(result: Tune) -> Iterator[str]:
-    """Where the two engines disagree."""
+    """Gains at an end of their range; where the two engines disagree."""
+    yield from result.on_bounds
     yield from doubted(result.certificate.audit)
 
 

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from drillctl import units
 from drillctl.arrays import Array, own_errstate
-from drillctl.design import Design, load, parameter
+from drillctl.design import Design, load, parameter, tuned_ranges
 from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
@@ -80,7 +81,31 @@ class Tune(Result, kind="tune"):
         best = max(run, key=lambda one: one.runs.hits if one.runs else 0, default=None)
         if best is None or best.runs is None or best.runs.hits <= self.certificate.runs.hits:
             return ""
-        return f" (the baseline {best.name!r} has {best.runs.probability:.4f} at the same)"
+        reaches = best.runs.interval[0] >= self.certificate.required
+        said = f"{best.name!r} {'meets it with' if reaches else 'has'} {best.runs.probability:.4f}"
+        return f" (the baseline {said} at the same draws)"
+
+    @property
+    def on_bounds(self) -> tuple[str, ...]:
+        """Where the search ended at an end of its range, and how far another may go, in words."""
+        rig = tuned_ranges(self.design)
+        texts = []
+        for one, value in zip(self.tuning.tuned, self.tuning.values, strict=True):
+            near = ON_BOUND * (one.high - one.low)
+            least, most = rig.get(one.path, (0.0, 0.0))
+            if one.high - value <= near:
+                end, further = one.high, max(2.0 * one.high - one.low, most)
+            elif value - one.low <= near and one.low > least:
+                end, further = one.low, least
+            else:
+                continue
+            if not _allowed(self.design, one.path, further):
+                continue
+            texts.append(
+                f"{one.path} = {value:.6g} lies at the end of its range, {end:.6g}: better values "
+                f"may lie beyond; search as far as {further:.6g} with [tune.parameters]"
+            )
+        return tuple(texts)
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI: of the search, with `certificate` and `baselines`."""
@@ -88,6 +113,7 @@ class Tune(Result, kind="tune"):
         result["message"] = self.message
         return result | {
             "passed": self.passed,
+            "on_bounds": list(self.on_bounds),
             "search_message": self.tuning.message,
             "certificate": self.certificate.summary(),
             "baselines": {one.name: one.summary() for one in self.baselines},
@@ -98,6 +124,15 @@ class Tune(Result, kind="tune"):
         """Whether a grid was gone through as well."""
         grid = any(one.name == "exhaustive grid" for one in self.baselines)
         return self.design, {"exhaustive": True} if grid else {}
+
+
+def _allowed(design: Design, path: str, value: float) -> bool:
+    """Whether a design may hold a value (SI): shares end at 1, and most numbers at 0."""
+    try:
+        design.replace({path: units.SI(value)})
+    except InputError:
+        return False
+    return True
 
 
 @own_errstate()
@@ -153,6 +188,7 @@ OTHER_LAWS = {"soft torque": "soft-torque", "Z-torque": "z-torque", "stiff speed
 ANY_OTHER = {"soft-torque": "stiff-speed", "z-torque": "stiff-speed", "stiff-speed": "soft-torque"}
 """A law to change to on the way, which drops the numbers that a law has already."""
 POINTS = 41  # along each axis of a grid
+ON_BOUND = 0.01  # share of a range within which a tuned value counts as lying at its end
 MOST_AXES = 2  # of a grid that is gone through
 
 

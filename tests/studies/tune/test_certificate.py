@@ -17,6 +17,7 @@ from drillctl.reporting.blocks import Checks, Figure, Table, Text, Words
 from drillctl.reporting.gather import Gathered, NotThereError, Study
 from drillctl.reporting.sections import SECTIONS
 from drillctl.store.json_files import strict
+from drillctl.studies.tune import notes
 from drillctl.studies.tune.certificate import (
     HALVINGS,
     LOOKED_AT,
@@ -328,7 +329,25 @@ def test_a_better_baseline_is_told_where_no_gains_reach_the_level(found):
     certificate = dataclasses.replace(found.certificate, runs=FreshRuns(j1, 90.0, 33.0))
     message = dataclasses.replace(found, certificate=certificate).message
     best = max(found.baselines, key=lambda one: one.runs.hits)
-    assert f"the baseline {best.name!r} has {best.runs.probability:.4f}" in message
+    reaches = "meets it with" if best.runs.interval[0] >= certificate.required else "has"
+    assert f"the baseline {best.name!r} {reaches} {best.runs.probability:.4f}" in message
+
+
+def test_values_at_the_end_of_their_range_are_reported_with_a_wider_one(found):
+    assert found.on_bounds == ()
+
+    def at(*values):
+        return dataclasses.replace(
+            found, tuning=dataclasses.replace(found.tuning, values=np.array(values))
+        )
+
+    (kp,) = at(799.0, 100.0).on_bounds
+    assert "controller.kp = 799 lies at the end of its range, 800" in kp
+    assert "as far as 1800 with" in kp  # what the rig suggests
+    (low,) = at(401.0, 0.0).on_bounds  # less than 0 is no gain
+    assert "controller.kp = 401" in low
+    assert "as far as 0 with" in low
+    assert list(notes(at(799.0, 199.0)))[:2] == list(at(799.0, 199.0).on_bounds)
 
 
 @pytest.mark.slow
