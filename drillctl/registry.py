@@ -17,6 +17,7 @@ FRICTION_LAWS = (
     "drillctl.rig.bit_rock.tabulated",
     "drillctl.rig.bit_rock.tucker_wang",
     "drillctl.rig.bit_rock.stribeck",
+    "drillctl.rig.bit_rock.aggressiveness",
 )
 """Each module holds `LAWS`, a tuple of `drillctl.rig.bit_rock.law.FrictionLaw`."""
 

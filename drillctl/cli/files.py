@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -63,6 +64,8 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
         console.emit(with_warnings(to_tree(loaded_design.tables) | found, loaded_design))
     else:
         console.line(to_toml(loaded_design).rstrip())
+        for text in _rock(loaded_design):
+            console.line(text)
         console.line("\n# Elements of the sections:")
         for one in loaded_design.mesh:
             count = f"{one.elements} of {one.length:.4g} m, " if one.length > 0.0 else ""
@@ -73,6 +76,26 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
                 f"stiffness x {factors.stiffness:.4f}"
             )
     warn(loaded_design)
+
+
+def _rock(design: Design) -> Iterator[str]:
+    """The rock as coefficients and in drillers' numbers."""
+    from drillctl.rig.bit_rock import NavarroLopezSuarez
+    from drillctl.rig.bit_rock.aggressiveness import EXAMPLE_BIT, drillers_numbers
+    from drillctl.units import RPM
+
+    law, own = design.bit_rock, getattr(design.tables.bit_rock, "bit_diameter", None)
+    whose = "" if own else " (an example: the design gives no size)"
+    if not isinstance(law, NavarroLopezSuarez) or not (law.a2 > 0.0 and law.beta > 0.0):
+        return
+    size = EXAMPLE_BIT if own is None else own
+    numbers = drillers_numbers(law, size)
+    yield f"\n# Rock: a1 = {law.a1:.4g} m, a2 = {law.a2:.4g} m, beta = {law.beta:.4g} s/rad"
+    yield (
+        f"# as a bit of {size * 1e3:.4g} mm{whose}: aggressiveness "
+        f"{numbers.aggressiveness:.4g}, high-speed ratio "
+        f"{numbers.high_speed_ratio:.4g}, speed scale {numbers.speed_scale / RPM:.4g} rpm"
+    )
 
 
 def _joints(design: Design) -> list[tuple[str, Homogenised]]:

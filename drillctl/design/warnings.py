@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from drillctl.design.tables import DesignTables
 from drillctl.rig.bit_rock import BitRockLaw
+from drillctl.rig.bit_rock.law import friction_laws
 from drillctl.rig.drillstring import Parts
 from drillctl.rig.drillstring.mesh import off_the_line
 
@@ -47,6 +48,7 @@ def warnings_of(
     """Every warning of a design, of the weight (N) at rest of the bit."""
     fall = float(rock.steepest_fall(tables.operating_point.weight_on_bit))
     found = (
+        _assumed_rock(tables),
         _weak_drive(tables, rock.static_torque(at_rest)),
         _undamped(parts) if fall > 0.0 else None,
         _light_bit(parts, fall),
@@ -54,6 +56,14 @@ def warnings_of(
         _step(tables),
     )
     return tuple(one for one in found if one is not None)
+
+
+def _assumed_rock(tables: DesignTables) -> DesignWarning | None:
+    """A rock whose numbers nobody has measured."""
+    remark = friction_laws()[tables.bit_rock.law].remark(tables.bit_rock)
+    if not remark:
+        return None
+    return DesignWarning(remark, "bit_rock.aggressiveness", "3 T / (W D) of a measured torque T")
 
 
 def _weak_drive(tables: DesignTables, static: float) -> DesignWarning | None:

@@ -310,16 +310,20 @@ def uncertain_parameters(design: Design) -> tuple[Uncertain, ...]:
 
 
 def _defaults(design: Design) -> dict[str, DistributionTable]:
-    law = design.tables.bit_rock.law
-    keys = friction_laws()[law].draws
-    if not keys:
+    rock = design.tables.bit_rock
+    law = friction_laws()[rock.law]
+    spread = law.spread(rock) or dict.fromkeys(law.draws, DEFAULT_COV)
+    if not spread:
         raise InputError(
-            f"nothing is named uncertain, and there is no default for the friction law {law!r}; "
+            f"nothing is named uncertain, and there is no default for the friction law "
+            f"{rock.law!r}; "
             'give a table such as [uncertain."operating_point.weight_on_bit"]',
             "uncertain",
         )
-    table = DistributionTable(distribution="lognormal", cov=DEFAULT_COV)
-    return dict.fromkeys([f"bit_rock.{key}" for key in keys], table)
+    return {
+        f"bit_rock.{key}": DistributionTable(distribution="lognormal", cov=cov)
+        for key, cov in spread.items()
+    }
 
 
 def _read(design: Design, path: str, table: DistributionTable) -> Uncertain:

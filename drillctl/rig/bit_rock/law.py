@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Protocol
@@ -68,6 +68,10 @@ class FrictionLaw:
     # law of the table, the weight on bit (N), and whether that moves while the bit drills
     make: Callable[[Any, float, bool], BitRockLaw]
     draws: tuple[str, ...] = ()  # keys of sliding and static torque: uncertain by default
+    # of the table: standard deviation over mean by key, where it is not the usual one of `draws`
+    spread: Callable[[Any], Mapping[str, float]] = lambda table: {}
+    # of the table: what every result must say of its numbers
+    remark: Callable[[Any], str] = lambda table: ""
     forms: tuple[Form, ...] = ()  # that are its own
     # smooth law in place of another one, of a table with `regularised_over`
     regularised: Callable[[Any, Any], BitRockLaw] | None = None
