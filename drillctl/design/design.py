@@ -110,12 +110,12 @@ class Design:
     @cached_property
     def top_drive(self) -> TopDriveLaw:
         """Top-drive law."""
-        return top_drive(self.tables.controller, lambda: self.string)
+        return top_drive(parts.controller_of(self.tables), lambda: self.string)
 
     @cached_property
     def linear_drive(self) -> TopDriveLaw:
         """Top-drive law within its limits, which is what a linear loop is closed with."""
-        table = self.tables.controller
+        table = parts.controller_of(self.tables)
         free = table.drive.unlimited
         if free == table.drive:
             return self.top_drive

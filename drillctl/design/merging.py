@@ -15,6 +15,9 @@ Tree = dict[str, Any]
 # replaces the others.
 _ALTERNATIVES: dict[str, tuple[tuple[tuple[str, ...], ...], ...]] = {
     "bit_rock": ((("table",), ("a1", "a2", "beta")),),
+    "top_drive": (
+        (("inertia",), ("motor_inertia", "gear_ratio", "motors", "gearbox_inertia", "efficiency")),
+    ),
     "drillstring.sections": (
         (("pipe",), ("outer_diameter", "inner_diameter"), ("polar_moment",), ("stiffness",)),
         (("shear_modulus",), ("youngs_modulus", "poisson_ratio")),

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
+from drillctl import units
 from drillctl.design.tables import DesignTables, SectionTable
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import BitRockLaw
@@ -24,6 +26,7 @@ from drillctl.rig.drillstring.mesh import MeshedSection, meshed, what_was_done
 from drillctl.rig.drillstring.section import torsional_yield
 from drillctl.rig.program import STILL, Program, Ramp
 from drillctl.rig.top_drive.ideal import ConstantTorqueTable
+from drillctl.rig.top_drive.law import DriveTable
 from drillctl.rig.weight_on_bit.law import HEAVIEST, WeightLaw, weight_laws
 
 STEEL_SHEAR_MODULUS = 79.3e9  # shear modulus (Pa) where a design gives none: drill-pipe steel
@@ -83,7 +86,7 @@ def _parts(tables: DesignTables) -> Parts:
     table = tables.drillstring
     return Parts(
         sections=tuple(section(s) for s in pieces(tables)),
-        top_inertia=tables.top_drive.inertia,
+        top_inertia=tables.top_drive.at_pipe,
         bit_inertia=tables.bha.inertia,
         top_damping=tables.top_drive.damping,
         bit_damping=tables.bha.damping,
@@ -194,7 +197,7 @@ def refuse_impossible_string(tables: DesignTables) -> None:
 
 def refuse_massless_node(tables: DesignTables) -> None:
     """Refuse a node without inertia (`InputError`): its equation of motion would be singular."""
-    above = tables.top_drive.inertia
+    above = tables.top_drive.at_pipe
     where = "top_drive.inertia"
     for section_ in map(section, pieces(tables)):
         if above == 0.0 and section_.inertia == 0.0:
@@ -310,9 +313,27 @@ def program(tables: DesignTables) -> Program:
     return Program(speed, weight, scenario.bit_rock.until)
 
 
+def drive_of(tables: DesignTables) -> DriveTable:
+    """What makes the drive real, within the limits of its motors."""
+    drive: DriveTable = tables.controller.drive
+    return tables.top_drive.limits.within(drive)
+
+
+def controller_of(tables: DesignTables) -> Any:
+    """The table of the controller with this drive."""
+    return tables.controller.model_copy(update={"drive": drive_of(tables)})
+
+
 def refuse_weak_drive(tables: DesignTables, string: Drillstring, torque: float) -> None:
     """Refuse a drive that cannot hold its set speed."""
-    drive, speed = tables.controller.drive, tables.operating_point.speed
+    drive, speed = drive_of(tables), tables.operating_point.speed
+    fastest = drive.maximum_speed
+    if fastest is not None and speed > fastest:
+        raise InputError(
+            f"{speed / units.RPM:.4g} rpm is beyond the {fastest / units.RPM:.4g} rpm that the "
+            "drive turns at most",
+            "operating_point.speed",
+        )
     if isinstance(tables.controller, ConstantTorqueTable):  # holds no speed
         return
     needed = torque + float(string.ground_damping.sum()) * speed
@@ -324,5 +345,7 @@ def refuse_weak_drive(tables: DesignTables, string: Drillstring, torque: float) 
             raise InputError(
                 f"gives {limit / 1e3:.4g} kN*m at the set speed, less than the "
                 f"{needed / 1e3:.4g} kN*m that rock and drag take there",
-                f"controller.drive.{key}",
+                f"controller.drive.{key}"
+                if getattr(drive, key) == getattr(tables.controller.drive, key)
+                else "top_drive",
             )

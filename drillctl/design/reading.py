@@ -198,6 +198,9 @@ def write_starter(name: str, tally: Tally | None = None, like: str | None = None
         text = _BODY.sub(
             '[bha]\ninertia = "0 kg*m^2"              # all of it is in the tally\n', text
         )
+        text = _BODY.sub(
+            '[bha]\ninertia = "0 kg*m^2"              # all of it is in the tally\n', text
+        )
     title = path.stem.replace("\\", "").replace('"', "")
     text = re.sub(r'^title = ".*"$', lambda _: f'title = "{title}"', text, count=1, flags=re.M)
     try:
@@ -211,6 +214,7 @@ def write_starter(name: str, tally: Tally | None = None, like: str | None = None
 
 
 _BLOCK = re.compile("^# string: begin\n.*^# string: end\n", flags=re.M | re.S)
+_BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
 _BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
 _BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
 _DAMPING = re.compile("^# Typical internal damping.*?^stiffness_damping.*?\n", flags=re.M | re.S)

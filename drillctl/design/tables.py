@@ -6,6 +6,7 @@ the class that holds both.
 
 from __future__ import annotations
 
+import math
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Literal
@@ -26,7 +27,7 @@ from drillctl.rig.drillstring import GRADES, PIPES, Joint
 from drillctl.rig.drillstring.catalogue import FOOT, find
 from drillctl.rig.table import Table, one_of
 from drillctl.rig.top_drive.ideal import PITable
-from drillctl.rig.top_drive.law import drive_laws
+from drillctl.rig.top_drive.law import DriveLimits, curve_limits, drive_laws
 from drillctl.rig.weight_on_bit.law import ConstantWeightTable, weight_laws
 
 if TYPE_CHECKING:  # a law's own keys are known to its file alone
@@ -275,10 +276,82 @@ class DrillstringTable(Table):
 
 
 class TopDriveTable(Table):
-    """The top drive (rotary table) as a body."""
+    """The top drive (rotary table): a body at the pipe, or motors behind a gear, and their limits.
 
-    inertia: q.Inertia
+    Inertia counts at the pipe: `inertia`, or the motors' times the gear ratio squared and that of
+    the gear, `motors motor_inertia gear_ratio^2 + gearbox_inertia`. `limits_at` says whether the
+    limits are of one motor, or at the pipe. From motor to pipe torque counts `motors gear_ratio
+    efficiency` times, speed one over `gear_ratio` times. `torque_speed`: points [speed, torque] of
+    constant torque, then constant power, up to the maximum speed, beyond which the torque falls to
+    zero over a tenth of it. `intermittent_torque` limits the torque as well; `continuous_torque` is
+    measured against. Narrower limits of `[controller.drive]` hold.
+    """
+
+    inertia: q.Inertia | None = None
+    motor_inertia: q.Inertia | None = None
+    gear_ratio: q.PositiveNumber | None = None
+    motors: q.Count = 1
+    gearbox_inertia: q.Inertia = 0.0
+    efficiency: q.Share = 1.0
+    limits_at: Literal["motor", "pipe"] | None = None
+    continuous_torque: q.TorqueLimit = None
+    intermittent_torque: q.TorqueLimit = None
+    torque_speed: tuple[tuple[q.SpeedOrZero, q.TorqueOrZero], ...] = ()
     damping: q.Damping = 0.0
+
+    @property
+    def at_pipe(self) -> float:
+        """Inertia at the pipe (kg m2)."""
+        if self.inertia is not None:
+            return self.inertia
+        assert self.motor_inertia is not None
+        assert self.gear_ratio is not None
+        return self.motors * self.motor_inertia * self.gear_ratio**2 + self.gearbox_inertia
+
+    @property
+    def limits(self) -> DriveLimits:
+        """What it can give at the pipe."""
+        ratio = (self.gear_ratio or 1.0) if self.limits_at == "motor" else 1.0
+        gain = ratio * self.motors * self.efficiency if self.limits_at == "motor" else 1.0
+        curve = curve_limits([(w / ratio, gain * torque) for w, torque in self.torque_speed])
+        intermittent, continuous = (
+            math.inf if torque is None else gain * torque
+            for torque in (self.intermittent_torque, self.continuous_torque)
+        )
+        return curve._replace(torque=min(curve.torque, intermittent), continuous=continuous)
+
+    @model_validator(mode="after")
+    def _one_inertia(self) -> TopDriveTable:
+        behind = [key for key in ("motor_inertia", "gear_ratio") if getattr(self, key) is not None]
+        behind += ["gearbox_inertia"] if self.gearbox_inertia else []
+        if self.inertia is not None and behind:
+            raise InputError(
+                f"{behind[0]} is not allowed with inertia, which counts at the pipe already: the "
+                "motors' times gear_ratio^2; give motor_inertia, gear_ratio, motors and "
+                "gearbox_inertia in its place"
+            )
+        if self.inertia is None and not behind:
+            raise InputError("inertia is missing, or motor_inertia with its gear_ratio")
+        for key in ("motor_inertia", "gear_ratio"):
+            if self.inertia is None and key not in behind:
+                raise InputError(
+                    f"{key} is missing beside {behind[0]}; an inertia that counts at the pipe "
+                    "already (the motors' times gear_ratio^2) needs neither"
+                )
+        if self.efficiency == 0.0:
+            raise InputError("efficiency 0 is not allowed: it must be greater than 0")
+        return self
+
+    @model_validator(mode="after")
+    def _where_limits_count(self) -> TopDriveTable:
+        keys = ("continuous_torque", "intermittent_torque", "torque_speed")
+        given = [key for key in keys if getattr(self, key)]
+        if given and self.limits_at is None:
+            raise InputError(f'limits_at is missing: {given[0]} at the "motor" or at the "pipe"?')
+        if self.limits_at == "motor" and self.gear_ratio is None:
+            raise InputError('limits_at = "motor" needs motor_inertia and gear_ratio')
+        _ = self.limits
+        return self
 
 
 class BhaTable(Table):

@@ -43,7 +43,7 @@ def validated(tree: Tree, origin: str) -> DesignTables:
         parts.program(tables)
         if drive_laws()[tables.controller.law].tuned_to_string:
             top_drive(tables.controller, lambda: parts.drillstring(tables))
-        if not tables.controller.drive.ideal:
+        if not parts.drive_of(tables).ideal:
             parts.refuse_weak_drive(
                 tables, parts.drillstring(tables), parts.torque_at_set_speed(tables)
             )
@@ -73,7 +73,13 @@ def _reported(problem: Any, tree: Tree, origin: str) -> InputError:
     if kind == "extra_forbidden":
         *parents, key = problem["loc"]
         allowed = sorted(_keys_at(tuple(parents)))
-        return InputError(f"unknown key; {nearest(str(key), allowed)}", where)
+        homes = [
+            f"[{home}]"
+            for home in _homes(DesignTables, str(key))
+            if home != ".".join(map(str, parents))
+        ]
+        elsewhere = f"; it stands in {' or '.join(homes[:3])}" if homes else ""
+        return InputError(f"unknown key{elsewhere}; {nearest(str(key), allowed)}", where)
     if kind == "missing":
         return InputError("is missing", where)
     if kind == "value_error":
@@ -128,6 +134,16 @@ def _keys_at(loc: tuple[str | int, ...]) -> list[str]:
             model = fields[step].annotation
         model = _table_class(model, step)
     return [f.alias or key for key, f in model.model_fields.items()]
+
+
+def _homes(table: Any, key: str, path: str = "") -> list[str]:
+    """Tables by dotted path that hold a key of this name."""
+    found = [path] if path and key in table.model_fields else []
+    for name, field in table.model_fields.items():
+        inner = field.annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            found += _homes(inner, key, f"{path}.{name}" if path else name)
+    return found
 
 
 def _table_class(annotation: Any, step: str) -> Any:

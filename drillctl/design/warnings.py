@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from drillctl.design.parts import drive_of
 from drillctl.design.tables import DesignTables
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.law import friction_laws
@@ -68,13 +69,14 @@ def _assumed_rock(tables: DesignTables) -> DesignWarning | None:
 
 def _weak_drive(tables: DesignTables, static: float) -> DesignWarning | None:
     """A drive that cannot free a stuck bit."""
-    limit = tables.controller.drive.torque_limit
+    limit, own = drive_of(tables).torque_limit, tables.controller.drive.torque_limit
     if limit is None or limit >= static:
         return None
+    key = "controller.drive.torque_limit" if own == limit else "top_drive.intermittent_torque"
     return DesignWarning(
-        f"controller.drive.torque_limit {limit / 1e3:.4g} kN*m is less than the static torque of "
+        f"{key} {limit / 1e3:.4g} kN*m is less than the static torque of "
         f"the bit, {static / 1e3:.4g} kN*m: once stuck it cannot be freed (status stalled)",
-        "controller.drive.torque_limit",
+        key,
         f"more than {static / 1e3:.4g} kN*m",
     )
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from drillctl.design.tables import SimulationTable
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import PrintedThreeBranch
-from drillctl.rig.top_drive import SampledDrive
+from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.simulation import measures as m
 from drillctl.simulation.lanes import Lanes, start
 from drillctl.simulation.propagator import StringStep, string_step
@@ -263,6 +263,12 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
             "work_at_bit": row(r.WORK),
             "work_per_turn": _where(turned > 1e-3, row(r.WORK) / turned),
             "time_outside_table": row(r.OUTSIDE_TABLE),
+            "time_at_torque_limit": row(r.AT_TORQUE_LIMIT),
+            "time_at_power_limit": row(r.AT_POWER_LIMIT),
+            "time_over_continuous": row(r.OVER_CONTINUOUS),
+            "peak_drive_power": _where(
+                np.full(len(lanes), isinstance(lanes.drive, RealDrive)), row(r.PEAK_POWER)
+            ),
         }
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(raw).all(axis=0))
     status = _statuses(finite, row(r.LATE_STUCK), window, values["settling_time_wide"])

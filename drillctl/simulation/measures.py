@@ -10,6 +10,7 @@ WINDOW = 20.0  # length of the window at the end of a run in which sticking and 
 SETTLED_FOR = 5.0
 """A run has settled when it stays in the band for at least this long at its end (s)."""
 WIDE_BAND = 0.05  # settling bands as a share of the set speed: 5 % decides the status
+AT_LIMIT = 0.99  # share of a limit from which on a drive counts as at it
 NARROW_BAND = 0.02  # ... and 2 % gives `settling_time`.
 
 STATUSES = ("ok", "sticking", "stalled", "not_settled", "censored", "failed")
@@ -92,6 +93,21 @@ class Measures:
         "with the weight on bit outside the friction table",
         1e-2,
         "duration",
+    )
+
+    time_at_torque_limit: float = _row(
+        "time at torque limit", "s", "with at least 99 % of the drive's largest torque",
+        1e-2, "duration",
+    )  # fmt: skip
+    time_at_power_limit: float = _row(
+        "time at power limit", "s", "with at least 99 % of the drive's power", 1e-2, "duration"
+    )
+    time_over_continuous: float = _row(
+        "time over continuous torque", "s", "above the torque that the drive bears for any time",
+        1e-2, "duration",
+    )  # fmt: skip
+    peak_drive_power: float | None = _row(
+        "peak drive power", "W", "largest power of the drive; none of an ideal one", 3e-2
     )
 
     def as_dict(self) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design
 from drillctl.progress import SILENT, Progress
+from drillctl.rig.top_drive import RealDrive
 from drillctl.simulation import measures as m
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, stuck_between
 from drillctl.store.codec import label
@@ -178,7 +179,22 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
         work_at_bit=motion.energy.bit,
         work_per_turn=m.per_turn(motion.energy.bit, mean, duration),
         time_outside_table=_outside_table(design, time, signals["weight_on_bit"]),
+        **_strain(design, time, signals),
     )
+
+
+def _strain(design: Design, time: Array, signals: dict[str, Array]) -> dict[str, Any]:
+    """Times (s) at the limits of the drive, from samples, and its peak power (W)."""
+    drive = design.top_drive
+    names = ("time_at_torque_limit", "time_at_power_limit", "time_over_continuous")
+    if not isinstance(drive, RealDrive):
+        return dict.fromkeys(names, 0.0) | {"peak_drive_power": None}
+    torque = signals["top_torque"]
+    power = torque * signals["top_speed"]
+    there = (torque >= m.AT_LIMIT * drive.most, power >= m.AT_LIMIT * drive.power,
+             torque > drive.continuous)  # fmt: skip
+    times = (float(np.trapezoid(one.astype(float), time)) for one in there)
+    return dict(zip(names, times, strict=True)) | {"peak_drive_power": float(power.max())}
 
 
 def _outside_table(design: Design, time: Array, weight: Array) -> float:

@@ -75,6 +75,7 @@ def _real_step(drive: RealDrive, step: float, string: Any) -> Any:
         seen_keep=keep, seen_ramp=ramp, inertia=drive.sensed_inertia / step,
         felt_keep=kept(drive.torque_filter, step), felt_mean=filter_mean,
         slow_take=take, motor_take=1.0 - kept(drive.lag, step),
+        slowness=drive.slowness, continuous=drive.continuous,
     )  # fmt: skip
 
 
@@ -91,6 +92,7 @@ def _sampled_step(drive: SampledDrive, step: float) -> Any:
         seen_keep=kept(drive.encoder, step), seen_ramp=ramp_followed(drive.encoder, step),
         mean=motor_mean, per_command=1.0 / (1.0 - motor_mean),
         motor_take=1.0 - kept(drive.lag, step), most_moved=drive.rate * step,
+        slowness=drive.slowness, continuous=drive.continuous,
     )  # fmt: skip
 
 

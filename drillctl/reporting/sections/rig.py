@@ -111,7 +111,7 @@ def _spring(ax: Axes, part: _Part) -> None:
 def _ends(ax: Axes, design: Design, words: Words) -> None:
     tables = design.tables
     ax.add_patch(Rectangle((-0.24, -0.09), 0.48, 0.085, facecolor=style.SKY, edgecolor="black"))
-    text = f"top drive: {number(tables.top_drive.inertia)} kg m²\n{tables.controller.law}"
+    text = f"top drive: {number(tables.top_drive.at_pipe)} kg m²\n{tables.controller.law}"
     ax.text(0.28, -0.05, text, va="center", fontsize=style.SMALL)
     ax.add_patch(Rectangle((-0.1, 1.0), 0.2, 0.035, facecolor="#888888", edgecolor="black"))
     bit = [(-0.1, 1.035), (0.1, 1.035), (0.05, 1.075), (-0.05, 1.075)]
@@ -144,7 +144,7 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
         "stiffness (N m/rad)", "inertia (kg m²)", "elements",
     )  # fmt: skip
     bodies = (
-        ("top drive", number(design.tables.top_drive.inertia),
+        ("top drive", number(design.tables.top_drive.at_pipe),
          number(design.tables.top_drive.damping)),
         ("BHA with bit", number(design.tables.bha.inertia), number(design.tables.bha.damping)),
     )  # fmt: skip

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 from pydantic import model_validator
 
-from drillctl import registry
+from drillctl import registry, units
 from drillctl.errors import InputError
 from drillctl.rig import table as q
 from drillctl.rig.table import Table, law_name
@@ -46,12 +46,16 @@ class DriveTable(Table):
     Lags and filters are time constants. Without `minimum_torque` a drive with a torque limit does
     not brake. A limit of `"inf"` is none. With `torque_rate_limit` the motor follows with a lag of
     10 ms at least. `anti_windup` takes effect where torque, power or rate is limited;
-    `tracking_time` is by default kp / ki.
+    `tracking_time` is by default kp / ki. All limits count at the pipe. Beyond `maximum_speed` the
+    largest torque falls to zero over a tenth of it. `continuous_torque` limits nothing: the time
+    above it is measured.
     """
 
     torque_limit: q.TorqueLimit = None
     minimum_torque: q.LeastTorque = None
     power_limit: q.PowerLimit = None
+    maximum_speed: q.SpeedLimit = None
+    continuous_torque: q.TorqueLimit = None
     torque_rate_limit: q.TorqueRateLimit = None
     anti_windup: Literal["back-calculation", "none"] = "back-calculation"
     tracking_time: q.Time | None = None
@@ -67,10 +71,19 @@ class DriveTable(Table):
             raise InputError("one_sample_delay needs a sampling_period")
         return self
 
+    @model_validator(mode="after")
+    def _torque_that_falls(self) -> DriveTable:
+        if self.maximum_speed is not None and self.torque_limit is None:
+            raise InputError("maximum_speed needs a torque_limit: it falls to zero beyond")
+        return self
+
     @property
     def ideal(self) -> bool:
         """Whether nothing of it acts."""
-        limits = (self.torque_limit, self.minimum_torque, self.power_limit, self.torque_rate_limit)
+        limits = (
+            self.torque_limit, self.minimum_torque, self.power_limit, self.torque_rate_limit,
+            self.maximum_speed, self.continuous_torque,
+        )  # fmt: skip
         lags = (self.sampling_period, self.lag, self.encoder_lag, self.torque_lag)
         return all(limit is None for limit in limits) and not any(lags)
 
@@ -85,11 +98,65 @@ class DriveTable(Table):
                 "torque_limit": None,
                 "minimum_torque": None,
                 "power_limit": None,
+                "maximum_speed": None,
+                "continuous_torque": None,
                 "torque_rate_limit": None,
                 "anti_windup": "back-calculation",
                 "tracking_time": None,
             }
         )
+
+
+class DriveLimits(NamedTuple):
+    """What a drive can give at the pipe; infinite where nothing limits it."""
+
+    torque: float = math.inf  # at low speed (N m)
+    power: float = math.inf  # at higher speed (W)
+    speed: float = math.inf  # (rad/s)
+    continuous: float = math.inf  # torque that it bears for any time (N m)
+
+    def within(self, drive: DriveTable) -> DriveTable:
+        """The keys of a drive with these limits where they are narrower."""
+
+        def least(own: float | None, other: float) -> float | None:
+            result = min(math.inf if own is None else own, other)
+            return None if math.isinf(result) else result
+
+        return drive.model_copy(
+            update={
+                "torque_limit": least(drive.torque_limit, self.torque),
+                "power_limit": least(drive.power_limit, self.power),
+                "maximum_speed": least(drive.maximum_speed, self.speed),
+                "continuous_torque": least(drive.continuous_torque, self.continuous),
+            }
+        )
+
+
+OFF_THE_CURVE = 0.03  # how far a point may lie from constant torque and constant power
+
+
+def curve_limits(points: list[tuple[float, float]]) -> DriveLimits:
+    """Constant torque, then constant power, through points of speed (rad/s) and torque (N m)."""
+    key = "torque_speed"
+    while len(points) > 1 and points[-1][1] == 0.0:  # how a curve may be closed at its end
+        points = points[:-1]
+    if not points:
+        return DriveLimits()
+    speeds, torques = zip(*points, strict=True)
+    if list(speeds) != sorted(set(speeds)) or list(torques) != sorted(torques, reverse=True):
+        raise InputError(f"{key}: speeds must rise and torques must not, from point to point")
+    if torques[-1] <= 0.0 or speeds[-1] == 0.0:
+        raise InputError(f"{key}: needs a speed and a torque above 0 at its end")
+    falling = [w * torque for w, torque in points if torque < torques[0] * (1.0 - OFF_THE_CURVE)]
+    made = DriveLimits(torques[0], min(falling, default=math.inf), speeds[-1])
+    for w, torque in points:
+        given = min(made.torque, made.power / max(w, 1e-9))
+        if abs(given / torque - 1.0) > OFF_THE_CURVE:
+            raise InputError(
+                f"{key}: {torque / 1e3:.4g} kN*m at {w / units.RPM:.4g} rpm of the pipe is off the "
+                f"curve of constant torque, then constant power ({given / 1e3:.4g} kN*m there)"
+            )
+    return made
 
 
 class Controller(NamedTuple):
@@ -169,6 +236,8 @@ def _real(controller: Controller, drive: DriveTable) -> RealDrive:
         "power": math.inf if drive.power_limit is None else drive.power_limit,
         "rate": rate,
         "tracking": float(tracking(controller.kp, controller.ki, drive)),
+        "slowness": 0.0 if drive.maximum_speed is None else 1.0 / drive.maximum_speed,
+        "continuous": math.inf if drive.continuous_torque is None else drive.continuous_torque,
     }
     if drive.sampling_period == 0.0:
         return RealDrive(**numbers)

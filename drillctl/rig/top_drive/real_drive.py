@@ -64,6 +64,11 @@ class RealDrive(NamedTuple):
         h, between two samples of a `SampledDrive` (s).
     late : float
         Periods that its command waits before it is given out: 0 or 1.
+    slowness : float
+        One over the maximum speed, beyond which the largest torque fades to zero (s/rad); 0 for
+        none.
+    continuous : float
+        Torque that it bears for any time (N m): limits nothing, is measured against.
     """
 
     feedforward: Any
@@ -82,6 +87,8 @@ class RealDrive(NamedTuple):
     tracking: Any
     period: Any = 0.0
     late: Any = 0.0
+    slowness: Any = 0.0
+    continuous: Any = math.inf
 
     def gains(self) -> tuple[Any, Any]:
         """Proportional (N m s/rad) and integral (N m/rad) gain of the speed controller."""
@@ -128,6 +135,8 @@ def _impedance(drive: RealDrive, s: Any, held: Any) -> Any:
     given = follows * controller
     return given * seen * (1.0 - felt * drive.sensed_inertia * s) / (1.0 + given * felt)
 
+
+FADE = 0.1  # share of the maximum speed over which the largest torque falls to zero beyond it
 
 MEMORY = ("speed seen", "torque felt", "its slow part", "integral", "motor torque")
 """Memory of a `RealDrive` (rad/s, N m, N m, rad, N m)."""
@@ -219,7 +228,8 @@ def sample(
 def limits(drive: RealDrive, speed: float) -> tuple[float, float]:
     """Least and largest torque (N m) that a drive gives at an absolute speed (rad/s)."""
     by_power = drive.power / max(abs(speed), 1e-9)
-    return max(drive.least, -by_power), min(drive.most, by_power)
+    share = clipped((1.0 + FADE - abs(speed) * drive.slowness) / FADE, 0.0, 1.0)
+    return max(drive.least, -by_power), min(drive.most, by_power) * share
 
 
 def clipped(value: float, low: float, high: float) -> float:

@@ -17,11 +17,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from drillctl.rig.top_drive.real_drive import FADE
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import fma, law_at, most
 from drillctl.simulation.kernels.observer_step import ObserverStep
 from drillctl.simulation.kernels.program_step import NoProgram
 from drillctl.simulation.kernels.vectors import at, each, pick, put, when
+from drillctl.simulation.measures import AT_LIMIT
 
 
 class RealStep(NamedTuple):
@@ -75,6 +77,9 @@ class RealStep(NamedTuple):
     felt_mean: Any
     slow_take: Any  # share of the way to its input that the slow part goes
     motor_take: Any  # share of the way to its command that the motor goes
+    # as in the law
+    slowness: Any
+    continuous: Any
 
 
 class SampledStep(NamedTuple):
@@ -103,6 +108,9 @@ class SampledStep(NamedTuple):
     per_command: Any
     motor_take: Any
     most_moved: Any
+    # as in the law
+    slowness: Any
+    continuous: Any
 
 
 SLOWEST = 1e-9  # speed (rad/s) under which a limit of power no longer grows
@@ -183,7 +191,8 @@ def _limits(law: Any, speed: Any) -> Any:
     """Limits of the torque in this step at an absolute speed (rad/s)."""
     by_power = law.power / most(abs(speed), SLOWEST)
     low = pick(law.least > -by_power, law.least, -by_power)
-    return low, pick(law.most < by_power, law.most, by_power)
+    share = _clip((1.0 + FADE - abs(speed) * law.slowness) / FADE, 0.0, 1.0)
+    return low, pick(law.most < by_power, law.most, by_power) * share
 
 
 def eliminate(drive: Any, program: Any, string: Any, swing: Any, work: Any, rate: Any) -> Any:
@@ -304,10 +313,26 @@ def _sample(drive: Any, work: Any) -> None:
 def follow_drive(drive: Any, work: Any, top_speed_before: Any, rate: Any) -> None:
     """Memory at the end of a step whose motion is known."""
     if isinstance(drive, RealStep):
-        return _follow_real(drive, work, top_speed_before, rate)
-    if isinstance(drive, SampledStep):
-        return _follow_sampled(drive, work, top_speed_before, rate)
-    return None
+        _follow_real(drive, work, top_speed_before, rate)
+    elif isinstance(drive, SampledStep):
+        _follow_sampled(drive, work, top_speed_before, rate)
+    else:
+        return
+    _measure_strain(drive, work, 1.0 / rate)
+
+
+def _measure_strain(drive: Any, work: Any, step: Any) -> None:
+    """Time of a step at the limits of the drive, and its power."""
+    law = law_at(drive, work, r.DRIVE)
+    torque = at(work, r.TOP_TORQUE) + at(work, r.DRAG)
+    power = torque * (at(work, r.TOP_SPEED) + at(work, r.SET_SPEED))
+    for row, there in (
+        (r.AT_TORQUE_LIMIT, torque >= AT_LIMIT * law.most),
+        (r.AT_POWER_LIMIT, power >= AT_LIMIT * law.power),
+        (r.OVER_CONTINUOUS, torque > law.continuous),
+    ):
+        put(work, row, at(work, row) + pick(there, step, 0.0))
+    put(work, r.PEAK_POWER, most(power, at(work, r.PEAK_POWER)))
 
 
 def _see(law: Any, work: Any, before: Any) -> Any:

@@ -164,6 +164,10 @@ WORK = _next()
 WEIGHT_SUM = _next()
 ROP_SUM = _next()
 OUTSIDE_TABLE = _next()
+AT_TORQUE_LIMIT = _next()  # of a real drive, s
+AT_POWER_LIMIT = _next()
+OVER_CONTINUOUS = _next()
+PEAK_POWER = _next()  # W
 BOUND = _next()  # J1 of a lane that was found over the level at which lanes are given up; else 0
 
 ROWS = _taken

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from drillctl.simulation.run import Simulation
 
 HIDDEN = ("j1_rate", "work_at_bit", "time_outside_table")  # measures that are in the summary alone
+OF_LIMITS = ("time_at_torque_limit", "time_at_power_limit", "time_over_continuous")
 BALANCED = 1e-6  # largest relative residual of a balanced run
 FREE = 20.0  # interval (s) between the samples of a run that is kept for its measures alone
 FINE = 0.05  # and of one that is drawn (s)
@@ -35,6 +36,9 @@ def tables(result: Simulation) -> Iterator[Table]:
         for one in MEASURES.values()
         # Some are measured of compared cases alone.
         if hasattr(result.measures, one.name) and one.name not in HIDDEN
+        # An ideal drive has no limits and no power of its own.
+        if one.name not in (*OF_LIMITS, "peak_drive_power")
+        or result.measures.peak_drive_power is not None
     ]
     if result.share_of_yield is not None:
         rows.append(["peak pipe torque over torsional yield", f"{result.share_of_yield:.1%}", ""])

@@ -1,0 +1,129 @@
+"""Motors behind a gear: inertia and limits at the pipe, in both engines."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import drillctl
+from drillctl import units
+from drillctl.errors import InputError
+from drillctl.rig.top_drive import PI, RealDrive
+from drillctl.rig.top_drive.law import curve_limits
+from drillctl.rig.top_drive.real_drive import limits
+
+RPM = units.RPM
+GEAR = {
+    "top_drive.motor_inertia": "23 kg*m^2",
+    "top_drive.gear_ratio": 7.2,
+    "top_drive.gearbox_inertia": "930 kg*m^2",
+}
+CURVE = [["0 rpm", "9 kN*m"], ["90 rpm", "9 kN*m"], ["150 rpm", "5.4 kN*m"]]
+
+
+def rig(**values):
+    return drillctl.load("monteiro-trindade-120kn", **values)
+
+
+def of_limits(**keys):
+    return rig(**{f"top_drive.{key}": value for key, value in keys.items()})
+
+
+def test_a_motor_counts_with_the_ratio_squared():
+    assert rig(**GEAR).string.top_inertia == pytest.approx(2122.32, abs=1e-9)
+    two = rig(**GEAR, **{"top_drive.motors": 2})
+    assert two.string.top_inertia == pytest.approx(2 * 23 * 7.2**2 + 930)
+
+
+def test_limits_of_a_motor_are_those_at_the_pipe():
+    motor = [["0 rpm", "1 kN*m"], ["900 rpm", "1 kN*m"], ["1500 rpm", "0.6 kN*m"]]
+    more = {"limits_at": "motor", "torque_speed": motor, "efficiency": 0.9, "motors": 2,
+            "continuous_torque": "0.7 kN*m"}  # fmt: skip
+    drive = rig(**GEAR, **{f"top_drive.{key}": value for key, value in more.items()}).top_drive
+    gain = 7.2 * 2 * 0.9
+    assert isinstance(drive, RealDrive)
+    assert drive.most == pytest.approx(gain * 1e3)
+    assert drive.power == pytest.approx(2 * 0.9 * 600 * 1500 * RPM)  # a gear takes or gives none
+    assert 1.0 / drive.slowness == pytest.approx(1500 * RPM / 7.2)
+    assert drive.continuous == pytest.approx(gain * 700)
+    assert drive.least == 0.0
+
+
+def test_the_curve_is_constant_torque_then_power_then_nothing():
+    drive = of_limits(limits_at="pipe", torque_speed=CURVE).top_drive
+    for rpm, torque in ((0, 9e3), (60, 9e3), (90, 9e3), (120, 6.75e3), (150, 5.4e3)):
+        assert limits(drive, rpm * RPM)[1] == pytest.approx(torque, rel=1e-9)
+    assert limits(drive, 157.5 * RPM)[1] == pytest.approx(0.5 * 5.4e3 * 150 / 157.5, rel=1e-6)
+    assert limits(drive, 166 * RPM)[1] == 0.0
+    assert curve_limits([(5.0, 3.0), (10.0, 3.0), (10.5, 0.0)]).speed == 10.0
+
+
+def test_the_narrower_limit_holds():
+    design = of_limits(limits_at="pipe", intermittent_torque="30 kN*m")
+    assert design.top_drive.most == 30e3
+    assert design.replace({"controller.drive.torque_limit": "20 kN*m"}).top_drive.most == 20e3
+    assert design.replace({"controller.drive.torque_limit": "40 kN*m"}).top_drive.most == 30e3
+    assert isinstance(design.linear_drive, PI)  # inside its limits it is as before
+
+
+AT_PIPE = {"top_drive.limits_at": "pipe"}
+KINKED = [*CURVE[:2], ["150 rpm", "8 kN*m"], ["200 rpm", "4 kN*m"]]
+SLOW = [["0 rpm", "20 kN*m"], ["90 rpm", "20 kN*m"]]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"top_drive.gear_ratio": 7.2}, r"motor_inertia is missing beside gear_ratio"),
+        ({"controller.drive.gear_ratio": 7.2}, r"it stands in \[top_drive\]"),
+        ({"top_drive.intermittent_torque": "30 kN*m"}, r'at the "motor" or at the "pipe"'),
+        ({"top_drive.limits_at": "motor"}, "needs motor_inertia and gear_ratio"),
+        (AT_PIPE | {"top_drive.torque_speed": CURVE[::-1]}, "must rise"),
+        (AT_PIPE | {"top_drive.torque_speed": KINKED}, "off the curve"),
+        (AT_PIPE | {"top_drive.torque_speed": SLOW}, "beyond the 90 rpm"),
+        (AT_PIPE | {"top_drive.intermittent_torque": "3 kN*m"}, "top_drive: gives 3 kN"),
+        ({"controller.drive.maximum_speed": "200 rpm"}, "needs a torque_limit"),
+    ],
+)
+def test_what_is_misplaced_is_explained(values, message):
+    with pytest.raises(InputError, match=message):
+        rig(**values)
+
+
+def test_a_gear_beside_an_inertia_at_the_pipe_is_explained(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        'schema = 1\nmodel = "monteiro-trindade-2012"\n[top_drive]\ninertia = "2000 kg*m^2"\n'
+        "gear_ratio = 7.2\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match="counts at the pipe already"):
+        drillctl.load(path)
+
+
+def test_both_engines_agree_on_time_at_the_limits():
+    design = rig(
+        **{
+            "top_drive.limits_at": "pipe", "top_drive.torque_speed": CURVE,
+            "top_drive.continuous_torque": "7 kN*m", "simulation.duration": "15 s",
+        }
+    )  # fmt: skip
+    exact = drillctl.simulate(design, "reference")
+    batch = drillctl.simulate(design, "batch").measures
+    assert exact.energy.relative_residual < 1e-8
+    times = ("time_at_torque_limit", "time_at_power_limit", "time_over_continuous")
+    for name in times:
+        one, other = getattr(exact.measures, name), getattr(batch, name)
+        assert 0.1 < one < 15.0
+        assert other == pytest.approx(one, abs=0.15), name
+    assert batch.peak_drive_power == pytest.approx(exact.measures.peak_drive_power, rel=0.02)
+    assert exact.measures.peak_drive_power <= 1.001 * 9e3 * 90 * RPM
+    assert batch.peak_top_torque == pytest.approx(9e3)
+
+
+def test_an_ideal_drive_is_at_no_limit():
+    run = drillctl.simulate(rig(**{"simulation.duration": "2 s"})).measures
+    assert (run.time_at_torque_limit, run.time_over_continuous) == (0.0, 0.0)
+    assert run.peak_drive_power is None
+    assert math.isfinite(run.peak_top_torque)
