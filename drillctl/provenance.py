@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -19,6 +20,15 @@ def provenance() -> dict[str, str]:
     results = {"drillctl": drillctl.__version__, "python": platform.python_version()}
     results |= {name: version(name) for name in PACKAGES}
     return results | {"processor": processor()}
+
+
+def merged(one: Mapping[str, str], other: Mapping[str, str]) -> dict[str, str]:
+    """What two origins have in common; where they differ, both."""
+    results = dict(one)
+    for key, value in other.items():
+        held = results.get(key, value).split(" + ")
+        results[key] = " + ".join(dict.fromkeys([*held, *value.split(" + ")]))
+    return results
 
 
 def processor() -> str:

@@ -1,5 +1,6 @@
 """How tests share workers and kernels; figures they measure, for docs/make_verification.py."""
 
+import ctypes
 import hashlib
 import json
 import os
@@ -113,3 +114,27 @@ def pytest_sessionfinish(session):
     target = session.config.getoption("--figures")
     if target is not None:
         target.write_text(json.dumps(session.config.stash[NOTED], indent=2), encoding="utf-8")
+
+
+# linux/capability.h: third version; what lets root pass over the permissions of files
+CAPABILITIES, OVER_PERMISSIONS = 0x20080522, 1 << 1 | 1 << 2
+
+
+@pytest.fixture
+def permissions_count():
+    """Root, too, is bound by the permissions of files, as any other user is."""
+    if os.geteuid() != 0:
+        yield
+        return
+    if sys.platform != "linux":
+        pytest.skip("root may write anywhere")
+    libc = ctypes.CDLL(None, use_errno=True)
+    head = (ctypes.c_uint32 * 2)(CAPABILITIES, 0)
+    held = (ctypes.c_uint32 * 6)()  # twice: effective, permitted, inheritable
+    assert libc.capget(head, held) == 0
+    all_of_them = held[0]
+    held[0] &= ~OVER_PERMISSIONS
+    assert libc.capset(head, held) == 0
+    yield
+    held[0] = all_of_them
+    assert libc.capset(head, held) == 0

@@ -141,7 +141,7 @@ def test_modes_back(bistable, tmp_path, monkeypatch):
 
 def test_zarr_holds_units_and_provenance(result, bistable, tmp_path):
     result.save(tmp_path / "map")
-    with xarray.open_zarr(tmp_path / "map/data.zarr", consolidated=False) as data:
+    with xarray.open_zarr(tmp_path / "map/data.zarr") as data:
         assert set(data["j1"].dims) == {"controller.kp", "controller.ki"}
         assert data["controller.kp"].attrs["units"] == "N*m*s/rad"
         assert data["j1"].attrs["units"] == "s"
@@ -149,7 +149,7 @@ def test_zarr_holds_units_and_provenance(result, bistable, tmp_path):
         assert data["status"].attrs["flag_meanings"].split()[-1] == "failed"
         about_map = dict(data.attrs)
     drillctl.simulate(bistable, engine="batch").save(tmp_path / "run")
-    with xarray.open_zarr(tmp_path / "run/data.zarr", consolidated=False) as data:
+    with xarray.open_zarr(tmp_path / "run/data.zarr") as data:
         assert data["bit_speed"].attrs["units"] == "rad/s"
         assert data["time"].attrs["units"] == "s"
         about_run = dict(data.attrs)
@@ -176,13 +176,13 @@ def test_nothing_is_pickled_and_nothing_is_left_half_written(result, tmp_path):
     paths = [path for path in folder.rglob("*") if path.is_file()]
     assert paths
     for path in paths:
-        assert path.suffix != ".part"
+        assert path.suffix not in (".part", ".lock")
         # An opcode of a pickle's beginning (protocols 2 to 5), and of an object array's header.
         content = path.read_bytes()
         assert not content.startswith((b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"))
         assert b"pickle" not in content
     assert {path.name for path in folder.iterdir()} == {
-        "run.json", "design.toml", "summary.json", "data.zarr", "result.json",
+        "run.json", "design.toml", "summary.json", "data.zarr", "result.json", "journal.jsonl",
     }  # fmt: skip
     for name in ("run.json", "summary.json"):
         json.loads((folder / name).read_text(), parse_constant=pytest.fail)
@@ -191,17 +191,17 @@ def test_nothing_is_pickled_and_nothing_is_left_half_written(result, tmp_path):
 def test_blocks_hold_no_pickle(design, tmp_path):
     folder = claim("map", design, tmp_path / "run")
     sweep(design, store=Folder(folder.path))
-    held = sorted(path.name for path in (tmp_path / "run/blocks").iterdir())
+    held = sorted(path.name for path in (tmp_path / "run/blocks/map").iterdir())
     assert held == ["000000.npz", "string-000000.npz"]
     for name in held:
-        with np.load(tmp_path / "run/blocks" / name, allow_pickle=False) as arrays:
+        with np.load(tmp_path / "run/blocks/map" / name, allow_pickle=False) as arrays:
             assert all(arrays[key].dtype != object for key in arrays)
 
 
 def test_kept_strings_and_blocks_give_the_same_bits(design, result, tmp_path, monkeypatch):
     folder = claim("map", design, tmp_path / "run")
     same_sweep(sweep(design, store=Folder(folder.path)), result)
-    (tmp_path / "run/blocks/000000.npz").unlink()
+    (tmp_path / "run/blocks/map/000000.npz").unlink()
     monkeypatch.setattr("drillctl.ensemble.sweeps.prepare", pytest.fail)  # the string is kept
     same_sweep(sweep(design, store=Folder(folder.path)), result)
     monkeypatch.setattr("drillctl.ensemble.running.run_batch", pytest.fail)  # and so is the block
@@ -295,6 +295,7 @@ def test_axes_that_do_not_fit_the_law_do_not_stop_saving(tmp_path):
 def test_default_folders_are_never_shared(design, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     paths = [claim("map", design, None).path for _ in range(3)]
+    assert not list(tmp_path.glob("runs/*.part"))
     assert [path.name[-5:] for path in paths] == ["map-1", "map-2", "map-3"]
 
 
@@ -310,7 +311,7 @@ def test_discard_takes_back_only_its_own(design, tmp_path):
     folder = claim("map", design, tmp_path / "worked")
     sweep(design, store=Folder(folder.path))
     folder.discard()
-    assert (tmp_path / "worked/blocks/000000.npz").is_file()
+    assert (tmp_path / "worked/blocks/map/000000.npz").is_file()
 
 
 # --- what is not a run -----------------------------------------------------------------------
@@ -350,11 +351,17 @@ def test_open_refuses_a_damaged_result(result, tmp_path, content):
         drillctl.open(folder)
 
 
-def test_open_refuses_the_format_of_an_earlier_version(result, tmp_path):
+def test_folders_of_an_earlier_version_are_refused_by_name(result, design, tmp_path):
     folder = result.save(tmp_path / "run")
-    (folder / "result.json").unlink()
-    with pytest.raises(InputError, match="'map' in a format that this version does not read"):
+    (folder / "journal.jsonl").unlink()  # 0.1 had none
+    about = json.loads((folder / "run.json").read_text())
+    about["provenance"]["drillctl"] = "0.1.0"
+    (folder / "run.json").write_text(json.dumps(about))
+    told = "a run of 'map' by version 0.1.0, .* run the command again in a new folder"
+    with pytest.raises(InputError, match=told):
         drillctl.open(folder)
+    with pytest.raises(InputError, match=told):
+        claim("map", design, folder)
 
 
 def test_open_refuses_an_unfinished_run(design, tmp_path):

@@ -111,7 +111,8 @@ def _parameter(option: Option) -> inspect.Parameter:
     if option.least is not None:
         more["min"] = option.least
     flag = f"{option.flag}/--{option.opposite}" if option.opposite else option.flag
-    note = typer.Option(flag, help=f"{option.help.rstrip('.')}.", **more)
+    flags = [flag, option.formerly] if option.formerly else [flag]
+    note = typer.Option(*flags, help=f"{option.help.rstrip('.')}.", **more)
     kind = option.type if option.default is not None else option.type | None
     return inspect.Parameter(
         option.name, _KEYWORD, default=option.default, annotation=Annotated[kind, note]

@@ -1,4 +1,4 @@
-"""The generic command of a study: claim a folder, show again or compute, write, draw, print."""
+"""The generic command of a study: claim a folder, compute, conclude; then draw and print."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import typer
 from drillctl.cli import console
 from drillctl.cli.options import Common, command_of, warn, with_warnings
 from drillctl.errors import InputError
+from drillctl.store.json_files import replaced
 from drillctl.studies.base import Run, Study
 
 if TYPE_CHECKING:
@@ -38,25 +39,22 @@ def perform(study: Study, design: Design, options: dict[str, Any], common: Commo
     values = study.values(options)
     design = design.replace(values) if values else design
     _refuse_nothing_to_resume(options, common.out)
-    folder = store.claim(
+    with store.claim(
         study.name, design, common.out, study.growing(design),
-        bool(options.get("allow_mixed")), **study.settings(options),
-    )  # fmt: skip
-    if folder.finished:
-        result = store.open(folder.path)
-        _show(study, result, folder.summary(), common)
-        console.note(f"already done: {folder.path}")
-    else:
-        with guarded(folder, study), console.progress() as bar, console.library_output_on_stderr():
-            run = Run(options, bar, folder.path, common.units, common.verbose)
-            result = study.computed(design, run)
-        _write(study, result, folder, common)
-        for note in study.notes(result):
-            console.note(note)
-        summary = with_warnings(study.summary(result), result.design)
-        folder.finish(summary)
-        _show(study, result, summary, common)
-        (console.note if common.json else console.line)(f"results: {folder.path}")
+        bool(options.get("allow_other_machine")), **study.settings(options),
+    ) as folder:  # fmt: skip
+        if folder.finished:
+            result = store.open(folder.path)
+            _show(study, result, folder.summary(), common)
+            _check_beside(study, result, folder, common)
+            console.note(f"already done: {folder.shown}")
+        else:
+            result = _computed(study, design, options, folder, common)
+            _write_beside(study, result, folder, common)
+            for note in study.notes(result):
+                console.note(note)
+            _show(study, result, folder.summary(), common)
+            (console.note if common.json else console.line)(f"results: {folder.shown}")
     failure = study.failure(result)
     if failure is not None:
         console.note(f"drillctl: {failure}")
@@ -64,34 +62,74 @@ def perform(study: Study, design: Design, options: dict[str, Any], common: Commo
 
 
 def _refuse_nothing_to_resume(options: dict[str, Any], out: Path | None) -> None:
+    from drillctl.store.folder import resolved
+
     if not options.get("resume"):
         return
     if out is None:
         raise InputError("requires --out, the folder of the run to resume", "--resume")
-    if not (out / "run.json").is_file():
+    if not (resolved(out) / "run.json").is_file():
         raise InputError(f"{out} holds no run to resume", "--resume")
 
 
-def _write(study: Study, result: Any, folder: RunFolder, common: Common) -> None:
-    """Write data, tables, figures and further files of a result."""
+def _computed(
+    study: Study, design: Design, options: dict[str, Any], folder: RunFolder, common: Common
+) -> Any:
+    """Compute a study and conclude its run, before anything of it is shown."""
+    with guarded(folder, study):
+        with console.progress() as bar, console.library_output_on_stderr():
+            run = Run(options, bar, folder.path, common.units, common.verbose)
+            result = study.computed(design, run)
+        folder.conclude(result, with_warnings(study.summary(result), result.design))
+    return result
+
+
+def _write_beside(study: Study, result: Any, folder: RunFolder, common: Common) -> None:
+    """Write tables, pictures and further files of a result that is safe: a failure is a note."""
     from drillctl.store.tables import write_csv
 
-    result.write(folder.path)
-    for table in study.tables(result):
-        write_csv(table, folder.path)
-    for picture in study.pictures(result):
-        draw(picture.draw(common.units), folder.path / f"{picture.name}.png")
-    study.files(result, folder.path)
+    def tables() -> None:
+        for table in study.tables(result):
+            write_csv(table, folder.path)
+
+    def pictures() -> None:
+        for picture in study.pictures(result):
+            with _noted(f"{picture.name}.png"):
+                draw(picture.draw(common.units), folder.path / f"{picture.name}.png")
+
+    parts = {"tables": tables, "pictures": pictures,
+             "further files": lambda: study.files(result, folder.path)}  # fmt: skip
+    with _noted("pictures and tables"), folder.beside():
+        for name, write in parts.items():
+            with _noted(name):
+                write()
+
+
+@contextmanager
+def _noted(what: str) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:  # whatever a picture or a disk may raise
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        console.note(f"warning: {what}: not written: {reason}; the results are safe")
+
+
+def _check_beside(study: Study, result: Any, folder: RunFolder, common: Common) -> None:
+    """Note tables and pictures that were changed; write those that a kill left out."""
+    changed = folder.changed()
+    if changed is None and folder.lock is not None:
+        _write_beside(study, result, folder, common)
+    for problem in changed or ():
+        console.note(f"warning: {problem}")
 
 
 def draw(figure: Figure, path: Path) -> None:
     """Write a figure atomically."""
     from drillctl.plots.style import lay_out
 
-    part = path.with_suffix(".part")
     lay_out(figure, DPI)
-    figure.savefig(part, dpi=DPI, format="png")
-    part.replace(path)
+    with replaced(path) as part:
+        figure.savefig(part, dpi=DPI, format="png")
 
 
 def _show(study: Study, result: Any, summary: dict[str, Any], common: Common) -> None:
@@ -110,15 +148,15 @@ def _show(study: Study, result: Any, summary: dict[str, Any], common: Common) ->
 
 @contextmanager
 def guarded(folder: RunFolder, study: Study) -> Iterator[None]:
-    """Discard the folder of an invalid run; keep that of an interrupted one that can resume."""
+    """Discard the folder of a run that failed, except for finished blocks."""
     try:
         yield
-    except InputError:
-        folder.discard()
-        raise
     except KeyboardInterrupt:
         if study.resumes:
-            console.note(f"finished blocks are kept; to resume, repeat with --out {folder.path}")
+            console.note(f"finished blocks are kept; to resume, repeat with --out {folder.shown}")
         else:
             folder.discard()
+        raise
+    except BaseException:
+        folder.discard()
         raise

@@ -28,7 +28,7 @@ from drillctl.rig.top_drive.law import tracking
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.simulation.measures import BATCH_MEASURES
 from drillctl.store.codec import documented, label
-from drillctl.store.tables import texts
+from drillctl.store.tables import headed, texts
 
 SHARED = (
     "drillstring.", "top_drive.", "bha.", "simulation.", "controller.drive.sampling_period",
@@ -64,10 +64,11 @@ def span(axes: tuple[Axis, ...]) -> dict[str, dict[str, float]]:
 
 
 def over_axes(axes: tuple[Axis, ...]) -> dict[str, list[str]]:
-    """Values of the axes (SI) at every cell of their grid, as texts by path."""
+    """Values of the axes (SI) at every cell of their grid, as texts by head of a CSV file."""
     values = [np.array(texts(a.values), dtype=object) for a in axes]
     grids = np.meshgrid(*values, indexing="ij")
-    return {a.path: grid.ravel().tolist() for a, grid in zip(axes, grids, strict=True)}
+    columns = zip(axes, grids, strict=True)
+    return {headed(a.path, a.unit): grid.ravel().tolist() for a, grid in columns}
 
 
 OF_THE_ROCK = ("friction.", "before.", "weight.", "weight_program.", "set_speed")

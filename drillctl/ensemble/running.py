@@ -24,6 +24,8 @@ import math
 import pickle
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import islice
@@ -35,7 +37,7 @@ from numpy.typing import NDArray
 from drillctl.arrays import Array, Index, Mask
 from drillctl.errors import InputError, SimulationError
 from drillctl.progress import SILENT, Progress
-from drillctl.provenance import provenance
+from drillctl.provenance import merged, provenance
 from drillctl.simulation.batch import Prepared, run_batch, warm_up
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
@@ -67,6 +69,24 @@ class Measured:
     seconds: float  # spent in the lanes alone, their kernels loaded
 
 
+Steps = Callable[[list[Run], tuple[str, ...], float, Callable[[], Measured]], Measured]
+_STEPS: ContextVar[Steps | None] = ContextVar("steps", default=None)
+
+
+@contextmanager
+def kept(steps: Steps | None) -> Iterator[None]:
+    """Keep what is collected meanwhile, each time in its turn, so that a search resumes.
+
+    A search asks for the same runs in the same order whenever it begins with the same design: what
+    lies between them is computed again, and they are read.
+    """
+    token = _STEPS.set(steps)
+    try:
+        yield
+    finally:
+        _STEPS.reset(token)
+
+
 def collect(
     runs: Iterable[Run],
     size: int,
@@ -74,6 +94,14 @@ def collect(
     give_up: float = math.inf,
 ) -> Measured:
     """Run lanes, and stop those whose J1 passes a level (s)."""
+    steps = _STEPS.get()
+    if steps is None:
+        return _collected(runs, size, names, give_up)
+    runs = list(runs)
+    return steps(runs, names, give_up, lambda: _collected(runs, size, names, give_up))
+
+
+def _collected(runs: Iterable[Run], size: int, names: tuple[str, ...], give_up: float) -> Measured:
     measures = {name: np.full(size, np.nan) for name in names}
     status = np.full(size, FAILED, dtype=np.int8)
     schemes, seconds = set[Scheme](), 0.0
@@ -233,8 +261,9 @@ DEATHS = 20  # workers that may die over one block before it is taken to be the 
 class Cluster:
     """Blocks on the workers of a dask.distributed cluster."""
 
-    def __init__(self, client: Client, allow_mixed: bool = False) -> None:
-        self._client, self._allow_mixed = client, allow_mixed
+    def __init__(self, client: Client, allow_other_machine: bool = False) -> None:
+        self._client, self._allow_other_machine = client, allow_other_machine
+        self.origin = provenance()  # versions and processors of all workers so far
 
     def __call__(self, job: Job, pieces: Pieces) -> Iterator[Block]:
         """The blocks, in the order in which they are finished."""
@@ -244,6 +273,7 @@ class Cluster:
             return
         for theirs in self._client.run(provenance).values():
             self._refuse_other(theirs)
+            self.origin = merged(self.origin, theirs)
         sent = pickle.dumps(job)
         left = iter(pieces)
         running: dict[str, tuple[int, int]] = {}
@@ -263,6 +293,7 @@ class Cluster:
             if error is None:
                 block: Block = future.result()
                 self._refuse_other(block.provenance)
+                self.origin = merged(self.origin, block.provenance)
                 future.release()
                 yield block
                 more = next(left, None)
@@ -276,9 +307,9 @@ class Cluster:
     def _refuse_other(self, result: dict[str, str]) -> None:
         here = provenance()
         for key, value in here.items():
-            if result.get(key) == value or (key == "processor" and self._allow_mixed):
+            if result.get(key) == value or (key != "drillctl" and self._allow_other_machine):
                 continue
-            hint = " (--allow-mixed lets it)" if key == "processor" else ""
+            hint = "" if key == "drillctl" else " (--allow-other-machine lets it)"
             raise InputError(
                 f"a worker has {key} {result.get(key)}, this process {value}: results would differ "
                 f"in the last bits{hint}",

@@ -1,41 +1,34 @@
 """Where the finished blocks of a long run are stored, so that a killed run resumes.
 
-In memory; of a map as one small file a block; of realizations as a zarr store that grows. A file
-or chunk is written beside its place and moved there. Of a row of realizations the status is
-written last, and it counts as done once that is there: a run killed at any moment has lost a
-block at most.
+In memory, or in the folder of the run as one small file a block, with a line in its journal. A
+block counts as done once the line is there: a run killed at any moment has lost a block at most.
+A block that is not what its line says is computed again.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+import hashlib
+import io
+import logging
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.arrays import Array
-from drillctl.ensemble.grid import shape_of
-from drillctl.ensemble.running import Block, Blocks, Job, Make, Pieces, Scheme
+from drillctl.ensemble.running import Block, Blocks, Job, Make, Measured, Pieces, Run, Scheme, kept
 from drillctl.errors import StoreError
 from drillctl.simulation.batch import Prepared
-from drillctl.simulation.measures import MEASURES, STATUSES
 from drillctl.simulation.propagator import StringStep
 from drillctl.simulation.scheme import Scheme as StringScheme
-from drillctl.store.codec import stored_name
+from drillctl.store.folder import finished_data
+from drillctl.store.journal import Journal, reading
 from drillctl.store.json_files import picked
 
-if TYPE_CHECKING:
-    from drillctl.ensemble.realizations import Realizations
-
-NOT_RUN = -1  # status of a lane that was not run yet
-FILES = {"realizations": "data.zarr", "sensitivity": "sensitivity.zarr"}
-"""Where the realizations of a study are, in the folder of its run."""
-
+LOG = logging.getLogger("drillctl")
 
 Store = Callable[[str, Any], Blocks]
 """Gives the blocks of a job by what they belong to: `map`, `realizations` or `sensitivity`."""
@@ -46,17 +39,74 @@ def in_memory(name: str, job: Job) -> Blocks:
     return MemoryBlocks(job)
 
 
-@dataclass(frozen=True)
 class Folder:
-    """Blocks in the folder of a run."""
+    """What was computed so far in the folder of a run."""
 
-    path: Path
+    def __init__(self, path: Path) -> None:
+        self._path, self._journal = path, Journal(path)
 
     def __call__(self, name: str, job: Any) -> Blocks:
-        """Files of their own for a map, the result's own data for realizations."""
-        if name in FILES:
-            return ZarrBlocks(self.path, name, job)
-        return FileBlocks(self.path / "blocks", job)
+        """The blocks of a job; those of draws that more are added to come from their result."""
+        blocks = FileBlocks(Files(self._path, self._journal, f"blocks/{name}"), job)
+        if name == "realizations":
+            self._take(blocks, job)
+        return blocks
+
+    @property
+    def steps(self) -> Steps:
+        """The runs of a search."""
+        return Steps(Files(self._path, self._journal, "blocks/steps"))
+
+    def _take(self, blocks: FileBlocks, job: Job) -> None:
+        try:
+            before = finished_data(self._path, self._journal)
+        except StoreError as error:
+            LOG.warning("%s; computed again", error)
+            return
+        if before is None:
+            return
+        status = before.status.reshape(len(before.status), -1)
+        for first, count in blocks.missing(len(status)):
+            rows = slice(first, first + count)
+            measures = {k: before.measures[k][rows].reshape(count, -1) for k in job.measures}
+            blocks.keep(Block(first, measures, status[rows]))
+
+
+def kept_in(path: Path | None) -> AbstractContextManager[None]:
+    """While it lasts, what a search runs is kept in the folder of its run, if there is one."""
+    return kept(None if path is None else Folder(path).steps)
+
+
+class Files:
+    """Arrays in files of a folder that its journal knows."""
+
+    def __init__(self, path: Path, journal: Journal, folder: str) -> None:
+        self._path, self._journal, self._folder = path, journal, folder
+        (path / folder).mkdir(parents=True, exist_ok=True)
+
+    def numbers(self) -> list[int]:
+        """Of the files that are called by a number."""
+        names = [n for n in self._journal.held if n.startswith(f"{self._folder}/")]
+        return sorted(int(stem) for n in names if (stem := Path(n).stem).isdigit())
+
+    def write(self, name: str, arrays: dict[str, Any]) -> None:
+        """Write arrays."""
+        content = io.BytesIO()
+        np.savez(content, **arrays)
+        self._journal.write(f"{self._folder}/{name}.npz", content.getvalue())
+
+    def read(self, name: str) -> dict[str, Any] | None:
+        """Arrays as they were written; None if there are none, or a note if they are damaged."""
+        place = f"{self._folder}/{name}.npz"
+        if place not in self._journal.held:
+            return None
+        try:
+            content = self._journal.read(place)
+            with reading(self._path / place), np.load(io.BytesIO(content)) as held:
+                return dict(held)
+        except StoreError as error:
+            LOG.warning("%s; computed again", error)
+            return None
 
 
 class MemoryBlocks:
@@ -75,15 +125,19 @@ class MemoryBlocks:
 
     def missing(self, rows: int) -> Pieces:
         """Blocks that the first `rows` rows still lack; room is made for them."""
+        self._make_room(rows)
+        return self._job.pieces(self._done[:rows])
+
+    def _make_room(self, rows: int) -> None:
         more = rows - len(self._done)
         if more > 0:
             self._measures = {name: _longer(v, rows) for name, v in self._measures.items()}
             self._status = _longer(self._status, rows)
             self._done = np.append(self._done, np.zeros(more, dtype=bool))
-        return self._job.pieces(self._done[:rows])
 
     def keep(self, block: Block) -> None:
         """Keep a finished block."""
+        self._make_room(block.first + len(block.status))
         rows = slice(block.first, block.first + len(block.status))
         for name, values in self._measures.items():
             values[rows] = block.measures[name]
@@ -110,131 +164,75 @@ def _longer(values: NDArray[Any], rows: int) -> NDArray[Any]:
 class FileBlocks(MemoryBlocks):
     """Blocks in memory and as files, one a block, by the number of its first row."""
 
-    def __init__(self, folder: Path, job: Job) -> None:
+    def __init__(self, files: Files, job: Job) -> None:
         super().__init__(job)
-        self._folder = folder
-        folder.mkdir(exist_ok=True)
+        self._files = files
+        for first in files.numbers():
+            if (held := files.read(f"{first:06d}")) is not None:
+                super().keep(self._read(first, held))
 
     def prepared(self, number: int, make: Make) -> Prepared:
         """The string of a number, read back if it was prepared before."""
-        return stored_string(self._folder, number, make)
-
-    def missing(self, rows: int) -> Pieces:
-        """Blocks that neither memory nor the folder has."""
-        for first, count in super().missing(rows):
-            if (path := self._path(first)).is_file():
-                with np.load(path, allow_pickle=False) as held:
-                    if len(held["status"]) == count:
-                        super().keep(self._read(first, held))
-        return super().missing(rows)
+        name = f"string-{number:06d}"
+        if (held := self._files.read(name)) is not None:
+            return _string_from(held)
+        made = make()
+        self._files.write(name, _string_arrays(made))
+        return made
 
     def keep(self, block: Block) -> None:
         """Write a finished block."""
         measures = np.stack([block.measures[name] for name in self._job.measures])
         used = np.array(sorted(block.schemes))
         arrays = {"measures": measures, "status": block.status, "schemes": used}
-        write_npz(self._path(block.first), arrays)
+        self._files.write(f"{block.first:06d}", arrays)
         super().keep(block)
 
-    def _path(self, first: int) -> Path:
-        return self._folder / f"{first:06d}.npz"
-
-    def _read(self, first: int, held: Any) -> Block:
+    def _read(self, first: int, held: dict[str, Any]) -> Block:
         measures = dict(zip(self._job.measures, held["measures"], strict=True))
-        used = frozenset((float(step), int(modes)) for step, modes in held["schemes"])
-        return Block(first, measures, held["status"], used)
+        return Block(first, measures, held["status"], _schemes(held["schemes"]))
 
 
-class ZarrBlocks:
-    """Realizations in a zarr store that grows, a chunk of every array a block."""
-
-    def __init__(self, folder: Path, name: str, job: Realizations) -> None:
-        import zarr
-
-        self._path, self._job = folder / FILES[name], job
-        self._strings = folder / f"strings-{name}"
-        with disk_errors(self._path):
-            for left in self._path.rglob("*.partial"):  # of a write that was killed
-                left.unlink(missing_ok=True)
-            self._group = zarr.open_group(self._path, mode="a", zarr_format=3)
-            for measure in job.measures:
-                self._array(measure, float, np.nan, {"units": MEASURES[measure].unit})
-            flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
-            self._array("status", np.int8, NOT_RUN, flags)
-
-    def _array(self, name: str, dtype: Any, fill: Any, attributes: dict[str, Any]) -> None:
-        if name in self._group:
-            return
-        shape = shape_of(self._job.axes)
-        self._group.create_array(
-            name, shape=(0, *shape), chunks=(self._job.block, *shape), dtype=dtype,
-            fill_value=fill, compressors=None, attributes=attributes,
-            dimension_names=["realization", *(stored_name(a.path) for a in self._job.axes)],
-        )  # fmt: skip
-
-    def prepared(self, number: int, make: Make) -> Prepared:
-        """The string of a part of the map, read back if it was prepared before."""
-        with disk_errors(self._strings):
-            self._strings.mkdir(exist_ok=True)
-            return stored_string(self._strings, number, make)
-
-    def missing(self, rows: int) -> Pieces:
-        """Blocks that the first `rows` realizations still lack; room is made for them."""
-        with disk_errors(self._path):
-            for name in (*self._job.measures, "status"):
-                array = self._group[name]
-                if array.shape[0] < rows:
-                    array.resize((rows, *array.shape[1:]))
-            done = self._group["status"][:rows].reshape(rows, -1)[:, 0] != NOT_RUN
-        return self._job.pieces(done)
-
-    def keep(self, block: Block) -> None:
-        """Write a finished block."""
-        rows = slice(block.first, block.first + len(block.status))
-        with disk_errors(self._path):
-            for name in (*self._job.measures, "status"):
-                array = self._group[name]
-                values = block.status if name == "status" else block.measures[name]
-                array[rows] = values.reshape((len(values), *array.shape[1:]))
-
-    def read(self, rows: int) -> tuple[dict[str, Array], NDArray[np.int8]]:
-        """Measures and status of the first `rows` realizations."""
-        with disk_errors(self._path):
-            measures = {name: self._flat(name, rows) for name in self._job.measures}
-            return measures, self._flat("status", rows)
-
-    def _flat(self, name: str, rows: int) -> NDArray[Any]:
-        values: NDArray[Any] = self._group[name][:rows]
-        return values.reshape(rows, -1)
-
-    @property
-    def schemes(self) -> frozenset[Scheme]:
-        """None: nothing is held in memory."""
-        return frozenset()
+def _schemes(pairs: Any) -> frozenset[Scheme]:
+    return frozenset((float(step), int(modes)) for step, modes in pairs)
 
 
-@contextmanager
-def disk_errors(path: Path) -> Iterator[None]:
-    """Failures of the disk, reported with what has become of the run."""
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise StoreError(
-            f"{path}: cannot be written: {reason}; finished blocks are kept, and the same command "
-            "goes on from them"
-        ) from None
+class Steps:
+    """Runs of a search in files by their number: the search repeats itself up to where it was."""
+
+    def __init__(self, files: Files) -> None:
+        self._files, self._number = files, 0
+
+    def __call__(
+        self, runs: list[Run], names: tuple[str, ...], give_up: float, run: Callable[[], Measured]
+    ) -> Measured:
+        """What was measured of runs, read back if they were run before."""
+        name = f"{self._number:06d}"
+        self._number += 1
+        key = _key(runs, names, give_up)
+        held = self._files.read(name)
+        if held is not None and str(held["key"]) == key:
+            measures = dict(zip(names, held["measures"], strict=True))
+            seconds = float(held["seconds"])
+            return Measured(measures, held["status"], _schemes(held["schemes"]), seconds)
+        result = run()
+        self._files.write(name, {
+            "key": key, "measures": np.stack([result.measures[one] for one in names]),
+            "status": result.status, "schemes": np.array(sorted(result.schemes)),
+            "seconds": result.seconds,
+        })  # fmt: skip
+        return result
 
 
-def stored_string(folder: Path, number: int, make: Make) -> Prepared:
-    """The string of a number, read back if it was prepared before."""
-    path = folder / f"string-{number:06d}.npz"
-    if not path.is_file():
-        made = make()
-        write_npz(path, _string_arrays(made))
-        return made
-    with np.load(path, allow_pickle=False) as held:
-        return _string_from(dict(held))
+def _key(runs: list[Run], names: tuple[str, ...], give_up: float) -> str:
+    """Hash of the numbers of all lanes; another machine may prepare other bits of a string."""
+    result = hashlib.sha256(repr((names, give_up)).encode())
+    for lanes, prepared, at in runs:
+        laws = (lanes.friction, lanes.drive, lanes.weight, lanes.before, *lanes.program[:2])
+        result.update(repr((prepared.scheme, prepared.duration, *map(type, laws))).encode())
+        for column in (at, lanes.set_speed, lanes.turning_speed, *(c for law in laws for c in law)):
+            result.update(np.asarray(column).tobytes())
+    return result.hexdigest()
 
 
 def _string_arrays(prepared: Prepared) -> dict[str, Any]:
@@ -264,13 +262,3 @@ def _string_from(held: dict[str, Any]) -> Prepared:
 
 def _number(array: Any) -> Any:
     return float(array) if array.ndim == 0 else array
-
-
-def write_npz(path: Path, arrays: dict[str, Any]) -> None:
-    """Write beside the target and move: a reader sees a whole file or none."""
-    part = path.with_suffix(".part")
-    with part.open("wb") as stream:
-        np.savez(stream, **arrays)
-        stream.flush()
-        os.fsync(stream.fileno())
-    part.replace(path)

@@ -50,7 +50,7 @@ from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES, sta
 from drillctl.store.codec import documented, label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
-from drillctl.store.tables import texts, write_columns
+from drillctl.store.tables import headed, texts, write_columns
 
 if TYPE_CHECKING:
     import shapely
@@ -416,6 +416,7 @@ def responses(result: Sweep, count: int = 4) -> list[Simulation]:
 
 def write_cells(result: Sweep, path: Path) -> None:
     """Write a row a cell: parameters, measures (SI) and status."""
-    columns = over_axes(result.axes) | {name: texts(v) for name, v in result.measures.items()}
+    columns = over_axes(result.axes)
+    columns |= {headed(k, MEASURES[k].unit): texts(v) for k, v in result.measures.items()}
     columns["status"] = np.array(STATUSES, dtype=object)[result.status.ravel()].tolist()
     write_columns(path, columns)

@@ -17,7 +17,6 @@ from drillctl.progress import SILENT, Progress
 from drillctl.reporting.blocks import Block, Text, Words, block, figure
 from drillctl.reporting.cells import CELLS
 from drillctl.store.json_files import read_json
-from drillctl.store.result import Result
 from drillctl.studies.base import Check, Recipe, Requested, Run, studies
 from drillctl.studies.base import Study as Kind
 
@@ -306,18 +305,18 @@ def _study(
     except InputError as error:
         return ended("failed", str(error))
     options = study.defaults() | dict(recipe.options)
-    run = store.claim(study.name, design, place, study.growing(design), **study.settings(options))
-    if run.finished:
-        return ended("done")
-    try:
-        compute = recipe.compute or study.computed
-        result = compute(design, Run(options, progress, run.path))
-        if isinstance(result, Result):
-            result.write(run.path)
-        run.finish(recipe.summary(result))
-    except KeyboardInterrupt:
-        return ended("interrupted", INTERRUPTED)
-    except (DrillctlError, ArithmeticError, MemoryError, ValueError) as error:
-        run.discard()
-        return ended("failed", str(error) or type(error).__name__)
+    with store.claim(
+        study.name, design, place, study.growing(design), **study.settings(options)
+    ) as run:
+        if run.finished:
+            return ended("done")
+        try:
+            compute = recipe.compute or study.computed
+            result = compute(design, Run(options, progress, run.path))
+            run.conclude(result, recipe.summary(result))
+        except KeyboardInterrupt:
+            return ended("interrupted", INTERRUPTED)
+        except (DrillctlError, ArithmeticError, MemoryError, ValueError) as error:
+            run.discard()
+            return ended("failed", str(error) or type(error).__name__)
     return ended("done")

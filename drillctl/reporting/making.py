@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -213,16 +214,24 @@ def report(
     wanted, named = chosen_sections(sections), set(formats)
     _known(named, FORMATS, "format", "--format")
     kinds = tuple(name for name in FORMATS if name in named) or ("html",)
-    run = store.claim("report", design, folder, profile=spent.name)
-    words = Words(system)
-    studies = studies_of(wanted)
-    with drawing_helpers(processes - 1) as helpers:
-        gathered = gather(design, spent, run.path / "studies", studies, words, progress)
-        interrupted = any(one.why == INTERRUPTED for one in gathered.studies.values())
-        progress.begin("writing the report", 1)
-        document = compose(gathered, wanted, title)
-        files = FigureFiles(run.path / "figures", gathered)
-        problems = (*gathered.problems, *files.collect(document, helpers))
+    with (
+        store.claim("report", design, folder, profile=spent.name) as run,
+        drawing_helpers(processes - 1) as helpers,
+    ):
+        return _report(design, run, spent, wanted, title, kinds, Words(system), progress, helpers)
+
+
+def _report(
+    design: Design, run: store.RunFolder, profile: Profile, wanted: tuple[str, ...],
+    title: str | None, kinds: tuple[Format, ...], words: Words, progress: Progress,
+    helpers: Executor | None,
+) -> Report:  # fmt: skip
+    gathered = gather(design, profile, run.path / "studies", studies_of(wanted), words, progress)
+    interrupted = any(one.why == INTERRUPTED for one in gathered.studies.values())
+    progress.begin("writing the report", 1)
+    document = compose(gathered, wanted, title)
+    files = FigureFiles(run.path / "figures", gathered)
+    problems = (*gathered.problems, *files.collect(document, helpers))
     document = replace(document, problems=problems)
     written, unwritten = write(document, files, run.path, kinds)
     if not written:
@@ -231,7 +240,7 @@ def report(
     if problems:
         write_json(run.path / "summary.json", content)  # unfinished: the same call resumes it
     else:
-        run.finish(content)
+        run.conclude(None, content)
     return Report(run.path, written, problems, interrupted, unwritten, content)
 
 

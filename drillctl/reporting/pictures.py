@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import signal
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from drillctl.errors import DrillctlError, InputError
 from drillctl.plots.style import axes_or_new, default_look, lay_out
 from drillctl.reporting.blocks import Document, Figure, InteractiveMap
 from drillctl.reporting.gather import Gathered
-from drillctl.store.json_files import read_json, write_json, write_text
+from drillctl.store.json_files import read_json, replaced, write_json, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
@@ -148,13 +149,12 @@ def _saved(folder: Path, figure: Figure) -> Picture:
             crowd.set_rasterized(crowd.get_rasterized() or len(crowd.get_paths()) > MOST_SHAPES)
     lay_out(drawn, DPI)
     svg = folder / f"{figure.name}.svg"
-    part = svg.with_suffix(".part")
-    drawn.savefig(part, format="svg", dpi=DPI, metadata={"Date": None})
-    write_text(svg, _small(part.read_text(encoding="utf-8")))
-    part.unlink(missing_ok=True)
+    text = io.StringIO()
+    drawn.savefig(text, format="svg", dpi=DPI, metadata={"Date": None})
+    write_text(svg, _small(text.getvalue()))
     place = drawn.axes[0].get_position()
-    drawn.savefig(part, format="png", dpi=DPI)
-    part.replace(svg.with_suffix(".png"))
+    with replaced(svg.with_suffix(".png")) as part:
+        drawn.savefig(part, format="png", dpi=DPI)
     width, height = (72.0 * float(inches) for inches in drawn.get_size_inches())
     left, up = float(place.x0), 1.0 - float(place.y1)
     box = (left, up, float(place.width), float(place.height))

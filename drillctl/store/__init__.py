@@ -2,10 +2,15 @@
 
     run.json       verb, version, identity, provenance; whether the run is finished
     design.toml    the resolved design
-    blocks/        finished blocks of an unfinished map, written atomically
-    data.zarr      the dataset, labelled by parameter path; under uncertainty it grows by blocks
-    summary.json   what the command printed
+    blocks/        finished blocks of an unfinished run
+    data.zarr      the dataset, labelled by parameter path; result.json says how to read it
+    summary.json   what the command prints
+    journal.jsonl  the hash of every file as it was written
     *.png, *.csv   figures and tables
+
+`folder.py`: whose folder it is, how a run begins and ends; `lock.py`, `journal.py`: one process at
+a time, and whether a file is what was written; `codec.py`: a result as arrays and JSON;
+`result.py`: their base class; `tables.py`: tables for terminal, CSV and reports.
 
 No pickle anywhere; a folder with any other content is never written to.
 """

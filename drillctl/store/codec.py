@@ -14,9 +14,13 @@ only dataclasses and named tuples are made: reading a folder runs no code of its
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 import math
+import re
 import shutil
 import tomllib
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -28,9 +32,9 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design, to_toml
 from drillctl.design.validation import validated
-from drillctl.errors import StoreError
 from drillctl.provenance import provenance
-from drillctl.store.json_files import read_json, write_json
+from drillctl.store.journal import reading, writing
+from drillctl.store.json_files import replaced, write_json
 
 if TYPE_CHECKING:
     import xarray
@@ -93,9 +97,21 @@ def _described(one: Label) -> str:
     return "; ".join(part for part in parts if part) or "See the class."
 
 
+LONGEST = 200  # bytes of the name of a file
+
+
 def stored_name(name: str) -> str:
-    """Name of a variable on disk: zarr reads a slash, which a section name may hold, as a group."""
-    return name.replace("/", "%2F")
+    """Name of a variable on disk, where a slash, a dot alone or 300 letters are no name."""
+    safe = re.sub(r"[/\\%\x00-\x1f]|^\.+$|^_(?=_)|^$", _escaped, name)
+    content = safe.encode()
+    if len(content) <= LONGEST:
+        return safe
+    start = content[: LONGEST - 17].decode(errors="ignore")
+    return f"{start}~{hashlib.sha256(content).hexdigest()[:16]}"
+
+
+def _escaped(match: re.Match[str]) -> str:
+    return "".join(f"%{ord(one):02X}" for one in match[0]) or "%"
 
 
 TREE = "result.json"
@@ -315,24 +331,32 @@ def write(result: Any, folder: Path) -> None:
     The store is what xarray would write. Without it, and without the packages that it brings, a
     command is done a second sooner.
     """
-    import zarr
-
     tree, variables = encoded(result)
     for name, (dims, values, *about) in result.derived().items():
         over = (dims,) if isinstance(dims, str) else tuple(dims)
         variables[name] = _Variable(over, np.asarray(values), *(about or ({},)))
-    part, target = folder / "data.part", folder / DATA
-    shutil.rmtree(part, ignore_errors=True)
     origin = provenance() | dict(getattr(result, "provenance", None) or {})
-    group = zarr.create_group(part, zarr_format=3, attributes=origin)
-    for name, one in variables.items():
-        _put(group, stored_name(name), one)
-    shutil.rmtree(target, ignore_errors=True)
-    part.rename(target)
+    target = folder / DATA
+    with writing(target), replaced(target) as part:
+        _put_all(part, variables, origin)
+        shutil.rmtree(target, ignore_errors=True)
     write_json(folder / TREE, tree)
 
 
+def _put_all(folder: Path, variables: dict[str, _Variable], origin: dict[str, Any]) -> None:
+    import zarr
+
+    group = zarr.create_group(folder, zarr_format=3, attributes=origin)
+    for name, one in variables.items():
+        _put(group, stored_name(name), one)
+    with warnings.catch_warnings():  # zarr and xarray read it, and warn without it
+        warnings.simplefilter("ignore")
+        zarr.consolidate_metadata(group.store)
+
+
 def _put(group: Any, name: str, one: _Variable) -> None:
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
     kind, shape = one.values.dtype.kind, one.values.shape
     array = group.create_array(
         name,
@@ -340,43 +364,44 @@ def _put(group: Any, name: str, one: _Variable) -> None:
         dtype=str if kind in "OU" else one.values.dtype,
         chunks="auto" if one.values.size else tuple(max(1, n) for n in shape),
         fill_value=np.nan if kind == "f" else None,
+        compressors=(ZstdCodec(), Crc32cCodec()),
         attributes=one.attributes,
         dimension_names=[stored_name(dim) for dim in one.dims],
+        config={"write_empty_chunks": True},  # a chunk that is not there is damage
     )
     if one.values.size:
         array[...] = one.values
 
 
 def read(folder: Path) -> Any:
-    """Read the result of a folder."""
+    """Read the result of a folder, whose files were compared with their journal."""
     import zarr
 
-    try:
-        tree = read_json(folder / TREE)
-        if not isinstance(tree, dict):
-            raise ValueError(f"{TREE} is not of a result")
-        return decoded(tree, _Arrays(zarr.open_group(folder / DATA, mode="r")))
-    except (OSError, KeyError, TypeError, ValueError, AttributeError, ImportError) as error:
-        raise StoreError(f"{folder}: {TREE} or {DATA} cannot be read: {error}") from None
+    with reading(folder / DATA):
+        arrays = _Arrays(folder / DATA, zarr.open_group(folder / DATA, mode="r"))
+    with reading(folder / TREE):
+        return decoded(json.loads((folder / TREE).read_bytes()), arrays)
 
 
 class _Arrays(dict[str, NDArray[Any]]):
     """Arrays of a store, each read once."""
 
-    def __init__(self, group: Any) -> None:
+    def __init__(self, path: Path, group: Any) -> None:
         super().__init__()
-        self._group = group
+        self._path, self._group = path, group
 
     def __missing__(self, name: str) -> NDArray[Any]:
+        with reading(self._path / name):
+            self[name] = self._read(name)
+        return self[name]
+
+    def _read(self, name: str) -> NDArray[Any]:
         held = self._group[name]
         values = np.asarray(held[...])
         if values.dtype.kind not in "biufc":
             values = values.astype(object)
-        if held.attrs.get("dtype") == "bool":  # as xarray writes it
-            values = values.astype(bool)
         if (held.metadata.dimension_names or ("",))[-1:] == ("complex",):
             values = np.asarray(values[..., 0] + 1j * values[..., 1])
-        self[name] = values
         return values
 
 

@@ -1,26 +1,34 @@
-"""Differences between a run and the run that a folder was made for.
+"""The folder of a run: claimed by one run, locked, resumed only by the same run, and checked.
 
-The folder of a run: claimed by one run, resumed only by the same run.
+`run.json` says what the run is and whether it is finished; its line in the journal is written
+before it. So the moments at which a run may be killed differ from damage: a `run.json` that the
+journal never had was changed by someone else.
 """
 
 from __future__ import annotations
 
 import hashlib
 import itertools
+import json
 import os
+import re
 import shutil
 import tomllib
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import drillctl
 from drillctl.design import Design, to_toml
 from drillctl.design.reading import to_tree
-from drillctl.errors import InputError, shown
-from drillctl.provenance import provenance
-from drillctl.store.json_files import read_json, write_json, write_text
+from drillctl.errors import InputError, StoreError, shown
+from drillctl.provenance import merged, provenance
+from drillctl.store.journal import NAME, Journal, reading
+from drillctl.store.json_files import PART, as_json, write_json
+from drillctl.store.lock import ENDING, FolderLock
 
 MOST = 3  # largest number of keys in a message
 LONGEST = 57  # longest list printed in full (characters)
@@ -95,22 +103,48 @@ def growing_realizations(design: Design) -> Growing | None:
     )
 
 
-def refuse_other_machine(held: dict[str, str], where: str, allow_mixed: bool) -> None:
+def refuse_other_machine(held: Mapping[str, str], where: str, allowed: bool) -> None:
     """Refuse (`InputError`) to resume a run of other packages or another processor."""
     here = provenance()
     other = [key for key in here if held.get(key) != here[key]]
-    if allow_mixed and other == ["processor"]:
-        return
-    if other:
+    if other and not allowed:
         text = ", ".join(f"{key} {held.get(key)}, here {here[key]}" for key in other)
         raise InputError(
             "holds a run started with other packages or on another processor, whose bits would "
-            f"differ; give another folder ({text})",
+            f"differ; give another folder, or --allow-other-machine ({text})",
             where,
         )
 
 
-RUNS = Path("runs")  # parent folder of runs without --out
+RUNS = "runs"  # parent folder of runs without --out
+LONGEST_NAME, LONGEST_PATH = 240, 3800  # bytes that leave room for the files of a run
+
+
+def resolved(folder: str | Path, where: str = "--out") -> Path:
+    """The place of a folder; `InputError` for what cannot be one.
+
+    Parameters
+    ----------
+    folder : str or Path
+        As it was given; `~` is the home of the user.
+    where : str
+        Option that named it, for a message.
+    """
+    text = os.fspath(folder)
+    if "::" in text or "\0" in text or re.match(r"[\w+.-]{2,}:/", text):
+        raise InputError(f"{shown(text)} is the address of something else than a folder", where)
+    try:
+        path = Path(os.path.realpath(Path(text).expanduser()))
+    except RuntimeError as error:
+        raise InputError(f"{shown(text)} cannot be a folder: {error}", where) from None
+    name, whole = (len(os.fsencode(one)) for one in (path.name, path))
+    if name > LONGEST_NAME or whole > LONGEST_PATH:
+        raise InputError(
+            f"{shown(text)} is too long: at most {LONGEST_NAME} bytes a name and {LONGEST_PATH} in "
+            "all",
+            where,
+        )
+    return path
 
 
 def identity(verb: str, design: Design, **settings: Any) -> str:
@@ -119,9 +153,99 @@ def identity(verb: str, design: Design, **settings: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+RUN, DESIGN, SUMMARY, BLOCKS = "run.json", "design.toml", "summary.json", "blocks"
+DATA = (DESIGN, SUMMARY, "result.json", "cells.json", "data.zarr")
+"""Files of a finished run without which it is not what it says, beside `run.json`."""
+KEPT = ("blocks/sensitivity/", "blocks/realizations/string")
+"""Blocks that a run needs again when draws are added to it."""
+
+
+def _is_data(name: str) -> bool:
+    return name.partition("/")[0] in DATA
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a folder holds of a run."""
+
+    about: dict[str, Any]  # content of `run.json`
+    journal: Journal
+    # whether the run ended; None where it was killed as it began or ended, or `run.json` is old
+    finished: bool | None
+
+
+def found(path: Path) -> Found:
+    """What a folder holds, read and compared with its journal.
+
+    Raises
+    ------
+    InputError
+        Not a run, or one of a version without a journal.
+    StoreError
+        `run.json` or the journal is missing or damaged.
+    """
+    journal, place = Journal(path), path / RUN
+    known = journal.path.exists()
+    if not known and not place.is_file():
+        raise InputError("is not a saved run: run.json is missing", str(path))
+    with reading(place):
+        content = place.read_bytes()
+    about = _parsed(content)
+    version = about.get("provenance", {}).get("drillctl")
+    if not known and version == drillctl.__version__:
+        raise StoreError(f"{journal.path}: is missing")
+    if not known and not isinstance(version, str):
+        raise InputError("holds a run.json that drillctl did not write", str(path))
+    if not known:
+        raise InputError(
+            f"holds a run of {about.get('verb')!r} by version {version}, in a format that this "
+            f"version does not read; run the command again in a new folder, or read it with "
+            f"drillctl {version}",
+            str(path),
+        )
+    digest = hashlib.sha256(content).hexdigest()
+    if digest not in journal.before.get(RUN, ()):
+        raise StoreError(f"{place}: is damaged, or {NAME} is: they do not belong together")
+    return Found(about, journal, about["finished"] if digest == journal.held[RUN] else None)
+
+
+def _parsed(content: bytes) -> dict[str, Any]:
+    """The content of `run.json`; nothing if it is not one."""
+    try:
+        about = json.loads(content)
+    except (ValueError, RecursionError):
+        return {}
+    right = isinstance(about, dict) and isinstance(about.get("provenance"), dict)
+    return about if right else {}
+
+
+def finished_run(path: Path) -> Path:
+    """The folder of a finished run with a result, every file of it as it was written."""
+    here = found(path)
+    if here.finished is None:
+        raise StoreError(f"{path / RUN}: is older than {NAME} says; run the command again")
+    if not here.finished:
+        raise InputError("holds an unfinished run; run the command again", str(path))
+    here.journal.verify(filter(_is_data, here.journal.held))
+    if "result.json" not in here.journal.held:
+        verb = here.about.get("verb")
+        raise InputError(f"holds a run of {verb!r}, which is not opened from Python", str(path))
+    return path
+
+
+def finished_data(path: Path, journal: Journal) -> Any:
+    """The result that a run ended with before it was begun again; None if it never ended."""
+    if "result.json" not in journal.held:
+        return None
+    from drillctl.store.codec import read
+
+    journal.verify(name for name in journal.held if _is_data(name) and name != DESIGN)
+    return read(path)
+
+
 @dataclass(frozen=True)
 class RunFolder:
-    """A folder that belongs to one run.
+    """A folder that belongs to one run of this process, until it is released.
 
     Attributes
     ----------
@@ -131,6 +255,12 @@ class RunFolder:
         Command that made it.
     finished : bool
         Whether it held the finished run when it was opened.
+    about : dict
+        Content of `run.json`.
+    lock : FolderLock or None
+        None for a finished run where nothing can be written.
+    shown : Path
+        The folder as it was named.
     made : bool
         Whether this run created the folder.
     """
@@ -138,30 +268,121 @@ class RunFolder:
     path: Path
     verb: str
     finished: bool
+    about: dict[str, Any]
+    lock: FolderLock | None
+    shown: Path
     made: bool = False
 
+    def __enter__(self) -> Self:
+        """Nothing: it is held already."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:  # fmt: skip
+        """Release it."""
+        self.release()
+
+    def release(self) -> None:
+        """Let other processes have the folder."""
+        if self.lock is not None:
+            self.lock.release()
+
     def summary(self) -> dict[str, Any]:
-        """The summary of a finished run."""
-        result: dict[str, Any] = read_json(self.path / "summary.json")
+        """The summary of a finished run; `StoreError` if it is damaged."""
+        result: dict[str, Any] = json.loads(Journal(self.path).read(SUMMARY))
         return result
 
-    def finish(self, summary: dict[str, Any]) -> None:
-        """Write the summary, mark the run finished and drop its blocks."""
-        write_json(self.path / "summary.json", summary)
-        about = read_json(self.path / "run.json")
-        write_json(self.path / "run.json", about | {"finished": True})
-        shutil.rmtree(self.path / "blocks", ignore_errors=True)
+    def conclude(self, result: Any, summary: dict[str, Any]) -> None:
+        """Write a result and its summary, mark the run finished and drop its blocks.
+
+        Parameters
+        ----------
+        result : Result or None
+            None for a run that has no arrays, or has written its files itself.
+        summary : dict
+            Strict JSON values.
+        """
+        about = dict(self.about)
+        if hasattr(result, "write"):
+            about["provenance"] = _origin(result, about["provenance"])
+            if hasattr(result, "provenance"):
+                result = replace(result, provenance=about["provenance"])
+            result.write(self.path)
+        write_json(self.path / SUMMARY, summary)
+        journal = Journal(self.path)
+        names = {name for name in self._files() if _is_data(name)} - {DESIGN}
+        journal.forget(name for name in [*journal.held] if _is_old(name, names))
+        journal.note(sorted(names))
+        journal.announce(RUN, as_json(about | {"finished": True}))
+        self._drop_blocks(journal)
+
+    def _files(self) -> Iterator[str]:
+        for path in self.path.rglob("*"):
+            if path.is_file():
+                yield path.relative_to(self.path).as_posix()
+
+    def _drop_blocks(self, journal: Journal) -> None:
+        kept = KEPT if "count" in self.about else ()
+        gone = [n for n in journal.held if n.startswith(f"{BLOCKS}/") and not n.startswith(kept)]
+        journal.forget(gone)
+        for name in gone:
+            (self.path / name).unlink(missing_ok=True)
+        for path in sorted(self.path.glob(f"{BLOCKS}/**/"), reverse=True):
+            with suppress(OSError):  # what is kept lies in it
+                path.rmdir()
+
+    @contextmanager
+    def beside(self) -> Iterator[None]:
+        """Enter the pictures and tables that are written meanwhile in the journal."""
+        before = self._beside()
+        yield
+        journal = Journal(self.path)
+        now = self._beside()
+        journal.note(name for name, time in now.items() if before.get(name) != time)
+
+    def _beside(self) -> dict[str, int]:
+        """Times of all files beside the data."""
+        return {
+            path.name: path.stat().st_mtime_ns
+            for path in self.path.iterdir()
+            if path.is_file() and path.name not in (*DATA, RUN, NAME, ENDING)
+        }
+
+    def changed(self) -> list[str] | None:
+        """What is wrong with pictures and tables of a finished run; None if it has none yet."""
+        journal = Journal(self.path)
+        names = [n for n in journal.held if not (n == RUN or _is_data(n) or n.startswith(BLOCKS))]
+        return journal.changed(names) if names else None
 
     def discard(self) -> None:
-        """Remove what `claim` wrote, for a run that proved invalid."""
-        if any((self.path / "blocks").glob("[0-9]*.npz")) or (self.path / "data.zarr").exists():
-            return  # never delete computed blocks
-        shutil.rmtree(self.path / "blocks", ignore_errors=True)
-        for name in ("design.toml", "run.json"):
-            (self.path / name).unlink(missing_ok=True)
-        if self.made:
-            with suppress(OSError):  # something else was added meanwhile
-                self.path.rmdir()
+        """Remove what `claim` wrote, for a run that failed; finished blocks are kept."""
+        if not self.finished and not any(map(_is_work, self._files())):
+            shutil.rmtree(self.path / BLOCKS, ignore_errors=True)
+            for name in (DESIGN, RUN, NAME):
+                (self.path / name).unlink(missing_ok=True)
+            if self.made:
+                with suppress(OSError):  # something else was added meanwhile
+                    self.path.rmdir()
+        self.release()
+
+
+def _origin(result: Any, begun: Mapping[str, str]) -> dict[str, str]:
+    """Where a result came from: from more than one machine if it was resumed on another."""
+    own = getattr(result, "provenance", None) or provenance()
+    return merged(begun, own)
+
+
+def _is_old(name: str, names: set[str]) -> bool:
+    """Whether a file is of an earlier end of the run: data that are gone, pictures and tables."""
+    return name not in (RUN, DESIGN) and not name.startswith(BLOCKS) and name not in names
+
+
+def _is_work(name: str) -> bool:
+    """Whether a file holds what was computed."""
+    block = name.startswith(f"{BLOCKS}/") and not Path(name).name.startswith("string")
+    return block or name.startswith("data.zarr/")
 
 
 def claim(
@@ -169,10 +390,10 @@ def claim(
     design: Design,
     folder: str | Path | None,
     growing: Growing | None = None,
-    allow_mixed: bool = False,
+    allow_other_machine: bool = False,
     **settings: Any,
 ) -> RunFolder:
-    """Create the folder of a run, or reuse one that holds the same run.
+    """Create and lock the folder of a run, or one that holds the same run.
 
     Parameters
     ----------
@@ -184,102 +405,137 @@ def claim(
         By default a new folder under `runs`.
     growing : Growing, optional
         Count of draws to which a finished run may be extended.
-    allow_mixed : bool
-        Whether an unfinished run may resume on another type of processor.
+    allow_other_machine : bool
+        Whether an unfinished run may resume on another type of processor or with other packages.
     **settings
         Other settings that the result depends on.
 
     Returns
     -------
     RunFolder
-        If unfinished, run or resume it; if finished, show its summary again.
+        If unfinished, run or resume it; if finished, show its summary again. Release it in the end.
 
     Raises
     ------
     InputError
-        The folder holds something else, or cannot be written.
+        The folder holds something else, is in use, or cannot be written.
+    StoreError
+        It is damaged.
     """
     same = design if growing is None else growing.like
     about: dict[str, Any] = {
-        "verb": verb, "identity": identity(verb, same, **settings), "design": design.name
+        "verb": verb, "identity": identity(verb, same, **settings), "design": design.name,
+        "finished": False, "provenance": provenance(),
     }  # fmt: skip
     if growing is not None:
         about["count"] = growing.count
-    path = RUNS / f"{design.name}-{verb}-*" if folder is None else Path(folder)
+    path = given = Path(RUNS) / f"{design.name}-{verb}-*" if folder is None else Path(folder)
     try:
         if folder is None:
-            path = _fresh(verb, design)
-            run = RunFolder(path, verb, finished=False, made=True)
-        elif path.exists() and not path.is_dir():
-            raise InputError("is a file, not a folder", f"--out {path}")
-        elif path.is_dir() and not _empty(path):
-            run = _same_run(path, about, same, allow_mixed)
-        else:
-            run = RunFolder(path, verb, finished=False, made=not path.exists())
-            path.mkdir(parents=True, exist_ok=True)
-        begun = (path / "run.json").exists()
-        if not begun:
-            write_json(path / "run.json", about | {"finished": False, "provenance": provenance()})
-        elif not run.finished:
-            held = about_run(path)
-            write_json(path / "run.json", held | about | {"finished": False})
-        if not run.finished:
-            write_text(path / "design.toml", to_toml(design))
+            path, given, own = _fresh(verb, design)
+            return _begun(RunFolder(path, verb, False, about, own, given, made=True), design)
+        path = resolved(folder)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock = _locked(path, given)
+        try:
+            return _claimed(path, given, lock, about, design, same, allow_other_machine)
+        except BaseException:
+            if lock is not None:
+                lock.release()
+            raise
+    except StoreError:
+        raise
     except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", f"--out {path}") from None
+        raise InputError(f"cannot be written: {error.strerror}", f"--out {given}") from None
+
+
+def _locked(path: Path, given: Path) -> FolderLock | None:
+    """The lock of a folder; None where nothing can be written, as where a finished run is read."""
+    try:
+        return FolderLock(path, f"--out {given}")
+    except PermissionError:
+        if (path / RUN).is_file():
+            return None
+        raise
+
+
+def _claimed(
+    path: Path, given: Path, lock: FolderLock | None, about: dict[str, Any], design: Design,
+    same: Design, allow_other_machine: bool,
+) -> RunFolder:  # fmt: skip
+    if path.exists() and not path.is_dir():
+        raise InputError("is a file, not a folder", f"--out {given}")
+    made = not path.exists()
+    if not made and not _empty(path):
+        run = _same_run(path, given, lock, about, same, allow_other_machine)
+        return run if run.finished else _begun(run, design)
+    path.mkdir(exist_ok=True)
+    (path / NAME).unlink(missing_ok=True)
+    return _begun(RunFolder(path, about["verb"], False, about, lock, given, made), design)
+
+
+def _begun(run: RunFolder, design: Design) -> RunFolder:
+    """The folder with what the run is; remains of writes that were killed are removed."""
+    for path in run.path.rglob(f".*{PART}"):
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    journal = Journal(run.path)
+    journal.announce(RUN, as_json(run.about))
+    journal.write(DESIGN, to_toml(design).encode())
     return run
 
 
-def _fresh(verb: str, design: Design) -> Path:
+def _fresh(verb: str, design: Design) -> tuple[Path, Path, FolderLock]:
     """Create a new folder; at once, so that no other process takes the same name."""
-    RUNS.mkdir(parents=True, exist_ok=True)
+    name = re.sub("/|::+", "-", design.name)
     for number in itertools.count(1):
-        path = RUNS / f"{design.name}-{verb}-{number}"
+        given = Path(RUNS) / f"{name}-{verb}-{number}"
+        path = resolved(given, f"the name {design.name!r}")
+        path.parent.mkdir(parents=True, exist_ok=True)
         with suppress(FileExistsError):
             path.mkdir()
             break
-    return path
+    return path, given, FolderLock(path, str(given))
 
 
 def _empty(path: Path) -> bool:
     """Whether a folder is empty, or holds only the remains of a run killed at its start."""
-    return all(item.name == "run.part" for item in path.iterdir())
+    return all(item.suffix == PART or item.name in (NAME, ENDING) for item in path.iterdir())
 
 
-def _same_run(path: Path, about: dict[str, Any], same: Design, allow_mixed: bool) -> RunFolder:
-    where = f"--out {path}"
-    if not (path / "run.json").is_file():
+def _same_run(
+    path: Path, given: Path, lock: FolderLock | None, about: dict[str, Any], same: Design,
+    allow_other_machine: bool,
+) -> RunFolder:  # fmt: skip
+    where = f"--out {given}"
+    if not (path / RUN).is_file() and not (path / NAME).is_file():
         raise InputError("holds other files than a run; give an empty or new folder", where)
-    held = about_run(path)
+    here = found(path)
+    held = here.about
     if held.get("verb") != about["verb"]:
         raise InputError(f"holds a run of {held.get('verb')!r}, not {about['verb']!r}", where)
     if held.get("identity") != about["identity"]:
         came_from = held["provenance"].get("drillctl")
         reason = "another design or other settings"
-        if came_from != drillctl.__version__:
+        if drillctl.__version__ not in came_from.split(" + "):
             reason = f"version {came_from}, this is {drillctl.__version__}"
         else:
             grown = ("uncertainty.realizations",) if "count" in about else ()
-            reason += difference(path / "design.toml", same, grown)
+            reason += difference(path / DESIGN, same, grown)
         raise InputError(f"holds a run of {reason}; give another folder", where)
+    run = RunFolder(path, about["verb"], True, held, lock, given)
     more = about.get("count", 0) - held.get("count", 0)
-    if held.get("finished") and more < 0:
+    if here.finished and more < 0:
         raise InputError(
             f"holds a run of {held['count']} realizations, {about['count']} are requested: request "
             f"at least {held['count']}, or give another folder",
             where,
         )
-    if held.get("finished") and more == 0:
-        return RunFolder(path, about["verb"], finished=True)
-    if not os.access(path, os.W_OK):
+    if here.finished and more == 0:
+        return run
+    if lock is None or not os.access(path, os.W_OK):
         raise InputError("cannot be written: permission denied", where)
-    refuse_other_machine(held["provenance"], where, allow_mixed)
-    return RunFolder(path, about["verb"], finished=False)
-
-
-def about_run(path: Path) -> dict[str, Any]:
-    """The content of `run.json`, checked to be that of a run."""
-    held = read_json(path / "run.json")
-    if not isinstance(held, dict) or not isinstance(held.get("provenance"), dict):
-        raise InputError("holds a run.json that drillctl did not write", str(path))
-    return held
+    if here.finished:
+        here.journal.verify(filter(_is_data, here.journal.held))
+    refuse_other_machine(held["provenance"], where, allow_other_machine)
+    origin = merged(held["provenance"], provenance())
+    return replace(run, finished=False, about=about | {"provenance": origin})

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from drillctl.errors import InputError
+
+PART = ".part"  # ending of a file that is not whole yet
 
 
 def strict(content: Any) -> Any:
@@ -28,16 +35,42 @@ def picked(value: Any, *names: str) -> dict[str, Any]:
     return {name: getattr(value, name) for name in names}
 
 
+def as_json(content: Any) -> bytes:
+    """Strict JSON (null, never NaN)."""
+    return (json.dumps(strict(content), indent=2, allow_nan=False) + "\n").encode()
+
+
 def write_json(path: Path, content: Any) -> None:
-    """Write strict JSON (null, never NaN), atomically."""
-    write_text(path, json.dumps(strict(content), indent=2, allow_nan=False) + "\n")
+    """Write strict JSON, atomically."""
+    write_bytes(path, as_json(content))
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write to a temporary file and rename it: a reader sees the whole file or none."""
-    part = path.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
+    """Write text, atomically."""
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file, atomically and to the disk itself."""
+    with replaced(path) as part, part.open("xb") as stream:
+        stream.write(content)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+@contextmanager
+def replaced(path: Path) -> Iterator[Path]:
+    """A new name beside a file or folder, moved there at the end: readers see all of it or none."""
+    part = path.with_name(f".{os.getpid()}-{secrets.token_hex(4)}{PART}")
+    try:
+        yield part
+        part.replace(path)
+    except BaseException:
+        if part.is_dir():
+            shutil.rmtree(part, ignore_errors=True)
+        else:
+            part.unlink(missing_ok=True)
+        raise
 
 
 def read_json(path: Path) -> Any:

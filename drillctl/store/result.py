@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from drillctl.design import Design
-from drillctl.errors import InputError, StoreError
-from drillctl.store.codec import TREE, dataset, documented, read, write
-from drillctl.store.folder import Growing, about_run, claim
+from drillctl.store.codec import dataset, documented, read, write
+from drillctl.store.folder import Growing, claim, finished_run, resolved
 
 if TYPE_CHECKING:
     import xarray
@@ -80,10 +79,9 @@ class Result:
             The folder holds other files, or cannot be written.
         """
         design, settings = self.requested()
-        run = claim(self.kind, design, folder, self.growing(), **settings)
-        self.write(run.path)
-        run.finish(self.summary())
-        return run.path
+        with claim(self.kind, design, folder, self.growing(), **settings) as run:
+            run.conclude(self, self.summary())
+            return run.path
 
 
 def open(folder: str | Path) -> Any:
@@ -106,19 +104,4 @@ def open(folder: str | Path) -> Any:
     StoreError
         A file is missing or damaged.
     """
-    path = Path(folder)
-    if not (path / "run.json").is_file():
-        raise InputError("is not a saved run: run.json is missing", str(path))
-    about = about_run(path)
-    if not about.get("finished"):
-        raise InputError("holds an unfinished run; run the command again", str(path))
-    if (path / TREE).is_file():
-        for name in ("design.toml", "summary.json"):  # not needed here, but the folder is damaged
-            if not (path / name).is_file():
-                raise StoreError(f"{path}: {name} is missing")
-        return read(path)
-    raise InputError(
-        f"holds results of {about.get('verb')!r} in a format that this version does not read; run "
-        "the command again in a new folder",
-        str(path),
-    )
+    return read(finished_run(resolved(folder, "")))

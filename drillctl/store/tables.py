@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drillctl import units
-from drillctl.store.json_files import write_text
+from drillctl.store.json_files import replaced, write_text
 
 if TYPE_CHECKING:
     from drillctl.arrays import Array
@@ -115,9 +115,8 @@ class Column:
 
     def heads(self) -> list[str]:
         """Heads in a CSV file."""
-        if not self.interval:
-            return [self.name]
-        return [self.name, f"{self.name}_low", f"{self.name}_high"]
+        endings = ("", "_low", "_high") if self.interval else ("",)
+        return [headed(f"{self.name}{ending}", self.unit) for ending in endings]
 
     def fields(self, cell: Cell) -> list[Any]:
         """Fields of a cell in a CSV file; empty without a finite number."""
@@ -156,6 +155,11 @@ class Table:
         ]
 
 
+def headed(name: str, unit: str) -> str:
+    """The head of a column in a CSV file: its name, and its SI unit if it has one."""
+    return name if unit in ("", "1") else f"{name} ({unit})"
+
+
 def write_csv(table: Table, folder: Path) -> None:
     """Write a table as `NAME.csv`, in SI, atomically."""
     text = io.StringIO()
@@ -186,7 +190,7 @@ def texts(values: Array) -> list[str]:
 
 def write_columns(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
     """Write columns of texts without commas, quotes or line breaks: fast for many rows."""
-    with path.open("w", newline="", encoding="utf-8") as stream:
+    with replaced(path) as part, part.open("x", newline="", encoding="utf-8") as stream:
         csv.writer(stream, lineterminator="\n").writerow(columns)
         stream.writelines(f"{','.join(row)}\n" for row in zip(*columns.values(), strict=True))
 

@@ -50,7 +50,7 @@ class Option(NamedTuple):
     makes another run of the same design unless it is its default or `how`.
     """
 
-    name: str  # in Python: `allow_mixed` is --allow-mixed
+    name: str  # in Python: `allow_other_machine` is --allow-other-machine
     type: Any
     help: str  # verb first, at most 60 characters
     default: Any = None
@@ -59,6 +59,7 @@ class Option(NamedTuple):
     metavar: str | None = None
     least: float | None = None
     opposite: str = ""  # name of the flag that says no
+    formerly: str = ""  # flag of an earlier version, which does the same
 
     @property
     def flag(self) -> str:
@@ -68,6 +69,11 @@ class Option(NamedTuple):
 
 DRAWS = Option("realizations", int, "Use this many draws", sets="uncertainty.realizations")
 SEED = Option("seed", int, "Draw with this seed", sets="uncertainty.seed")
+OTHER_MACHINE = Option(
+    "allow_other_machine", bool, "Resume with other packages or processors", False, how=True,
+    formerly="--allow-mixed",
+)  # fmt: skip
+"""Of every study that resumes."""
 
 
 @dataclass(frozen=True)
@@ -216,6 +222,8 @@ class Study:
         results |= {"compute": given["computed"]} if "computed" in given else {}
         if self.module and self.python and not self.call:
             results["call"] = f"{self.module}.compute:{self.python}"
+        if self.resumes:
+            results["options"] = (*self.options, OTHER_MACHINE)
         for name, value in results.items():
             object.__setattr__(self, name, value)
 

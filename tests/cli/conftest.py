@@ -1,9 +1,7 @@
 """What tests of the command line share."""
 
-import ctypes
-import os
-import sys
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -19,6 +17,21 @@ def _own_folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture
+def rewritten():
+    """Give an unfinished run another origin, as if it had been begun there."""
+
+    def _rewritten(folder, **origin):
+        from drillctl.store.journal import Journal
+        from drillctl.store.json_files import as_json, read_json
+
+        about = read_json(Path(folder, "run.json"))
+        about["provenance"] |= origin
+        Journal(Path(folder)).announce("run.json", as_json(about | {"finished": False}))
+
+    return _rewritten
+
+
+@pytest.fixture
 def call(capsys):
     """Run a command line in this process: exit code, stdout, stderr."""
 
@@ -29,27 +42,3 @@ def call(capsys):
         return code, said.out, said.err
 
     return _call
-
-
-# linux/capability.h: third version; what lets root pass over the permissions of files
-CAPABILITIES, OVER_PERMISSIONS = 0x20080522, 1 << 1 | 1 << 2
-
-
-@pytest.fixture
-def permissions_count():
-    """Root, too, is bound by the permissions of files, as any other user is."""
-    if os.geteuid() != 0:
-        yield
-        return
-    if sys.platform != "linux":
-        pytest.skip("root may write anywhere")
-    libc = ctypes.CDLL(None, use_errno=True)
-    head = (ctypes.c_uint32 * 2)(CAPABILITIES, 0)
-    held = (ctypes.c_uint32 * 6)()  # twice: effective, permitted, inheritable
-    assert libc.capget(head, held) == 0
-    all_of_them = held[0]
-    held[0] &= ~OVER_PERMISSIONS
-    assert libc.capset(head, held) == 0
-    yield
-    held[0] = all_of_them
-    assert libc.capset(head, held) == 0

@@ -233,6 +233,7 @@ def test_map_json(call):
     held = {path.name for path in Path("m").iterdir()}
     assert held == {
         "design.toml", "run.json", "summary.json", "data.zarr", "result.json", "map.csv",
+        "journal.jsonl",
         "regions.csv", "statuses.csv", "map.png", "responses.png",
     }  # fmt: skip
     assert parsed(Path("m/summary.json").read_text()) == found
@@ -258,7 +259,9 @@ def test_maps_over_one_and_three_parameters(call):
     assert "40 cells" in out
     lines = Path("three/map.csv").read_text().splitlines()
     assert len(lines) == 41
-    assert lines[0].startswith("controller.kp,controller.ki,bit_rock.a1_factor,j1,")
+    assert lines[0].startswith(
+        "controller.kp (N*m*s/rad),controller.ki (N*m/rad),bit_rock.a1_factor,j1 (s),"
+    )
     assert drillctl.open("three").j1.shape == (5, 4, 2)
 
 
@@ -600,10 +603,15 @@ def test_out_with_a_foreign_run_json(call, content):
 
 def test_out_that_cannot_be_written(call):
     Path("file").write_text("")
-    for out in ("file/inside", "x" * 300):
+    for out, told in (
+        ("file/inside", "cannot be written"), ("x" * 300, "too long"), ("a/" * 2000, "too long"),
+        ("a::b", "something else than a folder"), ("memory::z", "something else"),
+        ("memory://z", "something else"), ("~nobody-at-all/x", "cannot be a folder"),
+    ):  # fmt: skip
         code, said, err = call("map", DESIGN, *SMALL, "--out", out)
         assert (code, said) == (2, "")
-        assert "cannot be written" in err
+        assert told in err
+    assert [*Path().iterdir()] == [Path("file")]
 
 
 def test_out_without_permission(call, permissions_count):
@@ -628,7 +636,7 @@ def test_a_map_of_chosen_measures(call):
     assert code == 0, err
     assert parsed(out)["regions"]
     head = Path("some/map.csv").read_text().splitlines()[0].split(",")
-    assert head[2:] == ["j1", "sticks", "status"]
+    assert head[2:] == ["j1 (s)", "sticks", "status"]
     assert list(drillctl.open("some").measures) == ["j1", "sticks"]
     # The same again is shown; another choice is another run.
     assert call("map", DESIGN, *SMALL, "--measure", "sticks", "--out", "some")[0] == 0
@@ -671,8 +679,8 @@ def test_interrupted_map_goes_on_and_ends_in_the_same_bits(call, monkeypatch):
         assert "--out cut" in err
         assert err.rstrip().endswith("drillctl: interrupted")
         assert counted.calls == 2
-    assert Path("cut/blocks/000000.npz").is_file()
-    assert not Path("cut/blocks/000007.npz").exists()
+    assert Path("cut/blocks/map/000000.npz").is_file()
+    assert not Path("cut/blocks/map/000007.npz").exists()
     assert not Path("cut/summary.json").exists()
     with pytest.raises(drillctl.errors.InputError, match="unfinished run"):
         drillctl.open("cut")
@@ -704,13 +712,11 @@ def test_a_string_that_varies_resumes_by_group(call, monkeypatch):
     same_bits("cut", drillctl.open("whole"))
 
 
-def test_unfinished_run_of_other_packages_is_refused(call, monkeypatch):
+def test_unfinished_run_of_other_packages_is_refused(call, rewritten, monkeypatch):
     with monkeypatch.context() as patch:
         Counted(patch, stop_at=2)
         call("map", DESIGN, *SMALL, "--out", "cut")
-    about = json.loads(Path("cut/run.json").read_text())
-    about["provenance"]["numpy"] = "0.1"
-    Path("cut/run.json").write_text(json.dumps(about))
+    rewritten("cut", numpy="0.1")
     code, _, err = call("map", DESIGN, *SMALL, "--out", "cut")
     assert code == 2
     assert "other packages" in err
@@ -725,7 +731,7 @@ def kill_after_a_block(arguments, folder, prelude=""):
     )  # fmt: skip
     try:
         deadline = time.monotonic() + 100.0
-        while not Path(folder, "blocks", "000000.npz").exists():
+        while not Path(folder, "blocks", "map", "000000.npz").exists():
             assert process.poll() is None, process.stderr.read()
             assert time.monotonic() < deadline
             time.sleep(0.01)

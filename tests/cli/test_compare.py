@@ -57,9 +57,9 @@ def test_folder_holds_tables_pictures_and_the_run(call):
     with Path("run/draws.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 20
-    assert float(rows[6]["j1"]) == result.cases[1].measures["j1"][1]
+    assert float(rows[6]["j1 (s)"]) == result.cases[1].measures["j1"][1]
     assert float(rows[6]["bit_rock.a1_factor"]) == result.cases[1].drawn["bit_rock.a1_factor"][1]
-    assert rows[0]["settling_time"] == ""
+    assert rows[0]["settling_time (s)"] == ""
     with Path("run/comparison.csv").open(encoding="utf-8") as stream:
         rows = {(row["case"], row["measure"]): row for row in csv.DictReader(stream)}
     told = rows["6 kN s/rad", "j1"]

@@ -49,9 +49,9 @@ def test_folder_holds_table_picture_and_the_run(call):
         rows = list(csv.DictReader(stream))
     assert len(rows) == 6
     point = result.benefits[1][1]
-    assert float(rows[4]["difference"]) == point.difference.value
+    assert float(rows[4]["difference (s)"]) == point.difference.value
     assert float(rows[4]["ended_share_high"]) == point.ended.interval[1]
-    assert [float(rows[4][key]) for key in ("gain", "delay")] == [6000.0, 0.2]
+    assert [float(rows[4][key]) for key in ("gain (N*s/rad)", "delay (s)")] == [6000.0, 0.2]
 
 
 def test_tables_for_people(call):

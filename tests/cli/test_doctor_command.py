@@ -23,6 +23,7 @@ def test_json_and_folder(call):
     assert found["audit"]["cells"] == found["audit"]["asked"] == 1
     assert {p.name for p in Path("d").iterdir()} == {
         "run.json", "design.toml", "data.zarr", "result.json", "summary.json", "errors.png",
+        "journal.jsonl",
         "scheme.csv", "errors.csv", "audited.csv", "speed.csv",
     }  # fmt: skip
     again = call("doctor", DESIGN, *SMALL, "--json", "--out", "d")

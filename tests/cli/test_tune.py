@@ -72,7 +72,7 @@ def test_json_has_the_keys_of_the_contract_and_the_folder_all_files(quick, call)
     with Path("r/baselines.csv").open(encoding="utf-8") as stream:
         rows = {row["name"]: row for row in csv.DictReader(stream)}
     assert float(rows["tuned"]["probability"]) == result.certificate.runs.probability
-    assert float(rows["paper's gains"]["controller.ki"]) == 100.0
+    assert float(rows["paper's gains"]["controller.ki (N*m/rad)"]) == 100.0
     with Path("r/tolerance.csv").open(encoding="utf-8") as stream:
         first = next(csv.DictReader(stream))
     assert float(first["low"]) == result.certificate.tolerances[0].low

@@ -403,16 +403,16 @@ def test_tables_hold_the_figures(result, tmp_path):
         write_csv(table, tmp_path)
         with (tmp_path / f"{table.name}.csv").open(encoding="utf-8") as stream:
             rows[table.name] = list(csv.DictReader(stream))
-    kept = [float(row["advantage"]) for row in rows["delays"] if row["gains"] == "ideal path"]
+    kept = [float(row["advantage (s)"]) for row in rows["delays"] if row["gains"] == "ideal path"]
     np.testing.assert_array_equal(kept, result.delay.kept.advantage)
-    values = [float(row["objective"]) for row in rows["map"]]
+    values = [float(row["objective (s)"]) for row in rows["map"]]
     np.testing.assert_array_equal(values, result.chart.figures["objective"].ravel())
     for row, case in zip(rows["cases"], result.cases, strict=True):
         assert row["case"] == case.name
-        assert float(row["objective_high"]) == case.objective.interval[1]
-        assert float(row["peak_top_torque"]) == case.mean("peak_top_torque")
+        assert float(row["objective_high (s)"]) == case.objective.interval[1]
+        assert float(row["peak_top_torque (N*m)"]) == case.mean("peak_top_torque")
         apart = case.difference(result.baseline, "j1", result.seed)
-        assert row["j1_difference"] == ("" if case is result.baseline else str(apart.value))
+        assert row["j1_difference (s)"] == ("" if case is result.baseline else str(apart.value))
     for name, count in (("cases", 7), ("shares", 7 * 5), ("areas", 3 * 4), ("front", 3 * 2)):
         assert len(rows[name]) == count, name
 

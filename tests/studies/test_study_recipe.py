@@ -65,7 +65,7 @@ def test_the_command_the_folder_python_and_the_report_come_with_it(house):
     again = python(house, *command)
     assert "already done" in again.stderr
     assert "set speed (rpm)" in again.stdout
-    assert (house / "run" / "speed-scan.csv").read_text().startswith("speed,j1\n9.0,")
+    assert (house / "run" / "speed-scan.csv").read_text().startswith("speed (rad/s),j1 (s)\n9.0,")
     script = """
 import drillctl
 from drillctl.reporting.sections import SECTIONS

@@ -216,10 +216,12 @@ def test_blocks_of_dead_workers_are_given_out_again(job):
 
 
 def test_workers_of_another_kind_are_refused(job):
-    other = here() | {"processor": "Abacus"}
-    with pytest.raises(InputError, match=r"processor Abacus, .*--allow-mixed lets it"):
+    other = here() | {"processor": "Abacus", "numba": "0.1"}
+    with pytest.raises(InputError, match=r"numba 0.1, .*--allow-other-machine lets it"):
         list(Cluster(Pretended(other))(job, [(0, 2)]))
-    assert len(list(Cluster(Pretended(other), allow_mixed=True)(job, [(0, 2)]))) == 1
-    older = here() | {"numba": "0.1"}
-    with pytest.raises(InputError, match=r"a worker has numba 0\.1, this process"):
-        list(Cluster(Pretended(older), allow_mixed=True)(job, [(0, 2)]))
+    workers = Cluster(Pretended(other), allow_other_machine=True)
+    assert len(list(workers(job, [(0, 2)]))) == 1
+    assert workers.origin["processor"] == f"{here()['processor']} + Abacus"
+    older = here() | {"drillctl": "0.1"}
+    with pytest.raises(InputError, match=r"a worker has drillctl 0\.1, this process"):
+        list(Cluster(Pretended(older), allow_other_machine=True)(job, [(0, 2)]))

@@ -87,7 +87,14 @@ def _shares(result: Comparison) -> Table:
 
 
 def _draws(result: Comparison) -> Table:
-    heads = ("case", "realization", *result.baseline.drawn, *result.baseline.measures, "status")
+    from drillctl.design import parameter
+
+    drawn, measures = result.baseline.drawn, result.baseline.measures
+    columns = (
+        Column("case"), Column("realization"),
+        *(Column(path, unit=parameter(result.design, path).si_unit) for path in drawn),
+        *(Column(name, unit=MEASURES[name].unit) for name in measures), Column("status"),
+    )  # fmt: skip
     rows = [
         [case.name, number, *map(float, values), STATUSES[status]]
         for case in result.cases
@@ -95,7 +102,7 @@ def _draws(result: Comparison) -> Table:
             zip(case.status, *case.drawn.values(), *case.measures.values(), strict=True)
         )
     ]
-    return Table("draws", "Every draw", tuple(map(Column, heads)), rows, shown=False)
+    return Table("draws", "Every draw", columns, rows, shown=False)
 
 
 def pictures(result: Comparison) -> Iterator[Picture]:

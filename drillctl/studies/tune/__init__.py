@@ -58,9 +58,11 @@ SHOWN = ("q50", "q95", "q99")  # quantiles of J1 that people are shown
 
 def computed(design: Design, run: Run) -> Tune:
     """The search with its certificate and baselines."""
+    from drillctl.ensemble.storing import kept_in
     from drillctl.studies.tune.compute import tune
 
-    return tune(design, run.options["exhaustive"], progress=run.progress, verbose=run.verbose)
+    with kept_in(run.folder):
+        return tune(design, run.options["exhaustive"], progress=run.progress, verbose=run.verbose)
 
 
 def tables(result: Tune) -> Iterator[Table]:
@@ -256,6 +258,7 @@ STUDY = Study(
         Option("exhaustive", bool, "Run a grid of 41 x 41 gains as well", default=False),
     ),
     python="tune",
+    resumes=True,
     recipes=(Recipe("tune", "the tuning of the gains", not_applicable, order=110),),
     sections=(Section("tuning", "Tuned gains and their certificate", ("tune",), order=90),),
 )  # fmt: skip

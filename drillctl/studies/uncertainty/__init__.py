@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -56,8 +57,9 @@ def computed(design: Design, run: Run) -> Uncertainty:
         result = uncertainty(design, **given)
     else:
         with connect(run.options["scheduler"]) as client:
-            workers = Cluster(client, run.options["allow_mixed"])
+            workers = Cluster(client, run.options["allow_other_machine"])
             result = uncertainty(design, workers=workers, **given)
+            result = replace(result, provenance=workers.origin)
     if interim is not None:
         interim.unlink(missing_ok=True)
     return result
@@ -330,7 +332,6 @@ STUDY = Study(
         Option("audit", int, "Audit this many lanes with the reference solver",
                sets="map.audit_cells"),
         Option("resume", bool, "Resume the run in --out; fail if there is none", False, how=True),
-        Option("allow_mixed", bool, "Accept processors of several types", False, how=True),
         Option("scheduler", str, "Use the dask.distributed scheduler at this address", how=True),
         Option("interim", float, "Draw interim pictures this many seconds apart", how=True,
                least=0.0),

@@ -18,7 +18,7 @@ from drillctl.design.uncertain_tables import SensitivityTable
 from drillctl.ensemble import audit as auditing
 from drillctl.ensemble.draws import Failures, beyond_the_table, by_reason
 from drillctl.ensemble.grid import Axis, cell_design, over_axes, refuse_more_bytes, shape_of
-from drillctl.ensemble.parameters import drawing, sampling_of
+from drillctl.ensemble.parameters import drawing, sampling_of, uncertain_parameters
 from drillctl.ensemble.probability import Scatter
 from drillctl.ensemble.realizations import Realizations
 from drillctl.ensemble.running import Blocks, Cluster, Workers, run
@@ -26,7 +26,8 @@ from drillctl.ensemble.storing import Store, in_memory
 from drillctl.ensemble.sweeps import kept_measures, sweep
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
-from drillctl.store.tables import texts, write_columns
+from drillctl.store.json_files import replaced
+from drillctl.store.tables import headed, texts, write_columns
 from drillctl.studies.uncertainty import sensitivity as indices
 from drillctl.studies.uncertainty.result import (
     Look,
@@ -302,9 +303,8 @@ class Interim:
 
         result = so_far()
         if result is not None and len(result.axes) == 2:
-            part = self._path.with_suffix(".part.png")
-            plots.probability_map(result, system=self._system).savefig(part)
-            part.replace(self._path)
+            with replaced(self._path) as part:
+                plots.probability_map(result, system=self._system).savefig(part, format="png")
         self._next = time.monotonic() + self._every
 
 
@@ -314,13 +314,16 @@ def write_columns_of(result: Uncertainty, folder: Path) -> None:
     for level, one in result.maps.items():
         ends = dict(zip(("", "_low", "_high"), (one.probability, *one.interval), strict=True))
         columns |= {f"probability_{level:g}{end}": values for end, values in ends.items()}
-    columns |= {f"j1_{name}": values for name, values in result.known.items()}
-    columns["nominal_j1"] = result.nominal
+    columns |= {f"j1_{name} (s)": values for name, values in result.known.items()}
+    columns["nominal_j1 (s)"] = result.nominal
     cells = over_axes(result.axes) | {name: texts(v) for name, v in columns.items()}
     write_columns(folder / "cells.csv", cells)
-    write_columns(folder / "draws.csv", {path: texts(v) for path, v in result.drawn.items()})
+    unit_of = {one.path: one.unit for one in uncertain_parameters(result.design)}
+    draws = {headed(path, unit_of[path]): texts(v) for path, v in result.drawn.items()}
+    write_columns(folder / "draws.csv", draws)
     if result.design.tables.uncertainty.contours:
-        heads = ["level", "realization", "polygon", "ring", *(a.path for a in result.axes)]
+        heads = ["level (s)", "realization", "polygon", "ring"]
+        heads += [headed(a.path, a.unit) for a in result.axes]
         rows = [[f"{one}" for one in row] for row in _contours(result)]
         columns_ = zip(*rows, strict=True) if rows else [[] for _ in heads]
         write_columns(folder / "contours.csv", dict(zip(heads, columns_, strict=True)))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -35,16 +34,13 @@ from drillctl.ensemble.probability import (
     probability_map,
     region_areas,
 )
-from drillctl.ensemble.realizations import Realizations
-from drillctl.ensemble.running import Block
-from drillctl.ensemble.storing import FILES, ZarrBlocks, disk_errors
 from drillctl.ensemble.sweeps import Region, outline, region
 from drillctl.errors import InputError
 from drillctl.provenance import provenance
 from drillctl.simulation.measures import MEASURES, STATUSES, status_counts
-from drillctl.store.codec import TREE, encoded, label, stored_name
+from drillctl.store.codec import label
 from drillctl.store.folder import Growing, growing_realizations
-from drillctl.store.json_files import picked, write_json
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 from drillctl.studies.uncertainty.best import (
     NEEDS_FULL,
@@ -463,29 +459,6 @@ class Uncertainty(Result, kind="uncertainty"):
     def growing(self) -> Growing | None:
         """The number of realizations, to which more can be added."""
         return growing_realizations(self.design)
-
-    def write(self, folder: Path) -> None:
-        """Write what the folder does not hold yet: its lanes were written block by block."""
-        import zarr
-
-        job = Realizations(self.design, self.axes, self.seed, tuple(self.measures), None)
-        stored = ZarrBlocks(folder, "realizations", job)
-        for first, count in stored.missing(self.realizations):
-            rows = slice(first, first + count)
-            flat = {k: v[rows].reshape(-1, job.width) for k, v in self.measures.items()}
-            status = self.status[rows].reshape(-1, job.width)
-            stored.keep(Block(first, flat, status, provenance=self.provenance))
-        path = folder / FILES["realizations"]
-        own = {*self.measures, "status"}
-        with disk_errors(path):
-            group = zarr.open_group(path, mode="a")
-            for name in list(group.array_keys()):
-                if name not in own:  # of fewer realizations
-                    del group[name]
-            data = self.data.drop_vars(own)
-            names = {str(n): stored_name(str(n)) for n in (*data.variables, *data.dims)}
-            data.rename(names).to_zarr(path, mode="a", consolidated=False)
-        write_json(folder / TREE, encoded(self)[0])
 
 
 def map_axes(design: Design) -> tuple[Axis, ...]:
