@@ -284,9 +284,7 @@ def test_bad_laws_are_refused(law, message):
         rig(law)
 
 
-def test_cycles_and_exports_refuse_a_drive_with_memory():
+def test_exports_refuse_a_drive_with_memory():
     design = rig(drive={"lag": "10 ms"})
-    with pytest.raises(InputError, match="controller: this drive has a memory"):
-        drillctl.limit_cycle(design)
     with pytest.raises(InputError, match="ideal drive"):
         nonlinear_system(design)

@@ -239,6 +239,17 @@ def test_damped_string_repeats():
     agrees_with_the_flow(orbit, solve_whole(long, 1e-11))
 
 
+def test_with_a_memory_in_the_drive_the_long_run_decides():
+    """A limit out of reach makes the drive one with a memory, and moves nothing."""
+    design = lumped(**{"controller.drive.torque_limit": "1000 kN*m"})
+    result, exact = limit_cycle(design, periods=30), limit_cycle(lumped(), periods=30)
+    assert exact.status == "periodic"
+    assert result.status == "repeating"
+    assert result.orbit is None
+    assert result.simulated.periods[-1] == pytest.approx(exact.orbit.period, abs=1e-5)
+    assert drawn(result).axes
+
+
 @pytest.mark.slow
 def test_undamped_string_does_not_repeat():
     result = limit_cycle(paper())

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -74,7 +75,6 @@ class Flow:
         self.shift = design.program.speed.integral(math.inf)  # angle (rad) that a ramp has left
         self.slip = slip_phase(design.string, design.speed)
         self.stick, self.reaction = stick_phase(design.string, design.speed)
-        self.static_torque = float(self.rock.static_torque(self.weight.weight(0.0)))
         kp, ki = (float(gain) for gain in design.top_drive.gains())
         self.projection, self.embedding = _coordinates(self.nodes, free=ki == 0.0)
         drive = np.zeros(2 * self.nodes)
@@ -82,6 +82,11 @@ class Flow:
         self.slip_jacobian = _jacobian(self.slip.first_order, drive)
         self.stick_jacobian = _jacobian(self.stick.first_order, drive)
         self.holding = self.reaction.motion + self.reaction.top * drive
+
+    @cached_property
+    def static_torque(self) -> float:
+        """Largest torque of a bit at rest (N m)."""
+        return float(self.rock.static_torque(self.weight.weight(0.0)))
 
     def bit_speed(self, state: Array) -> float:
         """Absolute speed of the bit (rad/s)."""

@@ -11,7 +11,6 @@ from drillctl.arrays import own_errstate
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import PrintedThreeBranch
-from drillctl.rig.top_drive import RealDrive
 from drillctl.rig.weight_on_bit import PATHS
 from drillctl.simulation.lanes import Kind
 from drillctl.simulation.limit_cycle.describing import (
@@ -104,37 +103,28 @@ def limit_cycle(
     Returns
     -------
     LimitCycle
-        A motion that does not repeat is a status, not an error.
+        A motion that does not repeat is a status, not an error. With a drive or a weight that has a
+        memory the orbit is not followed; with a weight that comes late there is no harmonic
+        cycle either.
 
     Raises
     ------
     InputError
-        Too few periods, an unknown start, a law with a memory, or the printed friction.
+        Too few periods, an unknown start, or the printed friction.
     SimulationError
         The reference solver could not finish.
     """
-    _refuse_memory(design)
     _refuse_printed_law(design)
     if periods < FEWEST_PERIODS:
         raise InputError(f"at least {FEWEST_PERIODS} periods, not {periods}", "periods")
-    harmonic = harmonic_cycles(design, modes)
+    moves_late = isinstance(design.weight_on_bit, PATHS)  # not a function of the bit speed
+    harmonic = () if moves_late else harmonic_cycles(design, modes)
     simulated = long_run(design, expected_period(design, harmonic), periods, start, tolerance)
     status, orbit = judge(design, simulated)
     usual = {"periods": PERIODS, "start": "wound_up", "modes": MODES, "tolerance": TOLERANCE}
     chosen = {"periods": periods, "start": start, "modes": modes, "tolerance": tolerance}
     settings = {name: value for name, value in chosen.items() if value != usual[name]}
     return LimitCycle(design, status, harmonic, orbit, simulated, settings)
-
-
-def _refuse_memory(design: Design) -> None:
-    """Cycles are found for laws that are functions of the motion (`InputError`)."""
-    why = "has a memory or changes by the clock; cycles are found without. Simulate it instead"
-    if isinstance(design.top_drive, RealDrive):
-        raise InputError(f"this drive {why}", "controller")
-    if isinstance(design.weight_on_bit, PATHS):
-        raise InputError(f"this weight on bit {why}", "weight_on_bit")
-    if design.program.moves:
-        raise InputError(f"this rig {why}", "scenario")
 
 
 def _refuse_printed_law(design: Design) -> None:

@@ -18,6 +18,8 @@ from scipy.optimize import brentq
 from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.errors import SimulationError
+from drillctl.rig.top_drive import RealDrive
+from drillctl.rig.weight_on_bit import PATHS
 from drillctl.simulation.lanes import Kind
 from drillctl.simulation.limit_cycle.flow import Flow
 from drillctl.simulation.limit_cycle.shooting import Orbit, find_orbit
@@ -34,11 +36,12 @@ CLOSE = 0.1
 STEPS = 6  # Newton steps from the last return: it lies near the orbit, or there is none to be found
 NOISE = 1e-6  # distance over the swing below which returns are the same to the integrator's error
 
-STATUSES = ("equilibrium", "settling", "stalled", "periodic", "not periodic")
+STATUSES = ("equilibrium", "settling", "stalled", "periodic", "repeating", "not periodic")
 """What a long motion does.
 
 `equilibrium`: the bit turns evenly; `settling`: its swing shrinks, but has not died out;
-`stalled`: it stands still; `periodic`: its returns contract to an orbit that is stable; and
+`stalled`: it stands still; `periodic`: its returns contract to an orbit that is stable;
+`repeating`: they contract, and the orbit is not followed, for a drive or weight with a memory; and
 `not periodic`: it swings for ever, or for as long as was looked, and nothing repeats.
 """
 
@@ -134,8 +137,9 @@ def long_run(
     design: Design, period: float, periods: int, start: Kind | None, tolerance: float
 ) -> Returns:
     """Simulate for many expected periods and take the returns of the second half."""
+    programmed = max(design.program.breaks(), default=0.0)  # the second half is to be free of it
     values: dict[str, Any] = {
-        "simulation.duration": f"{period * periods!r} s",
+        "simulation.duration": f"{max(period * periods, 2.0 * programmed)!r} s",
         "simulation.j1_from": "0 s",
     }
     if start is not None:
@@ -183,6 +187,10 @@ def judge(design: Design, returns: Returns) -> tuple[str, Orbit | None]:
     if returns.settled:
         return "equilibrium", None
     for apart in range(1, PER_CYCLE + 1):
+        if not _contract(returns, apart):
+            continue
+        if has_memory(design):
+            return "repeating", None
         orbit = _orbit_after(design, returns, apart)
         if orbit is not None:
             return "periodic", orbit
@@ -190,15 +198,24 @@ def judge(design: Design, returns: Returns) -> tuple[str, Orbit | None]:
     return ("settling" if shrinks else "not periodic"), None
 
 
-def _orbit_after(design: Design, returns: Returns, apart: int) -> Orbit | None:
-    """The stable orbit to which every `apart`-th return contracts, if there is one."""
+def has_memory(design: Design) -> bool:
+    """Whether the motion has states beyond those that an orbit is followed with."""
+    return isinstance(design.top_drive, RealDrive) or isinstance(design.weight_on_bit, PATHS)
+
+
+def _contract(returns: Returns, apart: int) -> bool:
+    """Whether every `apart`-th return comes nearer to the one before."""
     if len(returns.times) < apart + 6:
-        return None
+        return False
     distances = returns.distances(apart)
     third = len(distances) // 3
     shrinks = np.median(distances[-third:]) < 0.5 * np.median(distances[:third])
-    if distances[-1] > CLOSE or not (shrinks or distances[-1] < NOISE):
-        return None
+    return bool(distances[-1] <= CLOSE and (shrinks or distances[-1] < NOISE))
+
+
+def _orbit_after(design: Design, returns: Returns, apart: int) -> Orbit | None:
+    """The stable orbit to which every `apart`-th return contracts, if there is one."""
+    distances = returns.distances(apart)
     last, period = returns.points[-1], float(returns.times[-1] - returns.times[-1 - apart])
     try:
         orbit = find_orbit(design, last, period, steps=STEPS)

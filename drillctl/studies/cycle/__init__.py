@@ -62,6 +62,8 @@ def remarks(result: LimitCycle, system: units.System) -> Iterator[str]:
             f"{quantity(one.least_speed, 'rad/s', system)} to "
             f"{quantity(one.peak_speed, 'rad/s', system)}."
         )
+    if result.status == "repeating":
+        yield "The exact cycle is not followed: drive or weight on bit has a memory."
     yield (
         f"Status: {result.status}, of a run of {result.simulated.duration:.0f} s from a string "
         "wound up."
