@@ -174,6 +174,25 @@ class Sweep(Result, kind="map"):
         cell = int(np.nanargmin(self.j1))
         return float(self.j1.flat[cell]), place_of(self.axes, cell)
 
+    @property
+    def over_yield(self) -> dict[str, dict[str, float]]:
+        """Sections whose yield is known: it (N m), and cells whose peak pipe torque is above it.
+
+        The peak is that of the uppermost element; where no such peaks are kept, none is counted.
+        """
+        peaks = self.measures.get("peak_pipe_torque")
+        known = (one for one in self.design.string.parts.sections if one.yield_torque < math.inf)
+        if peaks is None:
+            return {}
+        return {
+            one.name: {
+                "torsional_yield": one.yield_torque,
+                "largest_share": float(np.nanmax(peaks, initial=0.0)) / one.yield_torque,
+                "cells": int((np.nan_to_num(peaks) > one.yield_torque).sum()),
+            }
+            for one in known
+        }
+
     def summary(self) -> dict[str, Any]:
         """Axes, minimum, regions, audit, failures, times; SI units, parameters by path."""
         minimum = self.minimum
@@ -183,6 +202,7 @@ class Sweep(Result, kind="map"):
             "regions": {f"{level:g}": r.summary() for level, r in self.regions.items()},
             "audit": self.audit.summary(),
             "statuses": status_counts(self.status),
+            "yield": self.over_yield,
             **picked(self, "step", "modes", "seconds", "total_seconds"),
         }
 

@@ -17,6 +17,7 @@ from drillctl.progress import SILENT, Progress
 from drillctl.rig.top_drive import RealDrive
 from drillctl.simulation import measures as m
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, stuck_between
+from drillctl.simulation.strain import section_peaks
 from drillctl.store.codec import label
 from drillctl.store.result import Result
 
@@ -64,12 +65,29 @@ class Simulation(Result, kind="simulate"):
     step: float | None = label(unit="s", means="fixed step of the batch engine")
     modes: int | None = label(means="modes that the batch engine carried")
     energy: EnergyAudit | None = label(means="energy balance of the reference solver")
+    section_torque: dict[str, float] = label(
+        unit="N*m", means="largest in each section whose torsional yield is known",
+        default_factory=dict,
+    )  # fmt: skip
 
     @property
     def share_of_yield(self) -> float | None:
         """Peak pipe torque over the torsional yield of the uppermost pipe; None if unknown."""
         limit = self.design.string.yield_torque
         return self.measures.peak_pipe_torque / limit if math.isfinite(limit) else None
+
+    @property
+    def yields(self) -> dict[str, dict[str, float]]:
+        """Peak torque and torsional yield (N m) of the sections whose yield is known, by name."""
+        limits = {one.name: one.yield_torque for one in self.design.string.parts.sections}
+        return {
+            name: {
+                "peak_torque": peak,
+                "torsional_yield": limits[name],
+                "share": peak / limits[name],
+            }
+            for name, peak in self.section_torque.items()
+        }
 
     def summary(self) -> dict[str, Any]:
         """Measures, status, engine, step, modes, energy; SI units, None where undefined."""
@@ -81,6 +99,7 @@ class Simulation(Result, kind="simulate"):
             "step": self.step,
             "modes": self.modes,
             "energy": None if self.energy is None else self.energy.summary(),
+            "yield": self.yields,
             "events": {
                 kind: self._times(kind) for kind in dict.fromkeys(e.kind for e in self.events)
             },
@@ -116,7 +135,7 @@ def sample(motion: Motion, interval: float = 0.01) -> Simulation:
     )
     return Simulation(
         design, time, signals, motion.events, measured, status, "reference",
-        motion.method, None, None, motion.energy,
+        motion.method, None, None, motion.energy, section_peaks(design, fine, fine_signals),
     )  # fmt: skip
 
 
@@ -318,4 +337,5 @@ def _by_batch(design: Design, interval: float) -> Simulation:
         step=scheme.step,
         modes=scheme.modes,
         energy=None,
+        section_torque=section_peaks(design, time, signals),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -87,14 +88,16 @@ def _probable(gathered: Gathered) -> Check | None:
 
 def _strong(gathered: Gathered) -> Check | None:
     study = gathered.have("simulate")
-    limit = gathered.design.string.yield_torque
-    if study is None or limit == float("inf"):
+    if study is None or not study.summary.get("yield"):
         return None
-    peak = study.summary["measures"]["peak_pipe_torque"]
-    if peak is None:
+    name, worst = max(study.summary["yield"].items(), key=lambda one: one[1]["share"])
+    peak, share = worst["peak_torque"], worst["share"]
+    if not math.isfinite(peak):
         return None
-    detail = f"peak {gathered.words.quantity(peak, 'N*m')}, {percent(peak / limit)} of yield"
-    return Check("Is the peak torque below the torsional yield of the pipe?", peak < limit, detail)
+    detail = f"peak {gathered.words.quantity(peak, 'N*m')}, {percent(share)} of yield, in {name}"
+    return Check(
+        "Is the peak torque below the torsional yield of each section?", share < 1.0, detail
+    )
 
 
 def summary(result: Verdict) -> dict[str, Any]:

@@ -101,6 +101,11 @@ def remarks(result: Sweep, system: units.System) -> Iterator[str]:
         units_of = {axis.path: axis.unit for axis in result.axes}
         place = ", ".join(f"{path} {quantity(x, units_of[path], system)}" for path, x in at.items())
         yield f"minimum J1 {value:.3f} s at {place}"
+    for name, one in result.over_yield.items():
+        yield (
+            f"peak torque of the uppermost pipe: up to {one['largest_share']:.0%} of the torsional "
+            f"yield of {name}, above it in {one['cells']} cells"
+        )
     yield result.audit.sentence("cells")
     yield (
         f"{result.j1.size} cells: {result.seconds:.3f} s in the lanes, "

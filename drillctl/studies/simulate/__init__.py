@@ -42,6 +42,8 @@ def tables(result: Simulation) -> Iterator[Table]:
     ]
     if result.share_of_yield is not None:
         rows.append(["peak pipe torque over torsional yield", f"{result.share_of_yield:.1%}", ""])
+    if len(result.yields) > 1:
+        rows += [[f"of {name}", f"{one['share']:.1%}", ""] for name, one in result.yields.items()]
     if result.energy is not None:
         residual = f"{result.energy.relative_residual:.0e} of the work"
         rows.append(["energy residual", residual, ""])
