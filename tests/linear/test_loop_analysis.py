@@ -253,7 +253,7 @@ def test_a_sensitivity_is_never_under_one():
 
 LIMITS = {
     "torque_limit": "40 kN*m", "minimum_torque": "-10 kN*m", "power_limit": "700 kW",
-    "torque_rate_limit": "20 kN*m/s", "anti_windup": "none", "tracking_time": "2 s",
+    "anti_windup": "none", "tracking_time": "2 s",
 }  # fmt: skip
 
 
@@ -277,11 +277,19 @@ def test_lags_stay_in_the_linear_loop_of_a_limited_drive():
     assert both.slope_margin != loop(paper(1500.0)).slope_margin
 
 
-def test_a_lag_that_only_the_limit_of_the_rate_brings_is_said():
-    limited = {"controller.drive.torque_rate_limit": "20 kN*m/s"}
-    assert any("lag of 10 ms" in one for one in STUDY.remarks(loop(paper(**limited)), "si"))
-    own = limited | {"controller.drive.lag": "10 ms"}
-    assert not any("lag" in one for one in STUDY.remarks(loop(paper(**own)), "si"))
+def test_the_lag_that_a_limit_of_the_rate_brings_is_in_the_linear_loop():
+    """The motor follows with it however small the command, so that small motions have it too."""
+    rate, lag = (
+        {"controller.drive.torque_rate_limit": "20 kN*m/s"},
+        {"controller.drive.lag": "10 ms"},
+    )
+    limited, own, lagging = (loop(paper(**values)) for values in (rate, rate | lag, lag))
+    assert limited.summary() == own.summary() == lagging.summary()
+    s = 1j * np.array([0.5, 5.0, 50.0])
+    run = limited.design.top_drive.impedance(s)
+    np.testing.assert_allclose(limited.design.linear_drive.impedance(s), run, rtol=1e-12)
+    assert any("lag of 10 ms" in one for one in STUDY.remarks(limited, "si"))
+    assert not any("lag" in one for one in STUDY.remarks(own, "si"))
 
 
 def test_a_limited_drive_is_not_integrated_without_its_limits():

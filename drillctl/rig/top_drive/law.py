@@ -88,13 +88,19 @@ class DriveTable(Table):
         return all(limit is None for limit in limits) and not any(lags)
 
     @property
+    def motor_lag(self) -> float:
+        """Time constant (s) with which the motor follows its command, however small that is."""
+        return self.lag if self.torque_rate_limit is None else max(self.lag, SHORTEST_LAG)
+
+    @property
     def unlimited(self) -> DriveTable:
         """The drive inside its limits: those of torque, power and rate, and the way back to them.
 
-        The 10 ms with which a rate-limited motor follows at least belong to that limit.
+        Its motor follows with the same lag: small motions of a run are those of the linear loop.
         """
         return self.model_copy(
             update={
+                "lag": self.motor_lag,
                 "torque_limit": None,
                 "minimum_torque": None,
                 "power_limit": None,
@@ -230,7 +236,7 @@ def _real(controller: Controller, drive: DriveTable) -> RealDrive:
         **controller._asdict(),
         "encoder": drive.encoder_lag,
         "torque_filter": drive.torque_lag,
-        "lag": drive.lag if math.isinf(rate) else max(drive.lag, SHORTEST_LAG),
+        "lag": drive.motor_lag,
         "least": least,
         "most": most,
         "power": math.inf if drive.power_limit is None else drive.power_limit,

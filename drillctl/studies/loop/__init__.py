@@ -109,9 +109,7 @@ def pictures(result: LoopAnalysis) -> Iterator[Picture]:
 
 
 def remarks(result: LoopAnalysis, system: units.System) -> Iterator[str]:
-    """Why there may be no margins; what a limit of the rate brings that is not in the loop."""
-    from drillctl.rig.top_drive.law import SHORTEST_LAG
-
+    """Why there may be no margins; what a limit of the rate brings into the loop."""
     if result.margins is None:
         yield "The loop is not stable: it has no margins at the top torque."
     if result.mesh_limited:
@@ -121,11 +119,10 @@ def remarks(result: LoopAnalysis, system: units.System) -> Iterator[str]:
             "string its damping (drillstring.sections.NAME.stiffness_damping, usually 1e-3 s)."
         )
     drive = result.design.tables.controller.drive
-    if drive.torque_rate_limit is not None and drive.lag < SHORTEST_LAG:
-        lag = f"{SHORTEST_LAG * 1e3:g} ms"
+    if drive.motor_lag > drive.lag:
         yield (
-            "The loop is that of a drive inside its limits. In a run the limit of the torque's "
-            f"rate comes with a lag of {lag}; set controller.drive.lag to count it here."
+            f"The limit of the torque's rate comes with a lag of {drive.motor_lag * 1e3:g} ms, "
+            "here as in a run; set controller.drive.lag for a longer one."
         )
 
 
