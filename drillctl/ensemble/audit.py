@@ -24,9 +24,9 @@ from drillctl.arrays import Array, Index, Mask
 from drillctl.design import Design
 from drillctl.design.tables import SimulationTable
 from drillctl.errors import SimulationError
-from drillctl.progress import SILENT, Progress
+from drillctl.progress import SILENT, Progress, Silent
 from drillctl.rig.drillstring import Drillstring
-from drillctl.simulation.batch import Prepared, prepare, run_batch
+from drillctl.simulation.batch import Prepared, Watch, new_watch, prepare, run_batch
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES
 from drillctl.simulation.propagator import string_step
@@ -267,11 +267,12 @@ def audited(
 
     progress.begin(f"auditing {of}s", len(designs))
     end, runs = time.perf_counter() + seconds, list[tuple[dict[str, float], ...]]()
+    until = _UntilStopped()
 
     def in_time(design: Design) -> tuple[dict[str, float], ...] | None:
         if time.perf_counter() >= end:
             return None
-        return (*by_batch(design), by_reference(design))
+        return (*by_batch(design, until.watch), by_reference(design, until))
 
     # As many as the lanes may use, which is what `--threads` sets.
     with ThreadPoolExecutor(min(len(designs), numba.get_num_threads())) as pool:
@@ -281,7 +282,8 @@ def audited(
                     break
                 runs.append(one)
                 progress.advance(1)
-        finally:  # interrupted: the others end what they have begun
+        finally:  # interrupted, or out of time
+            until.watch[0] = 1
             pool.shutdown(cancel_futures=True)
     done = len(runs)
     own, finer, reference = (
@@ -295,26 +297,39 @@ def audited(
     return Audit(cells[:done], own, reference, finer, speed, duration, of)
 
 
-def by_batch(design: Design) -> tuple[dict[str, float], dict[str, float]]:
+class _UntilStopped(Silent):
+    """Progress of runs in threads that no interruption reaches: it ends them when told to."""
+
+    def __init__(self) -> None:
+        self.watch = new_watch()
+
+    def advance(self, done: int) -> None:
+        if self.watch[0]:
+            raise SimulationError("stopped")
+
+
+def by_batch(
+    design: Design, watch: Watch | None = None
+) -> tuple[dict[str, float], dict[str, float]]:
     """Measures and status of a design by the batch engine, at its step and at a quarter of it."""
     lane, table = single_lane(design), design.tables.simulation
     own = prepare(lane, table)
     results = []
     for prepared in (own, refined(design.string, table, own, PARTS)):
-        ran = run_batch(lane, prepared)
+        ran = run_batch(lane, prepared, watch=watch)
         values = {name: float(column[0]) for name, column in ran.measures.items()}
         results.append(values | {"status": float(ran.status[0])})
     return results[0], results[1]
 
 
-def by_reference(design: Design) -> dict[str, float]:
+def by_reference(design: Design, progress: Progress = SILENT) -> dict[str, float]:
     """The same by the reference solver; all NaN if that fails, be it by overflow."""
     from drillctl.simulation.reference import solve
     from drillctl.simulation.run import sample
 
     try:
         with np.errstate(all="ignore"):  # a run that grows without bound counts as failed
-            ran = sample(solve(design, tolerance=TOLERANCE))
+            ran = sample(solve(design, TOLERANCE, progress))
     except (SimulationError, ArithmeticError, np.linalg.LinAlgError):
         return dict.fromkeys((*BATCH_MEASURES, "status"), math.nan)
     values = {k: math.nan if v is None else float(v) for k, v in ran.measures.as_dict().items()}

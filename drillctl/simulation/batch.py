@@ -33,6 +33,8 @@ from drillctl.simulation.step_laws import (
 )
 
 Array = NDArray[np.float64]
+Watch = NDArray[np.int64]
+"""Shape (1,): runs stop once it is other than zero, by whichever thread."""
 
 CHUNK = 16384
 """Lanes given to the kernels at a time: a fraction of a second, so that progress and an
@@ -97,9 +99,11 @@ def _turns(lanes: Lanes) -> Array:
     return result[result > 0.0]
 
 
-def run_batch(lanes: Lanes, prepared: Prepared, give_up: float = math.inf) -> Batch:
+def run_batch(
+    lanes: Lanes, prepared: Prepared, give_up: float = math.inf, watch: Watch | None = None
+) -> Batch:
     """Simulate every lane."""
-    raw = [_run(part, prepared, 0, give_up)[0] for part in _chunks(lanes)]
+    raw = [_run(part, prepared, 0, give_up, watch)[0] for part in _chunks(lanes)]
     return _measured(np.concatenate(raw, axis=1), lanes, prepared)
 
 
@@ -126,8 +130,9 @@ def _chunks(lanes: Lanes) -> Iterator[Lanes]:
 
 
 def _run(
-    lanes: Lanes, prepared: Prepared, every: int, give_up: float = math.inf
-) -> tuple[Array, Array]:
+    lanes: Lanes, prepared: Prepared, every: int, give_up: float = math.inf,
+    watch: Watch | None = None,
+) -> tuple[Array, Array]:  # fmt: skip
     """Raw measures, shape (MEASURES, lanes), and traces, shape (samples, signals, lanes)."""
     from drillctl.simulation.kernels.advance import TRACED, Clock, kernel
     from drillctl.simulation.kernels.rows import MEASURES, ROWS, WIDTH
@@ -169,7 +174,7 @@ def _run(
     rows = ROWS + 2 * len(state) + ticks.remembered + 2 * ticks.estimated
     rows += -(-MOST_READ * len(state) // WIDTH)
 
-    watch = np.zeros(1, dtype=np.int64)  # other than zero: stop
+    watch = new_watch() if watch is None else watch
 
     def advance(begin: int, end: int) -> None:
         run(begin, end, *arguments, _aligned(rows * WIDTH), measures, traces, watch)
@@ -185,7 +190,12 @@ def _aligned(size: int) -> Array:
     return room[(-room.ctypes.data % line) // 8 :][:size]
 
 
-def _in_threads(advance: Callable[[int, int], Any], blocks: int, watch: NDArray[np.int64]) -> None:
+def new_watch() -> Watch:
+    """A watch of runs that go on."""
+    return np.zeros(1, dtype=np.int64)
+
+
+def _in_threads(advance: Callable[[int, int], Any], blocks: int, watch: Watch) -> None:
     """Advance all blocks, some at a time in each of numba's number of threads.
 
     The caller's own thread waits, so that an interruption reaches it: it tells the kernels.

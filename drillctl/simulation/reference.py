@@ -26,7 +26,7 @@ from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight, ObservedWeight
 from drillctl.simulation.lanes import start
 
-STEPS = 5_000  # steps from one look at an interruption to the next: some milliseconds
+STEPS = 1_000  # steps from one look at an interruption to the next: some milliseconds
 ROOM = 1 << 13  # steps that a tape has room for at first
 
 

@@ -212,6 +212,29 @@ def test_a_rig_that_grows_without_bound_is_told_quietly(recwarn):
     assert not recwarn.list
 
 
+class Interrupting:
+    def begin(self, task, total):
+        pass
+
+    def advance(self, done):
+        raise KeyboardInterrupt
+
+
+def test_an_interruption_ends_what_other_threads_run(design, monkeypatch):
+    ran = {}
+
+    def kept(design, progress):
+        ran[design.tables.simulation.duration] = by_reference(design, progress)["j1"]
+        return {"j1": 0.0}
+
+    monkeypatch.setattr("drillctl.ensemble.audit.by_reference", kept)
+    long = design.replace({"simulation.duration": "20000 s"})
+    with pytest.raises(KeyboardInterrupt):
+        audited(np.arange(2), {}, [design, long], progress=Interrupting())
+    assert np.isfinite(ran[10.0])
+    assert np.isnan(ran.get(20000.0, np.nan))  # stopped, or never begun
+
+
 class Told:
     def __init__(self):
         self.tasks = []
