@@ -6,6 +6,7 @@ import csv
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from small_report import TINY, TITLE, small_design
@@ -16,6 +17,7 @@ from drillctl.design import axis_tables
 from drillctl.errors import InputError, SimulationError
 from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, gather, making
 from drillctl.reporting import pages as pdf
+from drillctl.reporting.sections.runs import mesh_check
 from drillctl.reporting.sections.summary import verdict
 
 
@@ -61,6 +63,18 @@ def test_markdown_shows_the_same(small):
     for name in small.content["sections"]:
         assert f"## {SECTIONS[name].title}" in text
     assert text.count("\n|---") > 10
+
+
+@pytest.mark.parametrize(("finer", "answer"), [((20.1, 20.1), True), ((20.1, 20.76), False)])
+def test_the_audit_judges_the_mesh(small, finer, answer):
+    with (small.folder / "tables" / "audit-audit.csv").open(encoding="utf-8", newline="") as file:
+        assert "Do the elements suffice?" in {row[0] for row in csv.reader(file)}
+    runs = {f"mesh-{k}": j1 for k, j1 in zip((1, 2, 4), (20.0, *finer), strict=True)}
+    studies = {k: SimpleNamespace(summary={"measures": {"j1": j1}}) for k, j1 in runs.items()}
+    (check,) = mesh_check(SimpleNamespace(have=studies.get))
+    assert check.answer is answer
+    assert ("3.8 %" in check.detail) is not answer
+    assert not list(mesh_check(SimpleNamespace(have=lambda name: None)))
 
 
 def test_saved_studies_and_pictures_are_read_not_done_again(small, monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from drillctl.reporting.blocks import Block, Checks, Code, Figure, Table, Words
 from drillctl.reporting.gather import Gathered, NotThereError, Study, opened
 from drillctl.simulation.measures import MEASURES, Measure
 from drillctl.store.tables import NOTHING, number, percent
+from drillctl.studies.base import Check
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
@@ -100,13 +102,31 @@ DETAILS = ("energy", "scheme", "errors")  # their tables and pictures beside the
 def build_audit(gathered: Gathered) -> tuple[Block, ...]:
     """Checks, convergence, errors, versions, design."""
     shown = [gathered.shown(name) for name in CHECKED]
-    checks = tuple(check for one in shown for check in one.checks)
+    checks = (*(check for one in shown for check in one.checks), *mesh_check(gathered))
     details = [part for one in shown for name, part, _ in one.parts if name in DETAILS]
     return (
         Checks("audit", "Checks of the numbers of this report", checks),
         *_convergence(gathered), *details, _versions(gathered),
         Code("The design in full", to_toml(gathered.requested)),
     )  # fmt: skip
+
+
+def mesh_check(gathered: Gathered) -> Iterator[Check]:
+    """Whether finer meshes leave J1 within the tolerance that an audit has for it."""
+    done = [one for parts in (1, 2, 4) if (one := gathered.have(f"mesh-{parts}")) is not None]
+    j1 = [one.summary["measures"]["j1"] for one in done]
+    if len(j1) < 3 or not all(j1):
+        return
+    twice, four_times = (finer / j1[0] - 1.0 for finer in j1[1:])
+    tolerance = MEASURES["j1"].tolerance
+    answer = max(abs(twice), abs(four_times)) <= tolerance
+    detail = (
+        f"J1 moves by {percent(twice, 2)} with twice the elements and {percent(four_times, 2)} with "
+        f"four times; allowed: {percent(tolerance)}"
+    )
+    if not answer:
+        detail += "; give more elements, or the string its damping"
+    yield Check("Do the elements suffice?", answer, detail)
 
 
 def _convergence(gathered: Gathered) -> tuple[Table, ...]:
