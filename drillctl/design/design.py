@@ -140,13 +140,10 @@ class Design:
     def warnings(self) -> tuple[DesignWarning, ...]:
         """What is allowed but probably not meant, reported once when a design is used."""
         line = parts.parts_of(self.tables)
-        return warnings_of(self.tables, line, self.bit_rock, self._weight_at_rest)
-
-    @property
-    def _weight_at_rest(self) -> float:
-        point = self.tables.operating_point
-        law: Any = self.weight_on_bit
-        return float(law.weight(0.0)) if law.moves else point.weight_on_bit
+        return warnings_of(
+            self.tables, lambda: self.string, line, self.bit_rock, self.linear_drive,
+            self.weight_on_bit,
+        )  # fmt: skip
 
     @property
     def simple_drive(self) -> bool:

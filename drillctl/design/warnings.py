@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from drillctl.design.parts import drive_of
 from drillctl.design.tables import DesignTables
 from drillctl.rig.bit_rock import BitRockLaw
-from drillctl.rig.bit_rock.law import friction_laws
-from drillctl.rig.drillstring import Parts
+from drillctl.rig.bit_rock.law import contact, friction_laws
+from drillctl.rig.drillstring import Drillstring, Parts
+from drillctl.rig.drillstring.frequencies import followed
 from drillctl.rig.drillstring.mesh import off_the_line
+from drillctl.rig.top_drive import TopDriveLaw
+from drillctl.rig.weight_on_bit import RealWeight
 
 CHATTER = 0.03  # damping ratio that the rock may take from the fastest modes at the bit
 # Modes share the mobility of the bit: damping ends its chatter at a twentieth of what the rock
 # would take of one mode alone. Both numbers by sticks of the reference solver: docs/accuracy.md.
 SHARED = 20.0
+# Logarithm of the growth of a mode in a run. At 0.13 more elements move J1 by 1 to 6 %, at 0.013 by
+# less than 0.1 %: docs/accuracy.md.
+GROWTH = 0.1
 COARSE = 0.02  # error of the first five frequencies that no shipped mesh reaches
 MOST_VERIFIED = 1_000  # elements of a string up to which both engines are checked
 LONGEST_STEP = 0.05  # longest step (s) of the batch engine that is checked over a map
@@ -44,14 +53,21 @@ class DesignWarning(NamedTuple):
 
 
 def warnings_of(
-    tables: DesignTables, parts: Parts, rock: BitRockLaw, at_rest: float
-) -> tuple[DesignWarning, ...]:
-    """Every warning of a design, of the weight (N) at rest of the bit."""
-    fall = float(rock.steepest_fall(tables.operating_point.weight_on_bit))
+    tables: DesignTables, string: Callable[[], Drillstring], parts: Parts, rock: BitRockLaw,
+    drive: TopDriveLaw, weight: Any,
+) -> tuple[DesignWarning, ...]:  # fmt: skip
+    """Every warning of a design; `drive` has no limits."""
+    point = tables.operating_point
+    at_rest = float(weight.weight(0.0)) if weight.moves else point.weight_on_bit
+    fall = float(rock.steepest_fall(point.weight_on_bit))
+    if isinstance(weight, RealWeight):  # too slow for the modes of the mesh
+        slope = rock.torque_and_slope(point.weight_on_bit, point.speed, math.exp)[1]
+    else:
+        slope = contact(rock, weight, point.speed, math.exp)[1]
     found = (
         _assumed_rock(tables),
         _weak_drive(tables, rock.static_torque(at_rest)),
-        _undamped(parts) if fall > 0.0 else None,
+        _growing(string, parts, -float(slope), drive, tables.simulation.duration),
         _light_bit(parts, fall),
         _mesh(parts),
         _step(tables),
@@ -81,8 +97,11 @@ def _weak_drive(tables: DesignTables, static: float) -> DesignWarning | None:
     )
 
 
-def _undamped(parts: Parts) -> DesignWarning | None:
-    """A mesh whose highest modes nothing in the string damps."""
+def _growing(
+    string: Callable[[], Drillstring], parts: Parts, fall: float, drive: TopDriveLaw,
+    duration: float,
+) -> DesignWarning | None:  # fmt: skip
+    """Modes of the mesh alone that grow: the rock gives them more than the drive takes."""
     sections = [x for x in parts.sections if x.inertia > 0.0]
     damped = parts.modal_damping > 0.0 or any(
         x.coupling_damping or x.stiffness_damping or x.mass_damping or x.drag
@@ -90,9 +109,17 @@ def _undamped(parts: Parts) -> DesignWarning | None:
     )
     if damped or not sections:
         return None
+    frequency, shapes = string().undamped_modes
+    own = frequency > followed(parts)
+    resistance = np.real(drive.impedance(1j * frequency[own])) + parts.top_damping
+    given = (fall - parts.bit_damping) * shapes[-1, own] ** 2
+    growth = 0.5 * duration * np.max(given - resistance * shapes[0, own] ** 2, initial=0.0)
+    if growth <= GROWTH:
+        return None
+    more = f"{math.exp(min(growth, 700.0)):.2g}-fold"
     return DesignWarning(
-        "the string has no damping: its highest modes decide the delay margin and short sticks, "
-        "that is, the mesh decides these figures",
+        "the string has no damping, and the rock gives the highest modes of the mesh more than the "
+        f"drive takes: they grow {more} in a run, so that the mesh decides sticks and J1",
         f"drillstring.sections.{sections[0].name}.stiffness_damping",
         "1e-3 s",
     )

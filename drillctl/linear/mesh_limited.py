@@ -18,21 +18,13 @@ from drillctl.design import Design
 from drillctl.linear.ends import WAVE_MODES, BitSide, Ends, ends_of
 from drillctl.linear.loop_margins import Margins, margins, weight_delay_margin, whole_crossings
 from drillctl.linear.slope_margin import crossings
-from drillctl.rig.drillstring import Parts
-from drillctl.rig.drillstring.frequencies import natural_frequencies
+from drillctl.rig.drillstring.frequencies import followed, natural_frequencies
 from drillctl.rig.top_drive import TopDriveLaw
 
-FOLLOWED = 1.0  # phase of a wave from node to node (rad): a frequency is 4 % too high there
 CONVERGED = 0.02  # relative difference of half and all modes up to which a value exists
 SAME = 0.05  # relative difference to the exact string up to which a figure is not the mesh's
 NEWTON = 12  # steps towards a pole of the exact string
 Figures = dict[str, float | None]
-
-
-def followed(parts: Parts) -> float:
-    """Highest angular frequency (rad/s) that the elements follow; infinite without a mesh."""
-    longest = max(x.travel_time / x.elements for x in parts.sections)
-    return math.inf if longest == 0.0 else FOLLOWED / longest
 
 
 def figures_of(result: Margins | None) -> dict[str, tuple[float, float | None]]:

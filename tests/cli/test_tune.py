@@ -38,9 +38,7 @@ def quick(call):
 
 def test_json_has_the_keys_of_the_contract_and_the_folder_all_files(quick, call):
     code, out, err = quick(SHIPPED, *SMALL, "--set", "tune.probability=0.8", "--json", "--out", "r")
-    *_, warning, folder = err.splitlines()
-    assert warning.startswith("warning: the string has no damping")
-    assert (code, folder) == (0, "results: r")
+    assert (code, err.splitlines()[-1]) == (0, "results: r")
     found = strict(out)
     assert list(found["gains"]) == ["controller.kp", "controller.ki"]
     assert 600 < found["gains"]["controller.kp"] < 660
@@ -55,7 +53,7 @@ def test_json_has_the_keys_of_the_contract_and_the_folder_all_files(quick, call)
     assert certificate["margins"]["slope_margin"] > certificate["margins"]["slope"]
     assert strict(Path("r/summary.json").read_text()) == found
     again = quick(SHIPPED, *SMALL, "--set", "tune.probability=0.8", "--json", "--out", "r")
-    assert (again[0], strict(again[1]), again[2]) == (0, found, f"{warning}\nalready done: r\n")
+    assert (again[0], strict(again[1]), again[2]) == (0, found, "already done: r\n")
     # A design ready to run, tables and pictures.
     code, out, _ = quick(SHIPPED, *SMALL, "--set", "tune.probability=0.8", "--out", "r")
     assert code == 0

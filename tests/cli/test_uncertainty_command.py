@@ -55,8 +55,7 @@ def table(path):
 
 def test_json_has_the_keys_of_the_contract(call):
     code, out, err = call("uncertainty", PAPER, *FEW, "--seed", "7", "--json", "--out", "run")
-    assert err.startswith("warning: the string has no damping")
-    assert (code, err.splitlines()[1:]) == (0, ["results: run"])
+    assert (code, err.splitlines()) == (0, ["results: run"])
     found = strict(out)
     assert (found["realizations"], found["seed"]) == (12, 7)
     assert list(found["levels"]) == ["12", "15", "18"]
@@ -112,7 +111,7 @@ def test_what_is_saved_is_what_is_read(call):
     result = drillctl.open("run")
     again = result.summary()
     told = strict(out)
-    assert told.pop("warnings")
+    assert told.pop("warnings") == []
     assert strict(json.dumps(again, default=float).replace("NaN", "null")) == told
     assert told["looks"]
     saved = result.save("saved")
@@ -133,8 +132,7 @@ def test_a_result_of_python_is_saved_and_shown_by_the_command(call):
     })  # fmt: skip
     drillctl.uncertainty(design).save("run")
     code, _, err = call("uncertainty", PAPER, *FEW, "--out", "run")
-    assert err.startswith("warning: the string has no damping")
-    assert (code, err.splitlines()[1:]) == (0, ["already done: run"])
+    assert (code, err.splitlines()) == (0, ["already done: run"])
 
 
 def test_tables_for_people(call):

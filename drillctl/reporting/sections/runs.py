@@ -121,8 +121,8 @@ def mesh_check(gathered: Gathered) -> Iterator[Check]:
     tolerance = MEASURES["j1"].tolerance
     answer = max(abs(twice), abs(four_times)) <= tolerance
     detail = (
-        f"J1 moves by {percent(twice, 2)} with twice the elements and {percent(four_times, 2)} with "
-        f"four times; allowed: {percent(tolerance)}"
+        f"J1 moves by {percent(twice, 2)} with twice and by {percent(four_times, 2)} with four "
+        f"times as many; allowed: {percent(tolerance)}"
     )
     if not answer:
         detail += "; give more elements, or the string its damping"
