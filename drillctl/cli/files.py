@@ -75,6 +75,8 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
                 f"# tool joints of {name}: inertia of the body x {factors.inertia:.4f}, "
                 f"stiffness x {factors.stiffness:.4f}"
             )
+        for text in _mud(loaded_design):
+            console.line(f"# {text}")
     warn(loaded_design)
 
 
@@ -96,6 +98,25 @@ def _rock(design: Design) -> Iterator[str]:
         f"{numbers.aggressiveness:.4g}, high-speed ratio "
         f"{numbers.high_speed_ratio:.4g}, speed scale {numbers.speed_scale / RPM:.4g} rpm"
     )
+
+
+def _mud(design: Design) -> Iterator[str]:
+    """Drag of the mud on each section, and whether its flow is laminar there."""
+    from drillctl.design.parts import clearances
+    from drillctl.rig.drillstring.mud import LAMINAR, jointed_drag, taylor_number
+
+    well = design.tables.well
+    if well.mud_viscosity is None:
+        return
+    for _, one, length, hole in clearances(design.tables):
+        outer = one.diameters[0] if one.diameters else 0.0
+        drag = jointed_drag(well.mud_viscosity, outer, one.spacing, one.joint, hole)
+        text = f"mud at {one.name}, {length:.4g} m in {hole * 1e3:.4g} mm: {drag:.4g} N*s/rad"
+        if well.mud_density is not None and drag > 0.0:
+            number = taylor_number(well.mud_viscosity, well.mud_density, outer, hole, design.speed)
+            less = "" if number < LAMINAR else ", so that vortices take more"
+            text += f", Taylor number {number:.3g} (laminar under {LAMINAR:g}){less}"
+        yield text
 
 
 def _joints(design: Design) -> list[tuple[str, Homogenised]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -23,6 +24,7 @@ from drillctl.rig.drillstring import (
 )
 from drillctl.rig.drillstring.catalogue import HWDP_YIELD, Homogenised, homogenised
 from drillctl.rig.drillstring.mesh import MeshedSection, meshed, what_was_done
+from drillctl.rig.drillstring.mud import jointed_drag
 from drillctl.rig.drillstring.section import torsional_yield
 from drillctl.rig.program import STILL, Program, Ramp
 from drillctl.rig.top_drive.ideal import ConstantTorqueTable
@@ -85,7 +87,7 @@ def _parts(tables: DesignTables) -> Parts:
     """Sections as they stand, each of one element where the design does not say how many."""
     table = tables.drillstring
     return Parts(
-        sections=tuple(section(s) for s in pieces(tables)),
+        sections=in_mud(tables, tuple(section(s) for s in pieces(tables))),
         top_inertia=tables.top_drive.at_pipe,
         bit_inertia=tables.bha.inertia,
         top_damping=tables.top_drive.damping,
@@ -93,6 +95,46 @@ def _parts(tables: DesignTables) -> Parts:
         modal_damping=table.modal_damping,
         mass=table.mass,
     )
+
+
+def in_mud(tables: DesignTables, sections: tuple[Section, ...]) -> tuple[Section, ...]:
+    """Sections with the viscous torque of the mud around them."""
+    viscosity = tables.well.mud_viscosity
+    if viscosity is None:
+        return sections
+    drag = [0.0] * len(sections)
+    for number, table, length, hole in clearances(tables):
+        outer = table.diameters[0] if table.diameters else 0.0
+        try:
+            each = jointed_drag(viscosity, outer, table.spacing, table.joint, hole)
+        except InputError as error:
+            where = f"drillstring.sections.{table.name}"
+            raise InputError(error.problem, where) from None
+        drag[number] += each * length
+    return tuple(
+        replace(one, drag=one.drag + more) if more else one
+        for one, more in zip(sections, drag, strict=True)
+    )
+
+
+def clearances(tables: DesignTables) -> Iterator[tuple[int, SectionTable, float, float]]:
+    """Runs of a section in one hole: its number and table, length and diameter of the hole (m)."""
+    holes = tables.well.holes
+    ends = [math.inf if hole.to is None else hole.to for hole in holes]
+    top = 0.0
+    for number, table in enumerate(pieces(tables)):
+        bottom = top + table.span
+        if holes and bottom > ends[-1] * (1.0 + 1e-9):
+            raise InputError(
+                f"end at {ends[-1]:g} m, above the lower end of {table.name}, {bottom:.6g} m",
+                "well.holes",
+            )
+        if table.diameters is not None:
+            for hole, above, below in zip(holes, (0.0, *ends), ends, strict=False):
+                length = min(bottom, below) - max(top, above)
+                if length > 0.0:
+                    yield number, table, length, hole.diameter
+        top = bottom
 
 
 def section(table: SectionTable) -> Section:
@@ -192,6 +234,7 @@ def refuse_impossible_string(tables: DesignTables) -> None:
         raise InputError(
             f"{count} elements in all; allowed are {MOST_ELEMENTS}", "drillstring.sections"
         )
+    in_mud(tables, tuple(map(section, pieces(tables))))
     refuse_massless_node(tables)
 
 

@@ -354,6 +354,35 @@ class TopDriveTable(Table):
         return self
 
 
+class HoleTable(Table):
+    """A run of hole or casing of one inner diameter, down to `to`; the last, to the bit."""
+
+    to: q.Length | None = None
+    diameter: q.Diameter
+
+
+class WellTable(Table):
+    """The well: its holes from the top down, and the mud in it.
+
+    With `mud_viscosity` the mud takes a viscous torque from every section with an outer diameter,
+    that of laminar flow between concentric cylinders. `mud_density` does not enter it; it says
+    whether the flow is laminar (`drillctl show` prints the Taylor number).
+    """
+
+    holes: tuple[HoleTable, ...] = ()
+    mud_density: q.Density | None = None
+    mud_viscosity: q.Viscosity | None = None
+
+    @model_validator(mode="after")
+    def _downwards(self) -> WellTable:
+        ends = [hole.to for hole in self.holes[:-1]]
+        if None in ends or ends != sorted(set(ends)):
+            raise InputError("holes: each but the last ends at a depth, below the one above")
+        if self.mud_viscosity is not None and not self.holes:
+            raise InputError("mud_viscosity needs holes: the torque depends on the clearance")
+        return self
+
+
 class BhaTable(Table):
     """The bottom-hole assembly with the bit, as a body."""
 
@@ -489,6 +518,7 @@ class OwnTables(Table):
     drillstring: DrillstringTable
     top_drive: TopDriveTable
     bha: BhaTable = BhaTable()
+    well: WellTable = WellTable()
     bit_rock: BitRockTable
     controller: ControllerTable = PITable(law="pi", kp=200.0, ki=100.0)
     weight_on_bit: WeightOnBitTable = ConstantWeightTable()

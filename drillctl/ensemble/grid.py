@@ -31,8 +31,8 @@ from drillctl.store.codec import documented, label
 from drillctl.store.tables import headed, texts
 
 SHARED = (
-    "drillstring.", "top_drive.", "bha.", "simulation.", "controller.drive.sampling_period",
-    "weight_on_bit.observer_modes",
+    "drillstring.", "top_drive.", "bha.", "well.", "simulation.",
+    "controller.drive.sampling_period", "weight_on_bit.observer_modes",
 )  # fmt: skip
 """Paths under these change what all lanes share; the others differ from lane to lane."""
 

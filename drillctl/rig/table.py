@@ -146,6 +146,7 @@ SamplingPeriod = Annotated[float, units.TIME, _read(units.TIME, _none_or_period)
 Rate = Annotated[float, units.RATE, _read(units.RATE, _not_negative)]
 Inertia = Annotated[float, units.INERTIA, _read(units.INERTIA, _not_negative)]
 Density = Annotated[float, units.DENSITY, _read(units.DENSITY, _positive)]
+Viscosity = Annotated[float, units.VISCOSITY, _read(units.VISCOSITY, _positive)]
 Modulus = Annotated[float, units.MODULUS, _read(units.MODULUS, _positive)]
 PolarMoment = Annotated[float, units.POLAR_MOMENT, _read(units.POLAR_MOMENT, _positive)]
 Stiffness = Annotated[float, units.STIFFNESS, _read(units.STIFFNESS, _positive)]
