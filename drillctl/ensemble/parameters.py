@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design, Parameter, parameter
@@ -139,8 +140,6 @@ def correlation_root(table: UncertaintyTable, paths: tuple[str, ...]) -> Array |
 
 def correlated(points: Mapping[str, Array], root: Array) -> dict[str, Array]:
     """Points with the dependence of a Gaussian copula."""
-    from scipy.special import ndtr, ndtri
-
     scores = [ndtri(column) for column in points.values()]
     results = {}
     for path, weights in zip(points, root, strict=True):
@@ -187,6 +186,9 @@ class Uncertain:
         if self.samples:
             number = np.ceil(probabilities * len(self.samples)).astype(int) - 1
             return np.asarray(self.samples)[np.maximum(number, 0)]
+        if self.distribution == "lognormal":  # the usual one, without the wait for `stats`
+            spread, scale = self._lognormal_numbers
+            return np.asarray(np.exp(spread * ndtri(probabilities)) * scale)
         return np.asarray(self.law().ppf(probabilities), dtype=float)
 
     def _normal(self, stats: Any) -> Any:
@@ -199,9 +201,14 @@ class Uncertain:
             return stats.norm(self.mean, deviation)
         return stats.truncnorm(*ends, self.mean, deviation)
 
-    def _lognormal(self, stats: Any) -> Any:
+    @property
+    def _lognormal_numbers(self) -> tuple[float, float]:
         variance = np.log1p(self.cov**2)  # type: ignore[operator]
-        return stats.lognorm(np.sqrt(variance), scale=self.mean * np.exp(-0.5 * variance))
+        return np.sqrt(variance), self.mean * np.exp(-0.5 * variance)
+
+    def _lognormal(self, stats: Any) -> Any:
+        spread, scale = self._lognormal_numbers
+        return stats.lognorm(spread, scale=scale)
 
     def _uniform(self, stats: Any) -> Any:
         return stats.uniform(self.low, self.high - self.low)  # type: ignore[operator]

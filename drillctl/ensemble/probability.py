@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtr, bdtrc, ndtri, stdtrit
 
 from drillctl.arrays import Array, Index, Mask
 from drillctl.ensemble.cases import CONFIDENCE, Interval, share_intervals
@@ -64,10 +65,8 @@ class Scatter:
 
     def quantile(self, confidence: float) -> float:
         """Half-width of a two-sided interval over the standard error."""
-        from scipy.stats import norm, t
-
         at = 0.5 * (1.0 + confidence)
-        return float(norm.ppf(at) if self.independent else t.ppf(at, self.replicates - 1))
+        return float(ndtri(at) if self.independent else stdtrit(self.replicates - 1, at))
 
 
 INNER, MEDIAN, OUTER = 0.95, 0.5, 0.05
@@ -125,11 +124,9 @@ class ProbabilityMap:
         replicates = len(self.by_replicate)
         if replicates == 1:
             return exact
-        from scipy.stats import t
-
         each = self.by_replicate / (self.total // replicates)
         error = each.std(axis=0, ddof=1) / np.sqrt(replicates)
-        half = t.ppf(0.5 * (1.0 + confidence), replicates - 1) * error
+        half = stdtrit(replicates - 1, 0.5 * (1.0 + confidence)) * error
         # Replicates that agree to the last realization give no error; nor is it zero.
         alike = error == 0.0
         low = np.where(alike, exact[0], np.maximum(self.probability - half, 0.0))
@@ -222,11 +219,9 @@ def _bootstrap(
 
 def _may_change(counts: Index, total: int, least: int) -> Mask:
     """Cells that a resample may move into a region or out of it."""
-    from scipy.stats import binom
-
     share = counts / total
     inside = counts >= least
-    change = np.where(inside, binom.cdf(least - 1, total, share), binom.sf(least - 1, total, share))
+    change = np.where(inside, bdtr(least - 1, total, share), bdtrc(least - 1, total, share))
     return np.asarray(change > NEVER)
 
 

@@ -79,9 +79,9 @@ class Promise:
 
 def _chance(over: int, count: int, share: float) -> float:
     """Chance of so many or more of `count` where each is one with the chance `share`."""
-    from scipy.stats import binom
+    from scipy.special import bdtrc
 
-    return float(binom.sf(over - 1, count, share))
+    return float(bdtrc(over - 1, count, share))
 
 
 PROMISES = {

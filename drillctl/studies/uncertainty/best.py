@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import bdtr, ndtri
 
 from drillctl.arrays import Array, Mask
 from drillctl.ensemble.cases import CONFIDENCE, mean_interval, share_interval
@@ -71,11 +72,10 @@ class Quantile(NamedTuple):
     def influence(self, j1: Array, ordered: Array) -> Array:
         """(p - 1[J1 <= q]) times the sparsity, a difference quotient of the order statistics."""
         # Its width after Bofinger, Austral. J. Stat. 17 (1975) 1-7, for normal tails.
-        from scipy.stats import norm
-
         count, p = len(ordered), self.probability
-        z = norm.ppf(p)
-        width = (4.5 * norm.pdf(z) ** 4 / (2.0 * z * z + 1.0) ** 2 / count) ** 0.2
+        z = ndtri(p)
+        density = np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi)
+        width = (4.5 * density**4 / (2.0 * z * z + 1.0) ** 2 / count) ** 0.2
         low = max(int(np.floor(count * (p - width))), 0)
         high = min(int(np.ceil(count * (p + width))), count - 1)
         sparsity = (ordered[high] - ordered[low]) * count / max(high - low, 1)
@@ -274,11 +274,10 @@ def quantile_interval(
 ) -> tuple[float | None, float | None]:
     """Interval of a quantile by order statistics, whatever the distribution."""
     # David & Nagaraja, Order Statistics (2003), section 7.1.
-    from scipy.stats import binom
-
     count, tail = len(ordered), 0.5 * (1.0 - CONFIDENCE)
-    low = int(binom.ppf(tail, count, probability))
-    high = int(binom.ppf(1.0 - tail, count, probability)) + 1
+    at_most = bdtr(np.arange(count + 1), count, probability)
+    low, high = (int(k) for k in np.searchsorted(at_most, [tail, 1.0 - tail]))
+    high += 1
     known = high <= count and ordered[high - 1] < bound
     upper = float(ordered[high - 1]) if known else None
     return (float(ordered[low - 1]) if low > 0 else None), upper
