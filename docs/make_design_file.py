@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 from drillctl import units
-from drillctl.design.paths import kind_of
+from drillctl.design.paths import kind_of, range_of
 from drillctl.design.tables import DesignTables
 from drillctl.rig.table import Table
 
@@ -22,7 +22,8 @@ Generated from the code by `docs/make_design_file.py`; a test keeps it up to dat
 design overrides), `title`, `source`, `status`, `notes`. All tables below are optional in a design
 that names a model.
 
-A key with a unit takes text with any unit of the same kind. Gains may be bare numbers. Sections of
+A key with a unit takes text with any unit of the same kind. Gains may be bare numbers. Ranges are
+wide, a thousand times beyond any rig: what lies outside is a slip of the pen. Sections of
 a design and of its model are merged by name. A table whose `law` changes drops the numbers of the
 old law, and of a drive law also the axes of the map and the bounds of `tune` over them;
 `controller.drive` and `weight_on_bit.path` are kept. `tune.parameters` of a design replace those of
@@ -81,11 +82,13 @@ def _units() -> str:
 
 def _section(name: str, table: type[Table]) -> str:
     lines = [f"## `{name}`", "", inspect.getdoc(table) or "", ""]
-    lines += ["| key | unit | default |", "|---|---|---|"]
+    lines += ["| key | unit | range | default |", "|---|---|---|---|"]
     for key, info in table.model_fields.items():
         kind = kind_of(info)
         unit = ", ".join(kind.examples) if kind else _values(info.annotation)
-        lines.append(f"| `{info.alias or key}` | {unit} | {_default(info, kind)} |")
+        limits = range_of(info)
+        ends = limits.text(kind) if limits else ""
+        lines.append(f"| `{info.alias or key}` | {unit} | {ends} | {_default(info, kind)} |")
     return "\n".join([*lines, ""])
 
 

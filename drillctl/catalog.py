@@ -6,7 +6,10 @@ In a wheel they lie inside the package, in a checkout beside it; both are search
 from __future__ import annotations
 
 import difflib
+import os
+import stat
 import tomllib
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -14,6 +17,7 @@ from typing import Literal
 from drillctl.errors import InputError, nearest, shown
 
 Shelf = Literal["models", "designs"]
+MOST_BYTES = 2**24  # of a file that is named: some hundred thousand samples
 _PACKAGE = Path(__file__).resolve().parent
 
 
@@ -85,16 +89,105 @@ def find(name_or_path: str, shelves: tuple[Shelf, ...] = ("designs", "models")) 
     )
 
 
+def find_model(model: str, design: Path) -> Path:
+    """Where the model of a design lies: one given as a path is searched beside the design first.
+
+    Parameters
+    ----------
+    model : str
+        A shipped name, or a path.
+    design : Path
+        The file that names it.
+
+    Raises
+    ------
+    InputError
+        No such file, or no such name.
+    """
+    beside = design.parent / model
+    with suppress(OSError, ValueError):  # a name no file can have; `find` reports it
+        if beside.suffix == ".toml" and beside.exists():
+            return beside.resolve()
+    return find(model, ("models", "designs")).resolve()
+
+
 def _file(text: str) -> Path:
     """The file at a path, or the reason why there is none."""
     try:
         path = Path(text).expanduser()
         if path.is_file():
             return path
+        if path.exists():
+            raise InputError(_not_regular(path.stat().st_mode), text)
         beside = [p.stem for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+    except InputError:
+        raise
     except (OSError, RuntimeError, ValueError) as error:  # unreadable, ~nobody, null byte
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"cannot be read: {reason}", shown(text)) from None
     close = difflib.get_close_matches(path.stem, beside, n=1)
     hint = f"; did you mean '{close[0]}.toml'?" if close else ""
     raise InputError(f"no such file{hint}", text)
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Open without waiting for somebody to write into a pipe."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _not_regular(mode: int) -> str:
+    kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
+    return f"is {kind}, not a file"
+
+
+def read_bytes(path: Path, where: str) -> bytes:
+    """Content of a regular file that a user named.
+
+    Parameters
+    ----------
+    path : Path
+        Where it lies.
+    where : str
+        Named in messages.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, is a folder, a pipe or a device, or is larger than 16 MiB.
+    """
+    try:
+        with open(path, "rb", opener=_at_once) as stream:
+            mode = os.fstat(stream.fileno()).st_mode
+            if not stat.S_ISREG(mode):
+                raise InputError(_not_regular(mode), where)
+            data = stream.read(MOST_BYTES + 1)
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot be read: {reason}", where) from None
+    if len(data) > MOST_BYTES:
+        raise InputError(f"is larger than {MOST_BYTES // 2**20} MiB", where)
+    return data
+
+
+def read(path: Path, where: str) -> str:
+    """Text of a regular file that a user named.
+
+    Parameters
+    ----------
+    path : Path
+        Where it lies.
+    where : str
+        Named in messages.
+
+    Raises
+    ------
+    InputError
+        As with `read_bytes`, or it is not UTF-8.
+    """
+    try:
+        # Some editors put a byte-order mark in front.
+        return read_bytes(path, where).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"not UTF-8 text: {error.reason} at byte {error.start}", where) from None

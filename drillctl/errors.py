@@ -7,8 +7,13 @@
 
 from __future__ import annotations
 
+import datetime
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+
+from drillctl.text import LONGEST_ERROR, LONGEST_PLACE, one_line, shortened
+
+MOST_ERRORS = 10  # of a design that are told at once
 
 
 class DrillctlError(Exception):
@@ -16,7 +21,7 @@ class DrillctlError(Exception):
 
 
 class InputError(DrillctlError, ValueError):
-    """An invalid design, path or option.
+    """An invalid design, path or option: one line of 500 characters at most.
 
     Parameters
     ----------
@@ -27,13 +32,34 @@ class InputError(DrillctlError, ValueError):
     """
 
     def __init__(self, problem: str, where: str = "") -> None:
-        self.problem = problem
-        self.where = where
-        super().__init__(f"{where}: {problem}" if where else problem)
+        self.where = shortened(one_line(where), LONGEST_PLACE)
+        self.problem = shortened(one_line(problem), LONGEST_ERROR - len(self.where) - 2)
+        super().__init__(f"{self.where}: {self.problem}" if where else self.problem)
 
     def within(self, place: str) -> InputError:
         """The same error with the file or key that contains it."""
         return InputError(self.problem, f"{place}: {self.where}" if self.where else place)
+
+
+class MultipleInputError(InputError):
+    """Several at once, a line each, up to ten; `problem` and `where` are those of the first.
+
+    Parameters
+    ----------
+    errors : sequence of InputError
+        Two or more.
+    """
+
+    def __init__(self, errors: Sequence[InputError]) -> None:
+        super().__init__(errors[0].problem, errors[0].where)
+        self.errors = tuple(errors)
+        more = len(errors) - MOST_ERRORS
+        lines = [str(error) for error in errors[:MOST_ERRORS]]
+        self.args = ("\n".join([*lines, *([f"and {more} more"] if more > 0 else [])]),)
+
+    def within(self, place: str) -> InputError:
+        """The same errors with the file or key that contains them."""
+        return MultipleInputError([error.within(place) for error in self.errors])
 
 
 class SimulationError(DrillctlError, RuntimeError):
@@ -45,7 +71,7 @@ class StoreError(DrillctlError, OSError):
 
 
 def shown(value: object) -> str:
-    """Return a value from the user as short text on one line, for a message.
+    """Return a value from the user as short text on one line, as TOML writes it, for a message.
 
     Parameters
     ----------
@@ -58,6 +84,8 @@ def shown(value: object) -> str:
         return "a list"
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
     if isinstance(value, int) and abs(value) >= 10**18:
         return "a number of more than 18 digits"
     text = f"{float(value)!r}" if isinstance(value, float) else repr(value)

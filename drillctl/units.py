@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -156,7 +157,7 @@ def registry() -> Any:
 
 
 @functools.lru_cache(maxsize=512)
-def _factor(unit: str, kind: Kind) -> float:
+def factor(unit: str, kind: Kind) -> float:
     """SI value of one `unit`, refused (`InputError`) if it does not measure `kind`."""
     if kind is SPEED and unit not in SPEED.examples:
         raise InputError(f"a speed is given in {_join(SPEED.examples)}, not in {unit!r}")
@@ -186,14 +187,42 @@ def _join(words: tuple[str, ...]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
 
 
+def plain(value: Any) -> Any:
+    """A value as a design file could hold it.
+
+    Parameters
+    ----------
+    value : object
+        A number of NumPy or xarray becomes one of Python, with a unit (of pint, or as xarray keeps
+        it) text; arrays become lists; tables and lists are gone through, anything else is kept.
+
+    Returns
+    -------
+    object
+        The same in types of Python.
+    """
+    if isinstance(value, Mapping):
+        return {key: plain(inside) for key, inside in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(inside) for inside in value]
+    if hasattr(value, "magnitude"):  # pint
+        number, unit = plain(value.magnitude), f"{value.units:~C}"
+    elif hasattr(value, "dtype"):
+        unit = getattr(value, "attrs", {}).get("units", "")  # xarray
+        number = getattr(value, "values", value).tolist()
+    else:
+        return value
+    return f"{number!r} {unit}" if unit and isinstance(number, (int, float)) else number
+
+
 def parse(value: object, kind: Kind) -> float:
     """Read a quantity.
 
     Parameters
     ----------
     value : str or SI or float
-        Text with a unit (`"140 kN"`, `"4 1/2 in"`), or an `SI` number. A bare number is
-        taken for gains alone.
+        Text with a unit (`"140 kN"`, `"4 1/2 in"`), or an `SI` number; as an array of one or a
+        quantity of pint, too. A bare number is taken for gains alone.
     kind : Kind
         What it must measure.
 
@@ -209,6 +238,7 @@ def parse(value: object, kind: Kind) -> float:
     """
     if isinstance(value, SI):
         return float(value)
+    value = plain(value)
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise _no_quantity(value, kind)
     if not isinstance(value, str):
@@ -220,7 +250,7 @@ def parse(value: object, kind: Kind) -> float:
     if not match["unit"]:
         return _bare(number, kind)
     try:
-        return number * _factor(match["unit"], kind)
+        return number * factor(match["unit"], kind)
     except InputError as error:
         raise InputError(f"{shown(value)}: {error.problem}") from None
 
@@ -266,7 +296,7 @@ def _bare(number: float, kind: Kind) -> float:
     likely = (
         unit
         for unit in kind.examples
-        if kind.usual[0] <= abs(value) * _factor(unit, kind) <= kind.usual[1]
+        if kind.usual[0] <= abs(value) * factor(unit, kind) <= kind.usual[1]
     )
     unit = next(likely, kind.examples[0])
     raise InputError(f'{short} has no unit; did you mean "{short} {unit}"?')
@@ -289,7 +319,7 @@ def write(value: float, kind: Kind) -> str:
     """
     value = float(value)
     for unit in kind.examples:
-        magnitude = value / _factor(unit, kind)
+        magnitude = value / factor(unit, kind)
         if not math.isfinite(magnitude):  # overflow: this unit is too small for it
             continue
         for digits in (6, 10, 15):

@@ -13,7 +13,9 @@ PACKAGE = Path(drillctl.__file__).parent
 
 # From the ground up. `drillctl/__init__.py` is under all of them: it looks names up when they are
 # asked for, and imports nothing.
-GROUND = ("arrays", "units", "errors", "progress", "provenance", "registry", "catalog")
+GROUND = (
+    "arrays", "text", "units", "errors", "progress", "provenance", "registry", "catalog",
+)  # fmt: skip
 ROOMS = (
     "drillctl", "ground", "rig", "design", "store", "linear", "simulation", "ensemble", "plots",
     "studies", "reporting", "cli", "__main__",

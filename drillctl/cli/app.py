@@ -16,6 +16,7 @@ from drillctl import __version__
 from drillctl.cli import console
 from drillctl.errors import DrillctlError, InputError
 from drillctl.studies.base import Group
+from drillctl.text import LONGEST_ERROR, shortened
 
 INTERRUPTED = 128 + signal.SIGINT
 DEBUG = "--debug prints the traceback"
@@ -52,8 +53,8 @@ def run(arguments: list[str]) -> int:
         code, message = _outcome(arguments)
     if code == INTERRUPTED and terminated:
         code, message = 128 + signal.SIGTERM, "terminated"
-    if message:
-        console.note(f"drillctl: {message}")
+    for line in message.splitlines():
+        console.note(f"drillctl: {shortened(line, LONGEST_ERROR)}")
     return code
 
 

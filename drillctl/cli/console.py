@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from drillctl.errors import StoreError
 from drillctl.progress import SILENT, Progress
+from drillctl.text import clean
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichBar
@@ -21,7 +22,7 @@ PIPED_WIDTH = 160
 
 def note(text: str) -> None:
     """Print a line on stderr."""
-    print(text, file=sys.stderr)  # noqa: T201
+    print(clean(text), file=sys.stderr)  # noqa: T201
 
 
 def _output() -> TextIO:
@@ -51,7 +52,7 @@ def emit(summary: dict[str, Any]) -> None:
 
 def line(text: str) -> None:
     """Print a line on stdout."""
-    print(text, file=_output())
+    print(clean(text), file=_output())
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -63,13 +64,13 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
     for number, column in enumerate(columns):
         made.add_column(column, justify="left" if number == 0 else "right", overflow="fold")
     for row in rows:
-        made.add_row(*row)
+        made.add_row(*map(clean, row))
     # Titles and names come from the user: brackets and colons in them are not markup.
     console = Console(file=_output(), markup=False, emoji=False, highlight=False)
     if not console.is_terminal:
         console.width = PIPED_WIDTH
     # Rich would wrap a title of the table at the width of the table.
-    console.print(title, style="bold", soft_wrap=True)
+    console.print(clean(title), style="bold", soft_wrap=True)
     console.print(made)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import logging
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from drillctl.cli import console
-from drillctl.errors import InputError
+from drillctl.errors import InputError, MultipleInputError
 from drillctl.studies.base import Option
 
 if TYPE_CHECKING:
@@ -123,7 +123,21 @@ def loaded(name: str, sets: list[str] | None) -> Design:
     """Load a design by name or path with the values set."""
     from drillctl.design import load, parse_setting
 
-    return load(name, **dict(parse_setting(text) for text in sets or []))
+    values = dict(parse_setting(text) for text in sets or [])
+    try:
+        return load(name, **values)
+    except MultipleInputError as error:
+        raise MultipleInputError([_of_option(one, values) for one in error.errors]) from None
+    except InputError as error:
+        raise _of_option(error, values) from None
+
+
+def _of_option(error: InputError, values: Iterable[str]) -> InputError:
+    """An error whose key was set on the command line, named by the option and not the file."""
+    key = error.where.partition(": ")[2]
+    if any(key == path or key.startswith(f"{path}.") for path in values):
+        return InputError(error.problem, f"--set {key}")
+    return error
 
 
 def warn(design: Design) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import registry
 from drillctl.design import parts
+from drillctl.design.lines import place, without_place
 from drillctl.design.merging import Tree, with_values
 from drillctl.design.tables import DesignTables
 from drillctl.design.validation import validated
@@ -74,17 +75,17 @@ class Design:
         return Design(self.name, validated(tree, self.origin), tree, self.origin)
 
     def where(self, key: str) -> str:
-        """A key after the file that it is in, for messages."""
-        return f"{self.origin}: {key}" if self.origin else key
+        """A key after the file and line that it is in, for messages."""
+        return place(self.origin, key, self.tree) if self.origin else key
 
     @contextmanager
-    def within(self, place: str) -> Iterator[None]:
+    def within(self, inside: str) -> Iterator[None]:
         """Name a place of the file in front of the key of an `InputError`."""
         try:
             yield
         except InputError as error:
-            key = error.where.removeprefix(self.origin).removeprefix(": ")
-            where = self.where(f"{place}: {key}".removesuffix(": "))
+            key = f"{inside}: {without_place(error.where, self.origin)}".removesuffix(": ")
+            where = f"{self.origin}: {key}" if self.origin else key
             raise InputError(error.problem, where) from None
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from drillctl import units
 from drillctl.design.tables import DesignTables, refuse_same_names
 from drillctl.design.uncertain_tables import flattened
 from drillctl.errors import InputError, nearest, shown
@@ -115,6 +116,7 @@ def _named(sections: list[Any]) -> bool:
 
 def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
     """A new tree with single values set by dotted path, in whatever order they are given."""
+    values = units.plain(values)
     # A law or a kind drops the numbers of the old one, so it goes before the new one's.
     first = (".law", ".kind", ".distribution")
     for path in sorted(values, key=lambda path: not path.endswith(first)):

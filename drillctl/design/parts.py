@@ -27,6 +27,7 @@ from drillctl.rig.drillstring.mesh import MeshedSection, meshed, what_was_done
 from drillctl.rig.drillstring.mud import jointed_drag
 from drillctl.rig.drillstring.section import torsional_yield
 from drillctl.rig.program import STILL, Program, Ramp
+from drillctl.rig.table import MOST_TORQUE, SPRING, WHEEL
 from drillctl.rig.top_drive.ideal import ConstantTorqueTable
 from drillctl.rig.top_drive.law import DriveTable
 from drillctl.rig.weight_on_bit.law import HEAVIEST, WeightLaw, weight_laws
@@ -216,19 +217,22 @@ def _yield_torque(table: SectionTable) -> float:
 def refuse_impossible_string(tables: DesignTables) -> None:
     """Refuse (`InputError`) a string that cannot be computed.
 
-    A node without inertia (its equation of motion would be singular), a section so extreme
-    that its stiffness or inertia is no number, or more elements than fit.
+    A node without inertia (its equation of motion would be singular), a section whose dimensions
+    give a stiffness or inertia beyond the ranges of their keys, or more elements than fit.
     """
     for table in pieces(tables):
-        where = f"drillstring.sections.{table.name}"
-        try:
-            made = section(table)
-        except OverflowError:
-            raise InputError("its dimensions are too large to compute with", where) from None
-        for name, value in (("stiffness", made.stiffness), ("inertia", made.inertia)):
-            least = math.inf if table.stiffness is None or name == "stiffness" else -1.0
-            if not math.isfinite(value) or (value == 0.0 and least > 0.0):
-                raise InputError(f"its dimensions give a {name} of {value:g}", where)
+        made = section(table)
+        # That of a lumped spring is zero; its ends were checked with their keys.
+        inertia = made.inertia if table.stiffness is None else WHEEL.most
+        for name, value, limits, kind in (
+            ("stiffness", made.stiffness, SPRING, units.STIFFNESS),
+            ("inertia", inertia, WHEEL, units.INERTIA),
+        ):
+            if not limits.least <= value <= limits.most:
+                raise InputError(
+                    f"its dimensions give {name} = {value:g}; allowed: {limits.text(kind)}",
+                    f"drillstring.sections.{table.name}",
+                )
     count = sum(section(table).elements for table in pieces(tables))
     if count > MOST_ELEMENTS:
         raise InputError(
@@ -293,7 +297,7 @@ def _refuse_impossible_friction(law: BitRockLaw, weight: float) -> None:
     groups = (form.sliding, form.static, form.decay)
     numbers = [(names[0], getattr(law, names[0])) for names in groups if len(names) == 1]
     for name, value in (*numbers, ("static torque", law.static_torque(weight))):
-        if not 0.0 <= value < math.inf:
+        if not 0.0 <= value <= MOST_TORQUE:
             raise InputError(
                 f"its numbers give {name} = {value:g} at {weight / 1e3:g} kN", "bit_rock"
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -14,7 +14,7 @@ from drillctl import units
 from drillctl.design.design import Design
 from drillctl.design.tables import AxisTable, Table, settings_of_studies
 from drillctl.errors import InputError, nearest, shown
-from drillctl.rig.table import number
+from drillctl.rig.table import Range, Reader, number
 from drillctl.rig.top_drive.law import drive_laws
 from drillctl.units import Kind
 
@@ -79,6 +79,7 @@ class Parameter:
             if not math.isfinite(si):
                 raise InputError(f"{shown(value)} is not a finite {self.kind.name}")
             return si
+        value = units.plain(value)
         if isinstance(value, str):
             try:
                 value = float(value)
@@ -140,10 +141,24 @@ def _is_number(annotation: Any, *types: type) -> bool:
 
 def _check_of(info: Any) -> BeforeValidator | None:
     """The check in a field's annotation, wherever in it that stands."""
-    for note in (*info.metadata, *_notes_inside(info.annotation)):
-        if isinstance(note, BeforeValidator):
-            return note
-    return None
+    return next(_notes(info, BeforeValidator), None)
+
+
+def kind_of(info: Any) -> Kind | None:
+    """The `Kind` kept in a field's annotation, if it has one."""
+    return next(_notes(info, Kind), None)
+
+
+def range_of(info: Any) -> Range | None:
+    """The range that numbers of a field must lie in, if it takes numbers."""
+    check = _check_of(info)
+    return check.func.range if check and isinstance(check.func, Reader) else None
+
+
+def _notes(info: Any, kind: type) -> Iterator[Any]:
+    """What is noted of a kind in a field's annotation, wherever in it that stands."""
+    inside = [*info.metadata, *_notes_inside(info.annotation)]
+    return (note for note in inside if isinstance(note, kind))
 
 
 def _notes_inside(annotation: Any) -> list[Any]:
@@ -151,24 +166,6 @@ def _notes_inside(annotation: Any) -> list[Any]:
     for argument in get_args(annotation):
         result += _notes_inside(argument)
     return result
-
-
-def kind_of(info: Any) -> Kind | None:
-    """The `Kind` kept in a field's annotation, if it has one."""
-    for note in info.metadata:
-        if isinstance(note, Kind):
-            return note
-    return _kind_inside(info.annotation)
-
-
-def _kind_inside(annotation: Any) -> Kind | None:
-    for argument in get_args(annotation):
-        if isinstance(argument, Kind):
-            return argument
-        inner = _kind_inside(argument)
-        if inner is not None:
-            return inner
-    return None
 
 
 # What a drive law is tuned by, for this rig.

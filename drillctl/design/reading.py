@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from drillctl.design.tally import Tally, with_tally
 from drillctl.design.uncertain_tables import with_samples
 from drillctl.design.validation import validated
 from drillctl.errors import InputError, shown
+from drillctl.text import one_line
 
 
 def load(name_or_path: str | Path, **values: Any) -> Design:
@@ -51,7 +51,7 @@ def load(name_or_path: str | Path, **values: Any) -> Design:
         tree = with_tally(with_samples(with_values(tree, values), Path()), Path())
     except InputError as error:
         raise error.within(str(path)) from None
-    return Design(path.stem, validated(tree, str(path)), tree, str(path))
+    return Design(one_line(path.stem), validated(tree, str(path)), tree, str(path))
 
 
 def _merged(path: Path, seen: tuple[Path, ...]) -> Tree:
@@ -71,7 +71,7 @@ def _merged(path: Path, seen: tuple[Path, ...]) -> Tree:
             f"got {shown(model)}; a model is a name or a path in quotes", f"{path}: model"
         )
     try:
-        below = _model_path(model, path)
+        below = catalog.find_model(model, path)
     except InputError as error:
         raise InputError(f"{shown(model)}: {error.problem}", f"{path}: model") from None
     if below in (*seen, path.resolve()):
@@ -92,27 +92,14 @@ def _without_sections(tree: Tree) -> Tree:
     return {**tree, "drillstring": {key: string[key] for key in string if key != "sections"}}
 
 
-def _model_path(model: str, design: Path) -> Path:
-    """A model given as a path is searched beside the design first."""
-    beside = design.parent / model
-    with suppress(OSError):  # a name no file can have; `find` reports it
-        if beside.suffix == ".toml" and beside.is_file():
-            return beside.resolve()
-    return catalog.find(model, ("models", "designs")).resolve()
-
-
 def _read(path: Path) -> Tree:
+    text = catalog.read(path, str(path))
     try:
-        # utf-8-sig: some editors put a byte-order mark in front.
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise InputError(f"not UTF-8 text: {error}", str(path)) from None
+        return tomllib.loads(text)
     except RecursionError:
         raise InputError("broken TOML: nested too deeply", str(path)) from None
     except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
         raise InputError(f"broken TOML: {error}", str(path)) from None
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", str(path)) from None
 
 
 def parse_setting(text: str) -> tuple[str, Any]:

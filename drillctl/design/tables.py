@@ -63,7 +63,7 @@ class SectionTable(Table):
     catalogue for this pipe and grade. `tool_joint_factor` multiplies the inertia by hand.
     """
 
-    name: str
+    name: q.Name
     elements: q.Count | None = None
     length: q.Length | None = None
     repeat: q.Count = 1
@@ -79,9 +79,9 @@ class SectionTable(Table):
     joint_spacing: q.Length | None = None
     shear_modulus: q.Modulus | None = None
     youngs_modulus: q.Modulus | None = None
-    poisson_ratio: q.Number | None = None
+    poisson_ratio: q.PoissonRatio | None = None
     density: q.Density | None = None
-    tool_joint_factor: q.PositiveNumber = 1.0
+    tool_joint_factor: q.Factor = 1.0
     stiffness: q.Stiffness | None = None
     inertia: q.Inertia | None = None
     damping: q.Damping = 0.0
@@ -258,7 +258,7 @@ class DrillstringTable(Table):
     """
 
     mass: Literal["consistent", "lumped"] = "consistent"
-    modal_damping: q.NonNegativeNumber = 0.0
+    modal_damping: q.DampingRatio = 0.0
     stiffness_damping: q.TimeOrZero = 0.0
     tally: str | None = None
     tally_from: Literal["top", "bit"] | None = None
@@ -442,9 +442,9 @@ class RockProgramTable(Table):
     """Rock: torques and decay times these factors before the time `until`."""
 
     until: q.TimeOrZero = 0.0
-    static_factor: q.PositiveNumber = 1.0
-    sliding_factor: q.PositiveNumber = 1.0
-    decay_factor: q.PositiveNumber = 1.0
+    static_factor: q.Factor = 1.0
+    sliding_factor: q.Factor = 1.0
+    decay_factor: q.Factor = 1.0
 
 
 class ScenarioTable(Table):
@@ -455,10 +455,13 @@ class ScenarioTable(Table):
     bit_rock: RockProgramTable = RockProgramTable()
 
 
+MOST_STEPS = 1e9  # of a run of the batch engine: an hour's work
+
+
 class SimulationTable(Table):
     """How long and how finely to simulate."""
 
-    duration: q.Time = 100.0
+    duration: q.Duration = 100.0
     j1_from: q.TimeOrZero = 0.0
     step: q.Time | None = None
     modes: q.Count | None = None
@@ -473,6 +476,10 @@ class SimulationTable(Table):
             )
         if self.step is not None and self.step > self.duration:
             raise InputError(f"step {self.step:g} s must not exceed duration {self.duration:g} s")
+        if self.step is not None and self.duration / self.step > MOST_STEPS:
+            raise InputError(
+                f"step {self.step:g} s: more than {MOST_STEPS:g} steps in the duration"
+            )
         return self
 
 
@@ -510,10 +517,10 @@ class OwnTables(Table):
     """A whole design file, but for the tables of studies."""
 
     schema_version: Literal[1] = Field(default=1, alias="schema")
-    title: str = ""
-    source: str = ""
-    status: str = ""
-    notes: str = ""
+    title: q.Text = ""
+    source: q.Text = ""
+    status: q.Text = ""
+    notes: q.Text = ""
     operating_point: OperatingPoint = OperatingPoint()
     drillstring: DrillstringTable
     top_drive: TopDriveTable

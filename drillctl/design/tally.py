@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from drillctl import units
+from drillctl import catalog, units
 from drillctl.design.tables import SectionTable
 from drillctl.errors import InputError, shown
 from drillctl.rig.drillstring import GRADES, PIPES
@@ -122,25 +122,24 @@ def read(source: object, begins: object, folder: Path, where: str = "drillstring
     else:
         path = folder / Path(source).expanduser()
         place, text = str(path), _text_of(path, where)
-    rows = [(n, row) for n, row in enumerate(_rows(text), 1) if any(row)]
+    try:
+        rows = [(n, row) for n, row in enumerate(_rows(text), 1) if any(row)]
+    except csv.Error as error:
+        raise InputError(str(error), place) from None
     return _read(place, text, rows, str(begins))
 
 
 def _text_of(path: Path, where: str) -> str:
     """Lines of a file; the first sheet of a workbook as CSV."""
-    try:
-        if path.suffix.lower() in (".xlsx", ".xlsm"):
-            stream = io.StringIO()
-            csv.writer(stream, lineterminator="\n").writerows(_of_workbook(path))
-            return stream.getvalue()
-        return path.read_text(encoding="utf-8-sig").rstrip("\n") + "\n"
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8 text: {error}", where) from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}", where) from None
+    if path.suffix.lower() in (".xlsx", ".xlsm"):
+        stream = io.StringIO()
+        content = catalog.read_bytes(path, f"{where}: {path}")
+        csv.writer(stream, lineterminator="\n").writerows(_of_workbook(path, content))
+        return stream.getvalue()
+    return catalog.read(path, f"{where}: {path}").rstrip("\n") + "\n"
 
 
-def _of_workbook(path: Path) -> list[list[str]]:
+def _of_workbook(path: Path, content: bytes) -> list[list[str]]:
     """The first sheet of a workbook."""
     try:
         import openpyxl
@@ -149,9 +148,8 @@ def _of_workbook(path: Path) -> list[list[str]]:
             f"{path}: a workbook needs openpyxl (pip install 'drillctl[xlsx]'), or save it as CSV"
         ) from None
     try:
-        sheet = openpyxl.load_workbook(path, read_only=True, data_only=True).worksheets[0]
-    except OSError:
-        raise
+        book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+        sheet = book.worksheets[0]
     except Exception as error:  # what is no workbook fails in many ways
         raise InputError(f"{path} is no workbook: {error}") from None
     return [[_written(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]

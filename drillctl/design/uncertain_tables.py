@@ -9,12 +9,14 @@ without the file.
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import field_validator, model_validator
 
+from drillctl import catalog
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig import table as q
 from drillctl.rig.table import Table, number_or_quantity
@@ -274,12 +276,11 @@ def _inlined(path: str, table: Any, folder: Path) -> Any:
 
 
 def _numbers(path: Path, column: str | None, where: str) -> list[float]:
+    text = catalog.read(path, f"{where}: {path}")
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            rows = [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path} cannot be read: {reason}", where) from None
+        rows = [row for row in csv.reader(io.StringIO(text)) if row and not row[0].startswith("#")]
+    except csv.Error as error:
+        raise InputError(f"{path}: {error}", where) from None
     index = 0
     if rows and not _is_number(rows[0][0]):
         heads = [head.strip() for head in rows[0]]

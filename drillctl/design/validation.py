@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from drillctl.design.lines import dotted, place
 from drillctl.design.merging import Tree
 from drillctl.design.tables import DesignTables
-from drillctl.errors import InputError, nearest, shown
+from drillctl.errors import InputError, MultipleInputError, nearest, shown
 from drillctl.rig.bit_rock.law import friction_laws
 from drillctl.rig.top_drive.law import drive_laws, top_drive
 from drillctl.rig.weight_on_bit.law import weight_laws
@@ -33,42 +34,55 @@ _TYPES = {
 
 
 def validated(tree: Tree, origin: str) -> DesignTables:
-    """Validate plain TOML data."""
-    from drillctl.design import parts
-
+    """Validate plain TOML data; up to ten errors are told at once, each with its line."""
     try:
         tables = DesignTables.model_validate(tree)
-        parts.refuse_impossible_string(tables)
-        parts.bit_rock_before(tables)
-        parts.program(tables)
-        if drive_laws()[tables.controller.law].tuned_to_string:
-            top_drive(tables.controller, lambda: parts.drillstring(tables))
-        if not parts.drive_of(tables).ideal:
-            parts.refuse_weak_drive(
-                tables, parts.drillstring(tables), parts.torque_at_set_speed(tables)
-            )
     except ValidationError as error:
-        raise _reported(_first(error.errors()), tree, origin) from None
-    except InputError as error:
-        raise error.within(origin) if origin else error from None
-    return tables
+        problems = [_reported(one, tree) for one in _telling(error.errors())]
+    else:
+        problems = list(_impossible(tables))
+    if not problems:
+        return tables
+    if origin:
+        problems = [InputError(one.problem, place(origin, one.where, tree)) for one in problems]
+    raise problems[0] if len(problems) == 1 else MultipleInputError(problems)
 
 
-def _first(problems: list[Any]) -> Any:
-    """The first error; a misspelt key before the missing one it was meant for."""
-    first = problems[0]
-    if first["type"] == "missing":
-        table = first["loc"][:-1]
-        for problem in problems:
-            if problem["type"] == "extra_forbidden" and problem["loc"][:-1] == table:
-                return problem
-    return first
+def _impossible(tables: DesignTables) -> Iterator[InputError]:
+    """What no rig can be, of tables that are valid each for itself."""
+    from drillctl.design import parts
+
+    ends = (parts.refuse_impossible_string, parts.bit_rock_before, parts.program)
+    found = False
+    for check in (*ends, _refuse_impossible_drive):
+        if found and check is _refuse_impossible_drive:  # it rests on the others
+            return
+        try:
+            check(tables)
+        except InputError as error:
+            found = True
+            yield error
 
 
-def _reported(problem: Any, tree: Tree, origin: str) -> InputError:
-    """The first pydantic error as one of ours."""
-    path = _path(problem["loc"], tree)
-    where = f"{origin}: {path}" if origin and path else origin or path
+def _refuse_impossible_drive(tables: DesignTables) -> None:
+    from drillctl.design import parts
+
+    if drive_laws()[tables.controller.law].tuned_to_string:
+        top_drive(tables.controller, lambda: parts.drillstring(tables))
+    if not parts.drive_of(tables).ideal:
+        string, torque = parts.drillstring(tables), parts.torque_at_set_speed(tables)
+        parts.refuse_weak_drive(tables, string, torque)
+
+
+def _telling(problems: list[Any]) -> list[Any]:
+    """All errors but missing keys of a table with an unknown one, probably misspelt."""
+    misspelt = {one["loc"][:-1] for one in problems if one["type"] == "extra_forbidden"}
+    return [one for one in problems if one["type"] != "missing" or one["loc"][:-1] not in misspelt]
+
+
+def _reported(problem: Any, tree: Tree) -> InputError:
+    """A pydantic error as one of ours."""
+    where = dotted(problem["loc"], tree)
     kind = problem["type"]
     if kind == "extra_forbidden":
         *parents, key = problem["loc"]
@@ -99,28 +113,6 @@ def _reported(problem: Any, tree: Tree, origin: str) -> InputError:
     if where.endswith("drillstring.sections") and kind == "tuple_type":
         due = "it must be a list of tables, each under [[drillstring.sections]]"
     return InputError(f"got {shown(problem['input'])}; {due}", where)
-
-
-def _path(loc: tuple[str | int, ...], tree: Tree) -> str:
-    """Dotted path as a user writes it: sections by name, no union tags."""
-    words: list[str] = []
-    here: Any = tree
-    for step in loc:
-        if isinstance(step, int):
-            here = here[step] if isinstance(here, list) and step < len(here) else None
-            name = here.get("name") if isinstance(here, dict) else None
-            words.append(_printed(name) if name and isinstance(name, str) else str(step + 1))
-        elif isinstance(here, dict) and here.get("law") == step and step not in here:
-            continue
-        else:
-            here = here.get(step) if isinstance(here, dict) else None
-            words.append(_printed(step))
-    return ".".join(words)
-
-
-def _printed(key: str) -> str:
-    """A key as it stands in a one-line message."""
-    return key if key.isprintable() else repr(key)
 
 
 def _keys_at(loc: tuple[str | int, ...]) -> list[str]:

@@ -307,12 +307,11 @@ def uncertain_parameters(design: Design) -> tuple[Uncertain, ...]:
     tables = design.tables.uncertain or _defaults(design)
     results = []
     for path, table in tables.items():
-        where = design.where(f"uncertain.{path}")
         try:
             results.append(_read(design, path, table))
         except InputError as error:
-            key = error.where if error.where != path else ""
-            raise InputError(error.problem, f"{where}.{key}" if key else where) from None
+            key = f".{error.where}" if error.where not in ("", path) else ""
+            raise InputError(error.problem, design.where(f"uncertain.{path}{key}")) from None
     return tuple(results)
 
 
@@ -446,10 +445,11 @@ def _refuse_ends(
     for key, end, inward in (("min", low, 1.0), ("max", high, -1.0)):
         # An end itself is drawn with probability zero: just inside is what counts.
         span = abs(mean or 1.0) if low is None or high is None else high - low
-        if end is None or not open_end:
+        own = table.distribution == "normal" and getattr(table, key) is None  # of its key
+        if end is None or own or not open_end:
             continue
         impossible = target.refusal(end + inward * 1e-9 * span)
         if impossible:
             written = getattr(table, key) or f"a spread down to {end:g}"
-            reason = impossible.partition(": ")[2] or problem
+            reason = impossible.partition(": ")[2] or impossible
             raise InputError(f"{written} reaches impossible values: {reason}", key)

@@ -31,6 +31,7 @@ from drillctl.reporting.sections import SECTIONS
 from drillctl.reporting.sections.summary import summary as verdict_summary
 from drillctl.reporting.sections.summary import verdict
 from drillctl.store.json_files import write_json, write_text
+from drillctl.text import one_line
 
 if TYPE_CHECKING:
     from drillctl import units
@@ -117,7 +118,7 @@ def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> D
             left_out.append((kind.title, reason.why))
     design = gathered.requested
     return Document(
-        title=title or design.tables.title or design.name,
+        title=one_line(title or design.tables.title or design.name),
         subtitle=f"Torsional stick-slip of a drillstring: report of the design {design.name}",
         facts=_facts(gathered),
         problems=gathered.problems,

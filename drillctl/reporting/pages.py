@@ -16,6 +16,7 @@ from typing import Any
 from drillctl.errors import DrillctlError
 from drillctl.reporting.blocks import Document, Figure
 from drillctl.reporting.pictures import FigureFiles, themed
+from drillctl.text import clean
 
 _UNIT = re.compile(
     r"(?<=[\d∞]) (?=%|(?:s|Hz|ms|rpm|kN|klbf|ft|m|N|kg|dB|in|mm|kJ)\b)"
@@ -52,6 +53,7 @@ def _environment() -> Any:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("drillctl.reporting"), trim_blocks=True, lstrip_blocks=True,
         autoescape=jinja2.select_autoescape(["html.j2"]), undefined=jinja2.StrictUndefined,
+        finalize=lambda value: clean(value) if type(value) is str else value,
     )  # fmt: skip
     environment.globals["kind"] = lambda block: type(block).__name__
     for one in (_figures, _kept, _short, _plain, _fence):

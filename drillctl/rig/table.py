@@ -6,48 +6,113 @@ What every table of a design file is.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Annotated, Any, Union, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from drillctl import units
 from drillctl.errors import InputError, shown
+from drillctl.text import LONGEST_NAME, clean, one_line
 from drillctl.units import Kind
 
-Check = Callable[[float, object], None]
-"""Refuses a number (SI) out of its range; the message quotes what was written."""
-
 LARGEST_COUNT = 10**9  # of anything that is counted: what is larger is a slip of the pen
+FAR, NEAR = 1e9, 1e-9  # beyond any number without a unit, and below any that is not zero
+SHORTEST_LAG = 1e-4
+"""Shortest time constant (s) but for none: less would cost the solvers much and change nothing."""
+SHORTEST_PERIOD = 1e-3  # shortest sampling period (s) but for none
 
 
-def _any(si: float, written: object) -> None:
-    pass
+@dataclass(frozen=True)
+class Range:
+    """What a key takes: of the signs that make sense, a thousand times beyond any rig."""
+
+    least: float  # SI
+    most: float
+    zero: bool = False  # whether 0 is allowed beside them
+
+    def refusal(self, si: float, kind: Kind | None) -> str:
+        """Why a number (SI) is not allowed; empty if it is."""
+        if self.least <= si <= self.most or (self.zero and si == 0.0):
+            return ""
+        if si <= 0.0 <= self.least:
+            nought = self.zero or self.least == 0.0
+            return "it must be 0 or more" if nought else "it must be greater than 0"
+        if self.most == 0.0 < si:
+            return "it must be 0 or less"
+        if si < self.least:
+            return f"it must be {'0 or ' * self.zero}at least {_written(self.least, kind)}"
+        return f"it must be at most {_written(self.most, kind)}"
+
+    def text(self, kind: Kind | None) -> str:
+        """Both ends, for the documents."""
+        low, high = _written(self.least, kind), _written(self.most, kind)
+        unit = f" {high.partition(' ')[2]}"
+        if low.endswith(unit) or self.least == 0.0:
+            low = low.partition(" ")[0]
+        return f"{'0 or ' * self.zero}{low} to {high}"
 
 
-def _positive(si: float, written: object) -> None:
-    if not si > 0:
-        raise InputError(f"{shown(written)} is not allowed: it must be greater than 0")
+def _written(value: float, kind: Kind | None) -> str:
+    """A bound in the unit that makes it shortest."""
+    text = f"{value:g}"
+    if kind is not None:
+        texts = [f"{value / units.factor(unit, kind):.6g} {unit}" for unit in kind.examples]
+        text = min((t for t in texts if units.parse(t, kind) == value), key=len)
+    return re.sub(r"e([+-])0*", lambda found: f"e{found[1].strip('+')}", text)
 
 
-def _not_negative(si: float, written: object) -> None:
-    if not si >= 0:
-        raise InputError(f"{shown(written)} is not allowed: it must be 0 or more")
+@dataclass(frozen=True)
+class Reader:
+    """Reads a number, with a unit if it is of a kind, and refuses what lies out of its range."""
 
+    kind: Kind | None
+    range: Range
 
-def _read(kind: Kind, check: Check = _any) -> BeforeValidator:
-    def read(value: object) -> float:
-        si = units.parse(value, kind)
+    def __call__(self, value: Any) -> Any:
+        """The number (SI)."""
+        si = number(value) if self.kind is None else units.parse(value, self.kind)
         if not math.isfinite(si):
-            raise InputError(f"{shown(value)} is not a finite {kind.name}")
-        check(si, value)
-        return si + 0.0  # never -0.0: equal designs have equal hashes
+            raise InputError(f"{shown(value)} is not a finite {self.kind.name}")  # type: ignore[union-attr]
+        return self._inside(si, value) + 0.0  # never -0.0: equal designs have equal hashes
 
-    return BeforeValidator(read)
+    def _inside(self, si: Any, written: object) -> Any:
+        refusal = self.range.refusal(si, self.kind)
+        if refusal:
+            raise InputError(f"{shown(written)} is not allowed: {refusal}")
+        return si
+
+
+class Counter(Reader):
+    """Reads a whole number."""
+
+    def __call__(self, value: Any) -> Any:
+        """The number."""
+        value = units.plain(value)
+        if isinstance(value, float) and value.is_integer():
+            value = int(value)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise InputError(f"{shown(value)} is not a whole number")
+        return self._inside(value, value)
+
+
+class Limiter(Reader):
+    """Reads a limit: infinity, in whatever form it is written, is none."""
+
+    def __call__(self, value: Any) -> Any:
+        """The number (SI), or None."""
+        value = units.plain(value)
+        if value is None or (isinstance(value, float) and value == math.inf):
+            return None
+        first = value.strip().lower().partition(" ")[0] if isinstance(value, str) else ""
+        return None if first.lstrip("-") in ("inf", "infinity") else super().__call__(value)
 
 
 def number(value: object) -> float:
     """Read a number without unit; refused (`InputError`) unless it is finite."""
+    value = units.plain(value)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"{shown(value)} is not a number; write it without quotes or unit")
     try:
@@ -59,117 +124,104 @@ def number(value: object) -> float:
     return si + 0.0
 
 
-def _number(check: Check = _any) -> BeforeValidator:
-    def read(value: object) -> float:
-        si = number(value)
-        check(si, value)
-        return si
-
-    return BeforeValidator(read)
+def _any(most: float, kind: Kind | None = None) -> BeforeValidator:
+    return BeforeValidator(Reader(kind, Range(-most, most)))
 
 
-def _count(check: Check) -> BeforeValidator:
-    def read(value: object) -> int:
-        if isinstance(value, float) and value.is_integer():
-            value = int(value)
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise InputError(f"{shown(value)} is not a whole number")
-        if value > LARGEST_COUNT:
-            raise InputError(f"{shown(value)} is not allowed: at most {LARGEST_COUNT}")
-        check(value, value)
-        return value
-
-    return BeforeValidator(read)
+def _positive(least: float, most: float, kind: Kind | None = None) -> BeforeValidator:
+    return BeforeValidator(Reader(kind, Range(least, most)))
 
 
-SHORTEST_LAG = 1e-4
-"""Shortest time constant (s) but for none: less would cost the solvers much and change nothing."""
-SHORTEST_PERIOD = 1e-3  # shortest sampling period (s) but for none
+def _not_negative(most: float, kind: Kind | None = None) -> BeforeValidator:
+    return BeforeValidator(Reader(kind, Range(0.0, most)))
 
 
-def _none_or_lag(si: float, written: object) -> None:
-    if si != 0.0 and not si >= SHORTEST_LAG:
-        raise InputError(f"{shown(written)} is not allowed: it must be 0 or at least 0.1 ms")
+def _zero_or(least: float, most: float, kind: Kind) -> BeforeValidator:
+    return BeforeValidator(Reader(kind, Range(least, most, zero=True)))
 
 
-def _none_or_period(si: float, written: object) -> None:
-    if si != 0.0 and not si >= SHORTEST_PERIOD:
-        raise InputError(f"{shown(written)} is not allowed: it must be 0 or at least 1 ms")
+def _count(least: int) -> BeforeValidator:
+    return BeforeValidator(Counter(None, Range(least, LARGEST_COUNT)))
 
 
-def _not_positive(si: float, written: object) -> None:
-    if not si <= 0:
-        raise InputError(f"{shown(written)} is not allowed: it must be 0 or less")
+def _limit(least: float, most: float, kind: Kind) -> BeforeValidator:
+    return BeforeValidator(Limiter(kind, Range(least, most)))
 
 
-def _limit(kind: Kind, check: Check = _positive) -> BeforeValidator:
-    """A limit: infinity, in whatever form it is written, is none."""
-    read = _read(kind, check).func
+# A float with the `Kind` it is read and written by, and the range (SI) it must lie in. A positive
+# number has a least one as well: it stands under a line somewhere.
+Number = Annotated[float, _any(FAR)]
+PositiveNumber = Annotated[float, _positive(NEAR, FAR)]
+NonNegativeNumber = Annotated[float, _not_negative(FAR)]
+Factor = Annotated[float, _positive(1e-6, 1e6)]
+DampingRatio = Annotated[float, _not_negative(1e3)]
+PoissonRatio = Annotated[float, BeforeValidator(Reader(None, Range(-1.0, 0.5)))]
+Share = Annotated[float, _not_negative(1.0)]
+Arm = Annotated[float, _not_negative(1e3)]  # torque over weight on bit (m)
+Decay = Annotated[float, _not_negative(1e4)]  # of a torque with speed (s/rad)
+Count = Annotated[int, _count(1)]
+CountOrZero = Annotated[int, _count(0)]
 
-    def reads(value: object) -> float | None:
-        if value is None or (isinstance(value, float) and value == math.inf):
-            return None
-        if isinstance(value, str) and value.strip().lower().split(" ")[0] in (
-            "inf", "infinity", "-inf", "-infinity"
-        ):  # fmt: skip
-            return None
-        return float(read(value))  # type: ignore[call-arg]
+SPRING = Range(1e-6, 1e13)  # stiffness (N m/rad) of a section
+WHEEL = Range(1e-6, 1e10, zero=True)  # inertia (kg m2) of a section or a body
+MOST_TORQUE = 1e9  # (N m)
 
-    return BeforeValidator(reads)
-
-
-def _share(si: float, written: object) -> None:
-    if not 0.0 <= si <= 1.0:
-        raise InputError(f"{shown(written)} is not allowed: it must lie between 0 and 1")
-
-
-# A float with the `Kind` it is read and written by, and the range it must lie in.
-Number = Annotated[float, _number()]
-PositiveNumber = Annotated[float, _number(_positive)]
-NonNegativeNumber = Annotated[float, _number(_not_negative)]
-Count = Annotated[int, _count(_positive)]
-CountOrZero = Annotated[int, _count(_not_negative)]
-
-Speed = Annotated[float, units.SPEED, _read(units.SPEED)]
-PositiveSpeed = Annotated[float, units.SPEED, _read(units.SPEED, _positive)]
-SpeedOrZero = Annotated[float, units.SPEED, _read(units.SPEED, _not_negative)]
-Weight = Annotated[float, units.FORCE, _read(units.FORCE, _not_negative)]
-Torque = Annotated[float, units.TORQUE, _read(units.TORQUE)]
-TorqueOrZero = Annotated[float, units.TORQUE, _read(units.TORQUE, _not_negative)]
-Length = Annotated[float, units.LENGTH, _read(units.LENGTH, _positive)]
-Diameter = Annotated[float, units.DIAMETER, _read(units.DIAMETER, _positive)]
-Bore = Annotated[float, units.DIAMETER, _read(units.DIAMETER, _not_negative)]
-Time = Annotated[float, units.TIME, _read(units.TIME, _positive)]
-TimeOrZero = Annotated[float, units.TIME, _read(units.TIME, _not_negative)]
-Lag = Annotated[float, units.TIME, _read(units.TIME, _none_or_lag)]
-SamplingPeriod = Annotated[float, units.TIME, _read(units.TIME, _none_or_period)]
-Rate = Annotated[float, units.RATE, _read(units.RATE, _not_negative)]
-Inertia = Annotated[float, units.INERTIA, _read(units.INERTIA, _not_negative)]
-Density = Annotated[float, units.DENSITY, _read(units.DENSITY, _positive)]
-Viscosity = Annotated[float, units.VISCOSITY, _read(units.VISCOSITY, _positive)]
-Modulus = Annotated[float, units.MODULUS, _read(units.MODULUS, _positive)]
-PolarMoment = Annotated[float, units.POLAR_MOMENT, _read(units.POLAR_MOMENT, _positive)]
-Stiffness = Annotated[float, units.STIFFNESS, _read(units.STIFFNESS, _positive)]
-Damping = Annotated[float, units.DAMPING, _read(units.DAMPING, _not_negative)]
-Drag = Annotated[float, units.DRAG, _read(units.DRAG, _not_negative)]
-Slowness = Annotated[float, units.SLOWNESS, _read(units.SLOWNESS, _not_negative)]
-WeightGain = Annotated[float, units.WEIGHT_GAIN, _read(units.WEIGHT_GAIN, _not_negative)]
-ProportionalGain = Annotated[float, units.PROPORTIONAL_GAIN, _read(units.PROPORTIONAL_GAIN)]
-IntegralGain = Annotated[float, units.INTEGRAL_GAIN, _read(units.INTEGRAL_GAIN)]
+Speed = Annotated[float, units.SPEED, _any(1e5, units.SPEED)]
+PositiveSpeed = Annotated[float, units.SPEED, _positive(1e-9, 1e5, units.SPEED)]
+SpeedOrZero = Annotated[float, units.SPEED, _not_negative(1e5, units.SPEED)]
+Weight = Annotated[float, units.FORCE, _not_negative(1e9, units.FORCE)]
+PositiveWeight = Annotated[float, units.FORCE, _positive(1e-3, 1e9, units.FORCE)]
+Torque = Annotated[float, units.TORQUE, _any(MOST_TORQUE, units.TORQUE)]
+TorqueOrZero = Annotated[float, units.TORQUE, _not_negative(MOST_TORQUE, units.TORQUE)]
+Length = Annotated[float, units.LENGTH, _positive(1e-4, 1e8, units.LENGTH)]
+Diameter = Annotated[float, units.DIAMETER, _positive(1e-5, 1e3, units.DIAMETER)]
+Bore = Annotated[float, units.DIAMETER, _not_negative(1e3, units.DIAMETER)]
+Duration = Annotated[float, units.TIME, _positive(1e-3, 1e6, units.TIME)]
+Time = Annotated[float, units.TIME, _positive(1e-6, 1e6, units.TIME)]
+TimeOrZero = Annotated[float, units.TIME, _not_negative(1e6, units.TIME)]
+Lag = Annotated[float, units.TIME, _zero_or(SHORTEST_LAG, 1e6, units.TIME)]
+SamplingPeriod = Annotated[float, units.TIME, _zero_or(SHORTEST_PERIOD, 1e6, units.TIME)]
+Rate = Annotated[float, units.RATE, _not_negative(1e6, units.RATE)]
+Inertia = Annotated[float, units.INERTIA, BeforeValidator(Reader(units.INERTIA, WHEEL))]
+Density = Annotated[float, units.DENSITY, _positive(1e-2, 1e7, units.DENSITY)]
+Viscosity = Annotated[float, units.VISCOSITY, _positive(1e-9, 1e6, units.VISCOSITY)]
+Modulus = Annotated[float, units.MODULUS, _positive(1e3, 1e15, units.MODULUS)]
+PolarMoment = Annotated[float, units.POLAR_MOMENT, _positive(1e-15, 1e3, units.POLAR_MOMENT)]
+Stiffness = Annotated[float, units.STIFFNESS, BeforeValidator(Reader(units.STIFFNESS, SPRING))]
+Damping = Annotated[float, units.DAMPING, _not_negative(1e9, units.DAMPING)]
+Drag = Annotated[float, units.DRAG, _not_negative(1e5, units.DRAG)]
+Slowness = Annotated[float, units.SLOWNESS, _not_negative(1e6, units.SLOWNESS)]
+WeightGain = Annotated[float, units.WEIGHT_GAIN, _not_negative(1e9, units.WEIGHT_GAIN)]
+ProportionalGain = Annotated[float, units.PROPORTIONAL_GAIN, _any(1e8, units.PROPORTIONAL_GAIN)]
+IntegralGain = Annotated[float, units.INTEGRAL_GAIN, _any(1e8, units.INTEGRAL_GAIN)]
 PositiveProportionalGain = Annotated[
-    float, units.PROPORTIONAL_GAIN, _read(units.PROPORTIONAL_GAIN, _positive)
+    float, units.PROPORTIONAL_GAIN, _positive(1e-6, 1e8, units.PROPORTIONAL_GAIN)
 ]
-PositiveIntegralGain = Annotated[float, units.INTEGRAL_GAIN, _read(units.INTEGRAL_GAIN, _positive)]
-PositiveWeight = Annotated[float, units.FORCE, _read(units.FORCE, _positive)]
-Share = Annotated[float, _number(_share)]
+PositiveIntegralGain = Annotated[
+    float, units.INTEGRAL_GAIN, _positive(1e-6, 1e8, units.INTEGRAL_GAIN)
+]
 
 # Limits: None where there is none.
-TorqueLimit = Annotated[float | None, units.TORQUE, _limit(units.TORQUE)]
-LeastTorque = Annotated[float | None, units.TORQUE, _limit(units.TORQUE, _not_positive)]
-SpeedLimit = Annotated[float | None, units.SPEED, _limit(units.SPEED)]
-PowerLimit = Annotated[float | None, units.POWER, _limit(units.POWER)]
-TorqueRateLimit = Annotated[float | None, units.TORQUE_RATE, _limit(units.TORQUE_RATE)]
-WeightRateLimit = Annotated[float | None, units.FORCE_RATE, _limit(units.FORCE_RATE)]
+TorqueLimit = Annotated[float | None, units.TORQUE, _limit(1e-3, 1e15, units.TORQUE)]
+LeastTorque = Annotated[float | None, units.TORQUE, _limit(-1e15, 0.0, units.TORQUE)]
+SpeedLimit = Annotated[float | None, units.SPEED, _limit(1e-9, 1e15, units.SPEED)]
+PowerLimit = Annotated[float | None, units.POWER, _limit(1e-3, 1e15, units.POWER)]
+TorqueRateLimit = Annotated[float | None, units.TORQUE_RATE, _limit(1e-3, 1e15, units.TORQUE_RATE)]
+WeightRateLimit = Annotated[float | None, units.FORCE_RATE, _limit(1e-3, 1e15, units.FORCE_RATE)]
+
+
+def _name(text: str) -> str:
+    if not text.strip():
+        raise InputError("a name must hold more than blanks")
+    if len(text) > LONGEST_NAME:
+        raise InputError(f"a name has at most {LONGEST_NAME} characters, this one {len(text)}")
+    if one_line(text) != text:
+        raise InputError(f"'{one_line(text)}' holds a control character, which no name may")
+    return text
+
+
+Text = Annotated[str, AfterValidator(clean)]
+Name = Annotated[str, AfterValidator(_name)]
 
 
 class Table(BaseModel):
@@ -195,4 +247,5 @@ def one_of(laws: Iterable[Any]) -> Any:
 
 def number_or_quantity(value: object) -> object:
     """Text as it came, or a finite number: what may stand for a value at any path."""
+    value = units.plain(value)
     return value if isinstance(value, str) else number(value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import datetime
 import math
+import re
 import tomllib
 
 import pytest
@@ -17,6 +18,7 @@ from drillctl import catalog, units
 from drillctl.design import Design, parameter, parameters, parse_setting, to_toml
 from drillctl.design.reading import parse_axis, to_tree
 from drillctl.errors import InputError
+from drillctl.text import one_line
 
 HOLDS = (
     (
@@ -60,8 +62,9 @@ def told(tmp_path):
             drillctl.load(path, **values)
         message = str(caught.value)
         assert "\n" not in message
-        assert message.startswith(f"{path}: ")
-        return message.removeprefix(f"{path}: ")
+        place = re.match(rf"{re.escape(str(path))}(:\d+)?: ", message)
+        assert place
+        return message[place.end() :]
 
     return tell
 
@@ -100,7 +103,7 @@ def test_names_that_no_file_can_have(name):
 
 def test_a_folder_is_no_design(tmp_path):
     (tmp_path / "folder.toml").mkdir()
-    with pytest.raises(InputError, match=r"folder\.toml: no such file"):
+    with pytest.raises(InputError, match=r"folder\.toml: is a folder, not a file"):
         drillctl.load(tmp_path / "folder.toml")
 
 
@@ -320,8 +323,12 @@ PIPE_KEY = "drillstring.sections.pipe"
          "'0 mm' is not allowed: it must be greater than 0"),
         (rig(string=geometry("4 in", "-1 in")), f"{PIPE_KEY}.inner_diameter",
          "'-1 in' is not allowed: it must be 0 or more"),
-        (rig(string=geometry("1e200 m", "0 m")), PIPE_KEY, "too large to compute with"),
-        (rig(string=geometry("1e-200 m", "0 m")), PIPE_KEY, "its dimensions give a stiffness of 0"),
+        (rig(string=geometry("1e200 m", "0 m")), f"{PIPE_KEY}.outer_diameter",
+         "'1e200 m' is not allowed: it must be at most 1000 m"),
+        (rig(string=geometry("1e-200 m", "0 m")), f"{PIPE_KEY}.outer_diameter",
+         "'1e-200 m' is not allowed: it must be at least 0.01 mm"),
+        (rig(string=geometry("999 m", "0 m")), PIPE_KEY,
+         "its dimensions give stiffness = 8.61574e+20; allowed: 1e-6 to 1e13 N*m/rad"),
         (rig(string=PIPE.replace("1000 m", "0 m")), f"{PIPE_KEY}.length",
          "'0 m' is not allowed: it must be greater than 0"),
         (rig(string=PIPE.replace("1000 m", "-5 ft")), f"{PIPE_KEY}.length",
@@ -339,7 +346,7 @@ PIPE_KEY = "drillstring.sections.pipe"
         (rig(string=f"{PIPE}elements = 2.5\n"), f"{PIPE_KEY}.elements",
          "2.5 is not a whole number"),
         (rig(string=f"{PIPE}elements = 0x{'F' * 4000}\n"), f"{PIPE_KEY}.elements",
-         "a number of more than 18 digits is not allowed: at most 1000000000"),
+         "a number of more than 18 digits is not allowed: it must be at most 1e9"),
         (rig(string=f"{PIPE}tool_joint_factor = 0\n"), f"{PIPE_KEY}.tool_joint_factor",
          "0 is not allowed: it must be greater than 0"),
         (rig(string=f'{PIPE}drag = "-1 N*s/rad"\n'), f"{PIPE_KEY}.drag",
@@ -417,8 +424,11 @@ PIPE_KEY = "drillstring.sections.pipe"
          "a2 = 0.08 must not be less than a1 = 0.09"),
         (rig(friction=FRICTION + "a1_factor = 3\n"), "bit_rock",
          "a2 = 0.08 must not be less than a1 = 0.09"),
-        (rig(friction=FRICTION.replace("0.08", "1e308")), "bit_rock",
-         "its numbers give static torque = inf at 50 kN"),
+        (rig(friction=FRICTION.replace("0.08", "1e308")), "bit_rock.a2",
+         "1e+308 is not allowed: it must be at most 1000"),
+        (rig(friction=FRICTION.replace("0.08", "999"),
+             operating_point='[operating_point]\nweight_on_bit = "1e6 kN"\n'), "bit_rock",
+         "its numbers give static torque = 9.99e+11 at 1e+06 kN"),
         (rig(more='[simulation]\nduration = "0 s"'), "simulation.duration",
          "'0 s' is not allowed: it must be greater than 0"),
         (rig(more='[simulation]\nduration = "-1 s"'), "simulation.duration",
@@ -638,8 +648,7 @@ def test_extrapolation_stops_where_friction_ends(told):
         (rig(friction=FRICTION.replace("0.03", '"0.03"')),
          "bit_rock.a1: '0.03' is not a number; write it without quotes or unit"),
         (rig(friction=FRICTION.replace("0.03", "1979-05-27")),
-         "bit_rock.a1: datetime.date(1979, 5, 27) is not a number; "
-         "write it without quotes or unit"),
+         "bit_rock.a1: 1979-05-27 is not a number; write it without quotes or unit"),
         (rig(more="[map]\naudit_cells = false"), "map.audit_cells: false is not a whole number"),
         (rig(more="[map]\nlevels = 3"), "map.levels: got 3; it must be a list"),
         (rig(more="[map.axes]\nkp = 3"), "map.axes: got a table; it must be a list"),
@@ -750,9 +759,9 @@ def assert_design_or_one_line(make):
     try:
         design = make()
     except InputError as error:
-        message = str(error)
-        assert message
-        assert "\n" not in message
+        lines = str(error).split("\n")
+        assert 1 <= len(lines) <= 11
+        assert all(line and one_line(line) == line and len(line) <= 500 for line in lines)
         return
     assert isinstance(design, Design)
     assert design.bit_rock.static_torque(1.0) >= 0.0

@@ -336,7 +336,7 @@ STARTED = {"start.kind": "rest"}
         ([{"name": "a", "set": {"controller.kp": "soft"}}], "compare.cases 'a': controller.kp"),
         ([{"name": "a"}, {"name": "a"}], "two cases are called 'a'"),
         ([{"set": {}}], "compare.cases.1.name: is missing"),
-        ([{"name": " "}], "every case needs a name"),
+        ([{"name": " "}], "a name must hold more than blanks"),
         ([{"name": "a", "values": {}}], "unknown key"),
         ("a", "compare.cases: got 'a'; it must be a list"),
         ([{"name": "a", "set": 3}], "it must be a table"),

@@ -58,8 +58,8 @@ class JansenVanDenSteenTable(Table):
     """A static peak over a constant sliding torque (after Jansen & van den Steen 1995)."""
 
     law: Literal["jansen-van-den-steen"]
-    a1: q.NonNegativeNumber
-    a2: q.NonNegativeNumber
+    a1: q.Arm
+    a2: q.Arm
 
     @model_validator(mode="after")
     def _peak(self) -> JansenVanDenSteenTable:
@@ -71,7 +71,7 @@ class CoulombTable(Table):
     """The same torque at rest and at any speed: a x weight on bit."""
 
     law: Literal["coulomb"]
-    a: q.NonNegativeNumber
+    a: q.Arm
 
 
 LAWS = (

@@ -257,9 +257,9 @@ class FrictionRow(Table):
     """Friction coefficients at one weight on bit."""
 
     weight_on_bit: q.Weight
-    a1: q.NonNegativeNumber
-    a2: q.NonNegativeNumber
-    beta: q.NonNegativeNumber
+    a1: q.Arm
+    a2: q.Arm
+    beta: q.Decay
 
     @model_validator(mode="after")
     def _falling(self) -> FrictionRow:
@@ -271,13 +271,13 @@ class FrictionCoefficients(Table):
     """What laws have in common that decay exponentially: coefficients, or a table over WOB."""
 
     law: str
-    a1: q.NonNegativeNumber | None = None
-    a2: q.NonNegativeNumber | None = None
-    beta: q.NonNegativeNumber | None = None
+    a1: q.Arm | None = None
+    a2: q.Arm | None = None
+    beta: q.Decay | None = None
     table: tuple[FrictionRow, ...] | None = None
-    a1_factor: q.PositiveNumber = 1.0
-    a2_factor: q.PositiveNumber = 1.0
-    beta_factor: q.PositiveNumber = 1.0
+    a1_factor: q.Factor = 1.0
+    a2_factor: q.Factor = 1.0
+    beta_factor: q.Factor = 1.0
     outside_table: Literal["refuse", "extrapolate"] = "refuse"
 
     @field_validator("table")
@@ -371,7 +371,7 @@ class BitRadiusFrictionTable(Table):
     bit_radius: q.Diameter
     static_coefficient: q.NonNegativeNumber
     sliding_coefficient: q.NonNegativeNumber
-    decay: q.NonNegativeNumber
+    decay: q.Decay
     reference_speed: q.PositiveSpeed = 1.0
     regularised_over: q.PositiveSpeed | None = None
 

@@ -115,7 +115,7 @@ class FrictionPoint(Table):
     """Torque over weight on bit at one speed."""
 
     speed: q.Speed
-    a: q.NonNegativeNumber
+    a: q.Arm
 
 
 class TabulatedFrictionTable(Table):
@@ -123,7 +123,7 @@ class TabulatedFrictionTable(Table):
 
     law: Literal["tabulated"]
     points: tuple[FrictionPoint, ...]
-    static: q.NonNegativeNumber | None = None
+    static: q.Arm | None = None
 
     @model_validator(mode="after")
     def _ordered(self) -> TabulatedFrictionTable:

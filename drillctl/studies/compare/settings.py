@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import Field, field_validator
 
 from drillctl.errors import InputError
+from drillctl.rig import table as q
 from drillctl.rig.table import Table
 
 KEY = "compare"
@@ -15,15 +16,8 @@ KEY = "compare"
 class CaseTable(Table):
     """A case: its name, and values by dotted path that replace those of the design."""
 
-    name: str
+    name: q.Name
     values: dict[str, Any] = Field(default_factory=dict, alias="set")
-
-    @field_validator("name")
-    @classmethod
-    def _not_empty(cls, name: str) -> str:
-        if not name.strip() or not name.isprintable():
-            raise InputError(f"{name!r} is not allowed: every case needs a name")
-        return name
 
 
 class Settings(Table):

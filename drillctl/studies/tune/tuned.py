@@ -45,7 +45,7 @@ def tuned_parameters(design: Design) -> tuple[Tuned, ...]:
     """What the `[tune]` table of a design names, or the numbers of its controller."""
     table = design.tables.tune
     if table.parameters:
-        result = tuple(_read(design, path, entry) for path, entry in table.parameters.items())
+        result = tuple(_named(design, path, entry) for path, entry in table.parameters.items())
     else:
         result = _defaults(design)
     for path in (t.path for t in result if t.path in design.tables.uncertain):
@@ -56,26 +56,29 @@ def tuned_parameters(design: Design) -> tuple[Tuned, ...]:
     return result
 
 
-def _read(design: Design, path: str, entry: RangeTable) -> Tuned:
-    where = design.where(f"tune.parameters.{path}")
+def _named(design: Design, path: str, entry: RangeTable) -> Tuned:
     try:
-        target = parameter(design, path)
-        low, high = target.parse(entry.min), target.parse(entry.max)
+        return _read(design, path, entry)
     except InputError as error:
-        raise InputError(error.problem, where) from None
+        end = f".{error.where}" if error.where in ("min", "max") else ""
+        raise InputError(error.problem, design.where(f"tune.parameters.{path}{end}")) from None
+
+
+def _read(design: Design, path: str, entry: RangeTable) -> Tuned:
+    target = parameter(design, path)
+    low, high = target.parse(entry.min), target.parse(entry.max)
     if path.startswith("simulation.") or target.whole:
-        raise InputError("is not a number of the rig that can be tuned", where)
+        raise InputError("is not a number of the rig that can be tuned")
     if not low < high:
         raise InputError(
             f"min {entry.min} must be less than max {entry.max}: the bounds are "
-            + ("reversed" if high < low else "equal"),
-            where,
+            + ("reversed" if high < low else "equal")
         )
     for key, end in (("min", low), ("max", high)):
         try:
             design.replace({path: units.SI(end)})
         except InputError as error:
-            raise InputError(f"no design has it: {error.problem}", f"{where}.{key}") from None
+            raise InputError(f"no design has it: {error.problem}", key) from None
     return Tuned(path, target.si_unit, low, high)
 
 
