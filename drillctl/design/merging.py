@@ -93,6 +93,8 @@ def _is_gain(path: object) -> bool:
 def _changed(
     base: Mapping[str, Any], top: Mapping[str, Any], key: str, default: str | None = None
 ) -> bool:
+    if not (isinstance(base, Mapping) and isinstance(top, Mapping)):  # reported when validated
+        return False
     below = base.get(key, default)
     return key in top and below is not None and top[key] != below
 

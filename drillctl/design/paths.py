@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BeforeValidator
 
@@ -127,7 +127,7 @@ def _collect(table: Table, prefix: str, result: list[Parameter]) -> None:
         elif path == "drillstring.sections":
             for section in value:
                 _collect(section, f"{path}.{section.name}.", result)
-        elif _is_number(info.annotation):
+        elif _is_number(info.annotation) and not isinstance(value, tuple):
             whole = _is_number(info.annotation, int) and not _is_number(info.annotation, float)
             result.append(Parameter(path, kind_of(info), value, whole, _check_of(info)))
 
@@ -147,6 +147,20 @@ def _check_of(info: Any) -> BeforeValidator | None:
 def kind_of(info: Any) -> Kind | None:
     """The `Kind` kept in a field's annotation, if it has one."""
     return next(_notes(info, Kind), None)
+
+
+def kind_in(annotation: Any) -> Kind | None:
+    """The first `Kind` in a type."""
+    return next((note for note in _notes_inside(annotation) if isinstance(note, Kind)), None)
+
+
+def entries_of(annotation: Any, count: int) -> tuple[Any, ...]:
+    """Type of each of so many entries of a list."""
+    lists = [one for one in (annotation, *get_args(annotation)) if get_origin(one) is tuple]
+    if not lists:
+        return (None,) * count
+    first, *rest = get_args(lists[0])
+    return (first,) * count if rest == [Ellipsis] else (first, *rest)
 
 
 def range_of(info: Any) -> Range | None:

@@ -14,7 +14,7 @@ from typing import Any
 from drillctl import catalog, units
 from drillctl.design.design import Design
 from drillctl.design.merging import Tree, overlay, with_values
-from drillctl.design.paths import kind_of
+from drillctl.design.paths import entries_of, kind_in, kind_of
 from drillctl.design.tables import Table
 from drillctl.design.tally import Tally, with_tally
 from drillctl.design.uncertain_tables import with_samples
@@ -151,17 +151,18 @@ def to_tree(table: Table) -> Tree:
     """A table as plain TOML data, quantities as text with units; what is not set is left out."""
     tree: Tree = {}
     for key, info in type(table).model_fields.items():
-        value = _plain(getattr(table, key), kind_of(info))
-        if value is not None and value != "" and value != {}:
+        value = _plain(getattr(table, key), kind_of(info), info.annotation)
+        if value is not None and value not in ("", {}, []):
             tree[info.alias or key] = value
     return tree
 
 
-def _plain(value: Any, kind: units.Kind | None) -> Any:
+def _plain(value: Any, kind: units.Kind | None, annotation: Any = None) -> Any:
     if isinstance(value, Table):
         return to_tree(value)
     if isinstance(value, tuple):
-        return [_plain(item, kind) for item in value]
+        of_each = entries_of(annotation, len(value))
+        return [_plain(item, kind_in(one), one) for item, one in zip(value, of_each, strict=True)]
     if isinstance(value, dict):
         return {key: _plain(item, None) for key, item in value.items()}
     if kind is not None and isinstance(value, float):

@@ -289,7 +289,7 @@ class TopDriveTable(Table):
 
     inertia: q.Inertia | None = None
     motor_inertia: q.Inertia | None = None
-    gear_ratio: q.PositiveNumber | None = None
+    gear_ratio: q.Factor | None = None
     motors: q.Count = 1
     gearbox_inertia: q.Inertia = 0.0
     efficiency: q.Share = 1.0
@@ -338,6 +338,9 @@ class TopDriveTable(Table):
                     f"{key} is missing beside {behind[0]}; an inertia that counts at the pipe "
                     "already (the motors' times gear_ratio^2) needs neither"
                 )
+        refusal = q.WHEEL.refusal(self.at_pipe, units.INERTIA)
+        if refusal:
+            raise InputError(f"an inertia of {self.at_pipe:g} kg*m^2 at the pipe: {refusal}")
         if self.efficiency == 0.0:
             raise InputError("efficiency 0 is not allowed: it must be greater than 0")
         return self
