@@ -26,6 +26,8 @@ _ALTERNATIVES: dict[str, tuple[tuple[tuple[str, ...], ...], ...]] = {
     ),
 }
 
+_BESIDE = ("motors", "gearbox_inertia", "efficiency")  # alone they take no way
+
 WHOLE = ("tune.parameters",)
 """Tables that say what there is to do: the upper layer's stands in place of the lower one's."""
 
@@ -51,7 +53,7 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
         base, top = flattened(base), flattened(top)
     merged = dict(base)
     for ways in _ALTERNATIVES.get(path, ()):
-        taken = [way for way in ways if any(key in top for key in way)]
+        taken = [way for way in ways if any(key in top for key in way if key not in _BESIDE)]
         if taken:
             left = {key for way in ways if way not in taken for key in way}
             merged = {key: value for key, value in merged.items() if key not in left}
