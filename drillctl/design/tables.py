@@ -378,8 +378,8 @@ class WellTable(Table):
 
     @model_validator(mode="after")
     def _downwards(self) -> WellTable:
-        ends = [hole.to for hole in self.holes[:-1]]
-        if None in ends or ends != sorted(set(ends)):
+        ends = [hole.to for hole in self.holes[:-1] if hole.to is not None]
+        if len(ends) < len(self.holes) - 1 or ends != sorted(set(ends)):
             raise InputError("holes: each but the last ends at a depth, below the one above")
         if self.mud_viscosity is not None and not self.holes:
             raise InputError("mud_viscosity needs holes: the torque depends on the clearance")

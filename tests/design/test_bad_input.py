@@ -535,7 +535,8 @@ def test_sections_named_twice_in_the_model(tmp_path):
          "soft-torque, stiff-speed, torsional-rectification, z-torque"),
         (rig(friction=FRICTION.replace("lopez-suarez", "lopes-suarez")),
          "bit_rock.law: no law 'navarro-lopes-suarez'; did you mean 'navarro-lopez-suarez'? "
-         "allowed: bit-aggressiveness, bit-radius-friction, coulomb, jansen-van-den-steen, navarro-lopez-suarez, "
+         "allowed: bit-aggressiveness, bit-radius-friction, coulomb, jansen-van-den-steen, "
+         "navarro-lopez-suarez, "
          "printed-three-branch, stribeck, tabulated, tucker-wang"),
         (rig(controller="[controller]\nkp = 1\n"),
          "controller: law is missing; allowed: active-damping, constant-torque, pi, soft-torque, "
