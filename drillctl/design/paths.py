@@ -6,17 +6,19 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, get_args, get_origin
+from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from pydantic import BeforeValidator
 
 from drillctl import units
-from drillctl.design.design import Design
 from drillctl.design.tables import AxisTable, Table, settings_of_studies
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig.table import Range, Reader, number
 from drillctl.rig.top_drive.law import drive_laws
 from drillctl.units import Kind
+
+if TYPE_CHECKING:
+    from drillctl.design.design import Design
 
 _HIDDEN = (
     "title", "source", "status", "notes", "schema_version", "map", "uncertain", "uncertainty",
@@ -111,8 +113,13 @@ def _near_paths(path: str, known: dict[str, Parameter]) -> str:
 
 def parameters(design: Design) -> list[Parameter]:
     """Every numeric parameter that `--set` and sweep axes take, in file order."""
+    return values_of(design.tables)
+
+
+def values_of(table: Table) -> list[Parameter]:
+    """The same of validated tables."""
     result: list[Parameter] = []
-    _collect(design.tables, "", result)
+    _collect(table, "", result)
     return result
 
 

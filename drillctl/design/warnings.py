@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from drillctl import units
 from drillctl.design.parts import drive_of
+from drillctl.design.paths import values_of
 from drillctl.design.tables import DesignTables
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.law import contact, friction_laws
@@ -65,6 +67,7 @@ def warnings_of(
     else:
         slope = contact(rock, weight, point.speed, math.exp)[1]
     found = (
+        *_implausible(tables),
         _assumed_rock(tables),
         _weak_drive(tables, rock.static_torque(at_rest)),
         _growing(string, parts, -float(slope), drive, tables.simulation.duration),
@@ -81,6 +84,20 @@ def _assumed_rock(tables: DesignTables) -> DesignWarning | None:
     if not remark:
         return None
     return DesignWarning(remark, "bit_rock.aggressiveness", "3 T / (W D) of a measured torque T")
+
+
+def _implausible(tables: DesignTables) -> Iterator[DesignWarning]:
+    """Values far outside those of any rig: a slip of the pen, or of the unit."""
+    for one in values_of(tables):
+        if one.kind is None or not one.value:
+            continue
+        low, high = one.kind.usual
+        if not low <= abs(one.value) <= high:
+            least, most = (units.write(end, one.kind) for end in (low, high))
+            yield DesignWarning(
+                f"{one.path} {units.write(one.value, one.kind)} is far from that of any rig",
+                one.path, f"up to {most}" if low == 0.0 else f"{least} to {most}",
+            )  # fmt: skip
 
 
 def _weak_drive(tables: DesignTables, static: float) -> DesignWarning | None:
