@@ -382,3 +382,16 @@ def test_results_save_themselves(bistable, tmp_path):
 def test_modes_of_a_bare_string_have_no_design_to_be_saved_with(bistable, tmp_path):
     with pytest.raises(InputError, match="bare string"):
         drillctl.modes(bistable.string).save(tmp_path / "modes")
+
+
+def test_every_name_has_a_file_of_its_own(tmp_path):
+    from drillctl.store.codec import stored_name
+
+    long = ["x" * 300, "x" * 299 + "y", "ü" * 200]
+    names = ["", ".", "..", "a/b", "a%2Fb", "a\\b", "__a", "%", "a\nb", "a", *long]
+    stored = [stored_name(name) for name in names]
+    assert len(set(stored)) == len(names)
+    for one in stored:
+        (tmp_path / one).write_text("")
+        assert (tmp_path / one).parent == tmp_path
+    assert stored_name("controller.kp") == "controller.kp"

@@ -306,9 +306,10 @@ class RunFolder:
         """
         about = dict(self.about)
         if hasattr(result, "write"):
-            about["provenance"] = _origin(result, about["provenance"])
-            if hasattr(result, "provenance"):
-                result = replace(result, provenance=about["provenance"])
+            own = getattr(result, "provenance", None)
+            origin = about["provenance"] = merged(about["provenance"], own or provenance())
+            if own not in (None, origin):  # on several machines; a copy has nothing in its cache
+                result = replace(result, provenance=origin)
             result.write(self.path)
         write_json(self.path / SUMMARY, summary)
         journal = Journal(self.path)
@@ -366,12 +367,6 @@ class RunFolder:
                 with suppress(OSError):  # something else was added meanwhile
                     self.path.rmdir()
         self.release()
-
-
-def _origin(result: Any, begun: Mapping[str, str]) -> dict[str, str]:
-    """Where a result came from: from more than one machine if it was resumed on another."""
-    own = getattr(result, "provenance", None) or provenance()
-    return merged(begun, own)
 
 
 def _is_old(name: str, names: set[str]) -> bool:
@@ -476,7 +471,7 @@ def _claimed(
 
 def _begun(run: RunFolder, design: Design) -> RunFolder:
     """The folder with what the run is; remains of writes that were killed are removed."""
-    for path in run.path.rglob(f".*{PART}"):
+    for path in list(run.path.rglob(f".*{PART}")):
         shutil.rmtree(path) if path.is_dir() else path.unlink()
     journal = Journal(run.path)
     journal.announce(RUN, as_json(run.about))

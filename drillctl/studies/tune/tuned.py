@@ -23,6 +23,7 @@ from drillctl.errors import InputError, nearest
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive.law import StringNumbers, drive_laws, tracking
 from drillctl.store.codec import documented, label
+from drillctl.store.folder import resolved
 from drillctl.store.json_files import write_json, write_text
 from drillctl.studies.tune.settings import RangeTable
 
@@ -175,7 +176,7 @@ class TunedGains:
 
     def save(self, folder: str | Path) -> Path:
         """Write `design.toml`, ready to run, and `summary.json` into a folder, which is made."""
-        folder = Path(folder)
+        folder = resolved(folder, "folder")
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / "design.toml", to_toml(self.design))
         write_json(folder / "summary.json", self.summary())
