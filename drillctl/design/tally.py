@@ -162,10 +162,9 @@ def _written(value: object) -> str:
 
 
 def _rows(text: str) -> list[list[str]]:
-    """Rows of cells; the delimiter is the one that the line of heads has most of."""
+    """Rows of cells; the delimiter is the one that a line has most of, heads or not."""
     lines = text.splitlines()
-    head = next((line for line in lines if line.strip() and not line.startswith("#")), "")
-    delimiter = max(",;\t|", key=head.count)
+    delimiter = max(",;\t|", key=lambda one: max(line.count(one) for line in lines[:10]))
     rows = [
         [cell.strip() for cell in row] if row and not row[0].startswith("# ") else []
         for row in csv.reader(lines, delimiter=delimiter)
@@ -176,6 +175,8 @@ def _rows(text: str) -> list[list[str]]:
 
 
 def _read(place: str, text: str, rows: list[tuple[int, list[str]]], begins: str) -> Tally:
+    while len(rows) > 2 and len(_fields(rows[0][1])) < len(_NEEDED) and _heads_below(rows):
+        rows = rows[1:]  # a title
     if len(rows) < 2:
         raise InputError("holds no lines below its heads", place)
     (_, heads), *rest = rows
@@ -204,6 +205,19 @@ def _read(place: str, text: str, rows: list[tuple[int, list[str]]], begins: str)
         tuple((c.text, c.field or "not used", c.unit) for c in columns if c.text),
         tuple(notes),
     )
+
+
+_NEEDED = ({"od"}, {"length", "total length"})  # columns without which there is no string
+
+
+def _fields(row: list[str]) -> list[set[str]]:
+    """Which of the columns that are needed a row of heads has."""
+    fields = {_head(text).field for text in row}
+    return [one for one in _NEEDED if one & fields]
+
+
+def _heads_below(rows: list[tuple[int, list[str]]]) -> bool:
+    return any(len(_fields(row)) == len(_NEEDED) for _, row in rows[1:10])
 
 
 def _columns(heads: list[str], rows: list[list[str]], where: str) -> list[_Head]:

@@ -116,8 +116,8 @@ class Simulation(Result, kind="simulate"):
         return design, {}
 
 
-def sample(motion: Motion, interval: float = 0.01) -> Simulation:
-    """Signals at equal intervals and the measures of a run."""
+def sample(motion: Motion, interval: float = 0.01, sections: bool = False) -> Simulation:
+    """Signals at equal intervals and the measures of a run; torque in all sections on request."""
     design = motion.design
     duration = design.tables.simulation.duration
     fine = _grid(duration, min(FINE, duration / FEWEST_SAMPLES))
@@ -135,7 +135,8 @@ def sample(motion: Motion, interval: float = 0.01) -> Simulation:
     )
     return Simulation(
         design, time, signals, motion.events, measured, status, "reference",
-        motion.method, None, None, motion.energy, section_peaks(design, fine, fine_signals),
+        motion.method, None, None, motion.energy,
+        section_peaks(design, fine, fine_signals) if sections else {},
     )  # fmt: skip
 
 
@@ -310,7 +311,7 @@ def simulate(
     if engine == "reference":
         from drillctl.simulation.reference import solve
 
-        return sample(solve(design, progress=progress), interval)
+        return sample(solve(design, progress=progress), interval, sections=True)
     return _by_batch(design, interval)
 
 

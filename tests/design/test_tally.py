@@ -131,7 +131,8 @@ def test_what_is_written_carries_damping_with_its_reason(new, folder):
         ),
         ("#,Component,Total length (m),OD (mm),ID (mm),No\n1,p,19,127,108.6,2\n", "total length"),
         (
-            "name,quantity,length per joint (m),OD,ID\np,2,9.5 m,127 mm,108.6 mm\nTotal,,19,,\n",
+            "Well A-1\n\nOf today\nname,quantity,length per joint (m),OD,ID\n"
+            "p,2,9.5 m,127 mm,108.6 mm\nTotal,,19,,\n",
             "sum",
         ),
     ],
