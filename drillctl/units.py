@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from drillctl.errors import InputError, shown
+from drillctl.text import clean
 
 RPM = math.pi / 30.0  # one revolution a minute (rad/s)
 
@@ -188,21 +189,24 @@ def _join(words: tuple[str, ...]) -> str:
 
 
 def plain(value: Any) -> Any:
-    """A value as a design file could hold it.
+    """A value as a design holds it.
 
     Parameters
     ----------
     value : object
         A number of NumPy or xarray becomes one of Python, with a unit (of pint, or as xarray keeps
-        it) text; arrays become lists; tables and lists are gone through, anything else is kept.
+        it) text; arrays become lists; text is cleaned; tables and lists are gone through, anything
+        else is kept.
 
     Returns
     -------
     object
         The same in types of Python.
     """
+    if isinstance(value, str):
+        return clean(str(value))
     if isinstance(value, Mapping):
-        return {key: plain(inside) for key, inside in value.items()}
+        return {plain(key): plain(inside) for key, inside in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(inside) for inside in value]
     if hasattr(value, "magnitude"):  # pint

@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from drillctl import catalog
+from drillctl import catalog, units
 from drillctl.text import one_line, shortened
 
 Words = tuple[str | int, ...]  # keys, and numbers of entries in lists
@@ -64,6 +64,7 @@ def dotted(words: Words, tree: Any) -> str:
     return ".".join(texts)
 
 
+@lru_cache(maxsize=1024)
 def _printed(key: str) -> str:
     return shortened(one_line(key), LONGEST_KEY)
 
@@ -110,12 +111,12 @@ def _read(path: str, changed: int, size: int) -> tuple[dict[str, Any], dict[str,
     import tree_sitter_toml
 
     text = catalog.read(Path(path), path)
-    held = tomllib.loads(text)
+    held = units.plain(tomllib.loads(text))
     language = tree_sitter.Language(tree_sitter_toml.language())
     root = tree_sitter.Parser(language).parse(text.encode()).root_node
     lines: dict[str, int] = {}
     for words, row in _of_document(root):
-        lines.setdefault(dotted(words, held), row + 1)
+        lines.setdefault(dotted(units.plain(words), held), row + 1)
     lines.pop("model", None)  # gone from a design that was read: it can only be set
     return held, lines
 
@@ -164,8 +165,7 @@ def _of_value(node: Any, path: Words) -> Iterator[tuple[Words, int]]:
 
 def _keys(node: Any) -> list[str]:
     """Words of a key as TOML has them."""
-    tree, keys = tomllib.loads(f"{node.text.decode()} = 0"), []
-    while isinstance(tree, dict):
-        ((key, tree),) = tree.items()
-        keys.append(key)
-    return keys
+    if node.type == "dotted_key":
+        return [key for one in node.named_children for key in _keys(one)]
+    text = node.text.decode()
+    return [text] if node.type == "bare_key" else list(tomllib.loads(f"{text} = 0"))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +96,8 @@ def _without_sections(tree: Tree) -> Tree:
 def _read(path: Path) -> Tree:
     text = catalog.read(path, str(path))
     try:
-        return tomllib.loads(text)
+        tree: Tree = units.plain(tomllib.loads(text))
+        return tree
     except RecursionError:
         raise InputError("broken TOML: nested too deeply", str(path)) from None
     except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
@@ -150,11 +152,20 @@ def to_toml(design: Design) -> str:
 def to_tree(table: Table) -> Tree:
     """A table as plain TOML data, quantities as text with units; what is not set is left out."""
     tree: Tree = {}
-    for key, info in type(table).model_fields.items():
-        value = _plain(getattr(table, key), kind_of(info), info.annotation)
-        if value is not None and value not in ("", {}, []):
-            tree[info.alias or key] = value
+    for key, name, kind, annotation, required in _fields(type(table)):
+        value = _plain(getattr(table, key), kind, annotation)
+        if value is not None and (required or value not in ("", {}, [])):
+            tree[name] = value
     return tree
+
+
+@cache
+def _fields(table: type[Table]) -> tuple[tuple[str, str, units.Kind | None, Any, bool], ...]:
+    """Keys of a table: in Python and in a file, kind, type, whether there must be one."""
+    return tuple(
+        (key, info.alias or key, kind_of(info), info.annotation, info.is_required())
+        for key, info in table.model_fields.items()
+    )
 
 
 def _plain(value: Any, kind: units.Kind | None, annotation: Any = None) -> Any:

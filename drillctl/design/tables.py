@@ -520,10 +520,10 @@ class OwnTables(Table):
     """A whole design file, but for the tables of studies."""
 
     schema_version: Literal[1] = Field(default=1, alias="schema")
-    title: q.Text = ""
-    source: q.Text = ""
-    status: q.Text = ""
-    notes: q.Text = ""
+    title: str = ""
+    source: str = ""
+    status: str = ""
+    notes: str = ""
     operating_point: OperatingPoint = OperatingPoint()
     drillstring: DrillstringTable
     top_drive: TopDriveTable

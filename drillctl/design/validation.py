@@ -52,9 +52,11 @@ def _impossible(tables: DesignTables) -> Iterator[InputError]:
     """What no rig can be, of tables that are valid each for itself."""
     from drillctl.design import parts
 
-    ends = (parts.refuse_impossible_string, parts.bit_rock_before, parts.program)
+    each = (
+        parts.refuse_impossible_string, parts.bit_rock_before, parts.weight_on_bit, parts.program
+    )  # fmt: skip
     found = False
-    for check in (*ends, _refuse_impossible_drive):
+    for check in (*each, _refuse_impossible_drive):
         if found and check is _refuse_impossible_drive:  # it rests on the others
             return
         try:

@@ -18,7 +18,7 @@ from drillctl.rig.drillstring import Drillstring, Parts
 from drillctl.rig.drillstring.frequencies import followed
 from drillctl.rig.drillstring.mesh import off_the_line
 from drillctl.rig.top_drive import TopDriveLaw
-from drillctl.rig.weight_on_bit import RealWeight
+from drillctl.rig.weight_on_bit import PATHS
 
 CHATTER = 0.03  # damping ratio that the rock may take from the fastest modes at the bit
 # Modes share the mobility of the bit: damping ends its chatter at a twentieth of what the rock
@@ -62,7 +62,7 @@ def warnings_of(
     point = tables.operating_point
     at_rest = float(weight.weight(0.0)) if weight.moves else point.weight_on_bit
     fall = float(rock.steepest_fall(point.weight_on_bit))
-    if isinstance(weight, RealWeight):  # too slow for the modes of the mesh
+    if isinstance(weight, PATHS):  # too slow for the modes of the mesh
         slope = rock.torque_and_slope(point.weight_on_bit, point.speed, math.exp)[1]
     else:
         slope = contact(rock, weight, point.speed, math.exp)[1]

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from drillctl import units
 from drillctl.errors import InputError, shown
-from drillctl.text import LONGEST_NAME, clean, one_line
+from drillctl.text import LONGEST_NAME, one_line
 from drillctl.units import Kind
 
 LARGEST_COUNT = 10**9  # of anything that is counted: what is larger is a slip of the pen
@@ -216,11 +216,10 @@ def _name(text: str) -> str:
     if len(text) > LONGEST_NAME:
         raise InputError(f"a name has at most {LONGEST_NAME} characters, this one {len(text)}")
     if one_line(text) != text:
-        raise InputError(f"'{one_line(text)}' holds a control character, which no name may")
+        raise InputError(f"'{one_line(text)}': a name is of one line, without tabs")
     return text
 
 
-Text = Annotated[str, AfterValidator(clean)]
 Name = Annotated[str, AfterValidator(_name)]
 
 

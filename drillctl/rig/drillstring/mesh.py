@@ -86,6 +86,7 @@ def what_was_done(
     return tuple(result)
 
 
+@lru_cache(maxsize=16)
 def off_the_line(parts: Parts, within: float) -> bool:
     """Whether any of the first `ASKED` frequencies is further from those of the exact line."""
     free = tuple(x.inertia > 0.0 for x in parts.sections)
