@@ -226,6 +226,9 @@ def _columns(heads: list[str], rows: list[list[str]], where: str) -> list[_Head]
         values = [row[place].strip() for row in rows if place < len(row) and row[place].strip()]
         if column.field == "count" and values == [str(n) for n in range(1, len(rows) + 1)]:
             columns[place] = column._replace(field="")  # it counts the lines
+        of_pipe = column.field == "joint length" and not re.search("tool|tj", column.text.lower())
+        if of_pipe and not {"length", "total length"} & {one.field for one in columns}:
+            columns[place] = column._replace(field="length")
     for field in ("od", "length"):
         others = ("total length", "length of a piece") if field == "length" else ()
         if not any(c.field in (field, *others) for c in columns):
@@ -265,8 +268,8 @@ def _head(text: str) -> _Head:
 
 
 def _is_unit(text: str) -> bool:
-    kinds = (units.DIAMETER, units.LINEAR_MASS, units.INERTIA)
-    return any(text in units.spellings(kind) for kind in kinds)
+    kinds = (units.DIAMETER, units.LINEAR_MASS, units.INERTIA, units.FORCE)
+    return text in ("kg", "lb", "lbs") or any(text in units.spellings(kind) for kind in kinds)
 
 
 def _fits(unit: str, kind: units.Kind | None) -> bool:
@@ -335,7 +338,9 @@ class _Line:
         cell, kind = self.cells[field], FIELDS[field].kind
         assert kind is not None
         text = cell.text
-        if re.search(r"\d,\d", text):
+        if re.search(r"^\D*\d+,(\d{1,2}|\d{4,})(?!\d|,)", text):
+            text = text.replace(",", ".")  # no group of thousands
+        elif re.search(r"\d,\d", text):
             groups = re.fullmatch(r"(\d{1,3}(?:,\d{3})+)(\.\d+)?(\D.*)?", text)
             if groups is None or (groups[2] is None and text.count(",") == 1):
                 plain, point = text.replace(",", ""), text.replace(",", ".")

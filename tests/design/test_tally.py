@@ -129,6 +129,11 @@ def test_what_is_written_carries_damping_with_its_reason(new, folder):
             "Item\tQty\tLength_m\tBody OD, mm\tBore mm\np\t2 jts\t9.5\t127\t108.6\n",
             "units as words",
         ),
+        (
+            "name,OD (mm),ID (mm),Tool joint length (m),Joint length (m),No,Weight kg\n"
+            'p,127,"108,6",,"9,5",2,99\n',
+            "length of a joint",
+        ),
         ("#,Component,Total length (m),OD (mm),ID (mm),No\n1,p,19,127,108.6,2\n", "total length"),
         (
             "Well A-1\n\nOf today\nname,quantity,length per joint (m),OD,ID\n"

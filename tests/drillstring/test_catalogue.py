@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 
@@ -188,3 +189,24 @@ def test_a_tool_has_the_numbers_of_the_catalogue(rig):
     (jar,) = rig('name = "jar"\npipe = "6 3/4 in jar"').string.parts.sections
     assert (jar.stiffness, jar.inertia) == (3.35e5, 5.35)
     assert jar.length == 9.75
+
+
+def test_the_catalogue_is_listed_with_its_sources(capsys):
+    from drillctl.cli import run
+
+    assert run(["catalog", "--json"]) == 0
+    listed = {one["name"]: one for one in json.loads(capsys.readouterr().out)["components"]}
+    assert list(listed) == list(PIPES)
+    assert all(one["source"] and one["checked"] for one in listed.values())
+    pipe = listed["5 in 19.5 lb/ft"]
+    assert pipe["yield_torque"] == pytest.approx(100.5e3, rel=2e-3)
+    assert pipe["mass_per_length_with_joints"] == pytest.approx(22.4 * POUND_PER_FOOT, rel=5e-3)
+    jar = listed["6 3/4 in jar"]
+    assert (jar["mass"], jar["inertia"], jar["stiffness"]) == (1310.0, 5.35, 3.35e5)
+
+
+def test_show_prints_the_factors_of_tool_joints(capsys):
+    from drillctl.cli import run
+
+    assert run(["show", "typical-land"]) == 0
+    assert "5 1/2 in drill pipe: inertia of the body x 1.4037, stiff" in capsys.readouterr().out
