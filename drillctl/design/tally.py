@@ -224,7 +224,8 @@ def _columns(heads: list[str], rows: list[list[str]], where: str) -> list[_Head]
     columns = [_head(text) for text in heads]
     for place, column in enumerate(columns):
         values = [row[place].strip() for row in rows if place < len(row) and row[place].strip()]
-        if column.field == "count" and values == [str(n) for n in range(1, len(rows) + 1)]:
+        numbered = values == [str(n) for n in range(1, len(rows) + 1)]
+        if column.field in ("count", "name") and numbered:
             columns[place] = column._replace(field="")  # it counts the lines
         of_pipe = column.field == "joint length" and not re.search("tool|tj", column.text.lower())
         if of_pipe and not {"length", "total length"} & {one.field for one in columns}:

@@ -216,3 +216,10 @@ def test_a_new_rig_like_a_typical_one(name, tmp_path, monkeypatch):
     assert mine.string.parts == model.string.parts
     assert model.tables.status == "typical"
     assert not model.warnings
+
+
+def test_a_column_that_counts_the_lines_names_nothing(tmp_path):
+    text = "Item,Description,Length (m),OD (mm),ID (mm)\n1,Bit,0.3,216,\n2,Pipe,900,127,108.6\n"
+    made = read(text, "bit", tmp_path)
+    assert [one["name"] for one in made.sections] == ["Pipe", "Bit"]
+    assert dict(column[:2] for column in made.columns)["Item"] == "not used"
