@@ -448,7 +448,7 @@ WRONG = {
     "axis twice": (["map", DESIGN, *GAINS[:2], *GAINS[:2]], ["two axes", "controller.kp"]),
     "axes of another law": (
         ["map", DESIGN, "--set", "controller.law=constant-torque",
-         "--set", "controller.torque=9 kN*m"],
+         "--set", "controller.torque=9 kN*m", "--axis", "controller.kp=0:1:2"],
         ["map.axes controller.kp", "controller.torque"],
     ),
     "impossible cell": (
