@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drillctl.arrays import Array, Index
-from drillctl.simulation.reference_rates import BEGIN, FIRST, LENGTH, compiled, on_tape, rates_of
+from drillctl.simulation.reference_rates import BEGIN, FIRST, LENGTH, on_tape, rates_of, uncounted
 
 STAGES, DENSE_STAGES = 12, 16
 TOGETHER = 4  # stages that a sum takes in at once
@@ -93,7 +93,7 @@ class Work(NamedTuple):
     whole: Any  # shape (2 + 8 states,): whole dense output of a step, where an event ends it
 
 
-@compiled
+@uncounted
 def _combine(
     stages: Any, weights: Any, of: Any, count: int, step: float, state: Any, out: Any
 ) -> None:
@@ -114,7 +114,7 @@ def _combine(
             out[i] += (a * one[i] + b * two[i]) + (c * three[i] + d * four[i])
 
 
-@compiled
+@uncounted
 def _stages(
     rig: Any, method: Any, work: Any, time: float, step: float, phase: int, state: Any,
     first: int, last: int,
@@ -127,7 +127,7 @@ def _stages(
     return torque
 
 
-@compiled
+@uncounted
 def explicit_step(
     rig: Any, method: Any, work: Any, time: float, step: float, phase: int, state: Any
 ) -> float:
@@ -138,7 +138,7 @@ def explicit_step(
     return torque
 
 
-@compiled
+@uncounted
 def explicit_dense(
     rig: Any, method: Any, work: Any, time: float, step: float, phase: int, state: Any
 ) -> None:
@@ -146,7 +146,7 @@ def explicit_dense(
     _stages(rig, method, work, time, step, phase, state, STAGES + 1, DENSE_STAGES)
 
 
-@compiled
+@uncounted
 def explicit_error(method: Any, work: Any, step: float, tolerance: float, state: Any) -> float:
     """Estimated error of a step over the tolerance, as Hairer weighs the two estimates."""
     size, total, after = len(state), work.errors, work.after
@@ -173,7 +173,7 @@ def explicit_error(method: Any, work: Any, step: float, tolerance: float, state:
 # of the step, F0 the change over it and the others sums of that and of the stages.
 
 
-@compiled
+@uncounted
 def _record_one(
     dense: Any, unit: float, begin: float, change: float, stages: Any, row: Any, place: int
 ) -> None:
@@ -185,7 +185,7 @@ def _record_one(
         row[place + 2 + k] = dense.changes[k] * change + unit * total
 
 
-@compiled
+@uncounted
 def record(
     dense: Any, work: Any, time: float, step: float, state: Any, sums: Any, kept: Any, row: Any
 ) -> None:
@@ -210,14 +210,14 @@ def record(
         _record_one(dense, unit, begin, change, one, row, FIRST + 8 * (len(kept) + c))
 
 
-@compiled
+@uncounted
 def state_at(work: Any, share: float, out: Any) -> None:
     """Every state at a share of the step whose whole dense output is kept."""
     for i in range(len(out)):
         out[i] = on_tape(work.whole, i, share)
 
 
-@compiled
+@uncounted
 def first_length(
     rig: Any, work: Any, time: float, end: float, longest: float, tolerance: float,
     order: float, phase: int, state: Any,
