@@ -89,19 +89,26 @@ _KNOWN: dict[str, dict[str, float]] = {
     },
     "s": {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0},
     "1/s": {"1/s": 1.0},
-    "kg*m^2": {"kg*m^2": 1.0},
+    "kg*m^2": {"kg*m^2": 1.0, "lb*ft^2": 0.0421401100938048},
     "kg/m^3": {"kg/m^3": 1.0, "g/cm^3": 1e3, "lb/gal": 119.82642731689667},
     "kg/m": {"kg/m": 1.0, "lb/ft": 1.488163943569554},
     "Pa*s": {"Pa*s": 1.0, "mPa*s": 1e-3, "cP": 1e-3},
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": 6894.7572931683635},
     "m^4": {"m^4": 1.0, "in^4": 4.1623142559999997e-07},
-    "N*m/rad": {"N*m/rad": 1.0},
-    "N*m*s/rad": {"N*m*s/rad": 1.0},
-    "N*s/rad": {"N*s/rad": 1.0, "kN*s/rad": 1e3},
-    "s/rad": {"s/rad": 1.0},
+    "N*m/rad": {"N*m/rad": 1.0, "klbf*ft/rev": 215.78512840965433},
+    "N*m*s/rad": {"N*m*s/rad": 1.0, "klbf*ft/rpm": 12947.107704579259},
+    "N*s/rad": {"N*s/rad": 1.0, "kN*s/rad": 1e3, "klbf/rpm": 42477.38748221543},
+    "s/rad": {"s/rad": 1.0, "1/rpm": 9.549296585513721},
     "W": {"W": 1.0, "kW": 1e3, "MW": 1e6, "hp": 745.6998715822701},
-    "N*m/s": {"N*m/s": 1.0, "kN*m/s": 1e3},
-    "N/s": {"N/s": 1.0, "kN/s": 1e3},
+    "N*m/s": {"N*m/s": 1.0, "kN*m/s": 1e3, "klbf*ft/s": 1355.8179483314004},
+    "N/s": {"N/s": 1.0, "kN/s": 1e3, "klbf/s": 4448.221615260501},
+    # shown alone
+    "rad": {"rev": 6.283185307179586},
+    "J": {"kJ": 1e3, "klbf*ft": 1355.8179483314004},
+    "rad/(N*m*s)": {"rpm/(kN*m)": 0.00010471975511965977, "rpm/(klbf*ft)": 7.723732765784518e-05},
+    "rad/s/(N*m)": {"rpm/(klbf*ft)": 7.723732765784518e-05},
+    "rad/(N*m)": {"rev/(klbf*ft)": 0.004634239659470709},
+    "N*m/(rad/s)": {"klbf*ft/rpm": 12947.107704579259},
 }  # fmt: skip
 
 # How drillers spell them, by what each is in SI; a thousand pounds are never a mass here.
@@ -120,6 +127,7 @@ _SPELLED: dict[str, dict[str, str]] = {
         **dict.fromkeys(("'", "\u2032", "\u2019", "feet", "FT", "ft."), "ft"),
     },
     "kg/m^3": {"ppg": "lb/gal", "lbm/gal": "lb/gal", "SG": "g/cm^3", "sg": "g/cm^3"},
+    "kg*m^2": dict.fromkeys(("lbm*ft^2", "lb-ft^2", "lb*ft2"), "lb*ft^2"),
     "kg/m": dict.fromkeys(("#", "#/ft", "ppf", "lbs/ft", "lbm/ft", "lbf/ft"), "lb/ft"),
     "Pa*s": {"cp": "cP", "mPa.s": "mPa*s"},
 }  # fmt: skip
@@ -338,21 +346,28 @@ def spellings(kind: Kind) -> list[str]:
     return list(dict.fromkeys([*kind.examples, *_KNOWN[kind.si], *_SPELLED.get(kind.si, {})]))
 
 
-System = Literal["si", "field"]  # units people read: rpm, kN, kN m, m; or rpm, klbf, klbf ft, ft
+System = Literal["si", "field"]
+"""Units people read: rpm, kN, kN m, m, mm; or rpm, klbf, klbf ft, ft, in."""
 
-_DISPLAY: dict[str, dict[str, tuple[str, str]]] = {
+DIAMETERS = "m across"  # for `displayed`: a length that is read in mm or in
+
+# What people read in place of an SI unit; any other is read as it is.
+_SHOWN: dict[str, dict[str, str]] = {
     "si": {
-        "rad/s": ("rpm", "rpm"),
-        "N": ("kN", "kN"),
-        "N*m": ("kN*m", "kN m"),
-        "N*m*s/rad": ("N*m*s/rad", "N m s"),
-        "N*m/rad": ("N*m/rad", "N m"),
-        "kg*m^2": ("kg*m^2", "kg m²"),
+        "rad/s": "rpm", "N": "kN", "N*m": "kN*m", "N*s/rad": "kN*s/rad", "J": "kJ",
+        "rad/(N*m*s)": "rpm/(kN*m)", DIAMETERS: "mm",
     },
-}
-_DISPLAY["field"] = _DISPLAY["si"] | {
-    "N": ("klbf", "klbf"), "N*m": ("klbf*ft", "klbf ft"), "m": ("ft", "ft"),
+    "field": {
+        "rad/s": "rpm", "rad": "rev", "s/rad": "1/rpm", "N": "klbf", "N/s": "klbf/s",
+        "N*s/rad": "klbf/rpm", "N*m": "klbf*ft", "N*m/s": "klbf*ft/s", "J": "klbf*ft",
+        "N*m/rad": "klbf*ft/rev", "N*m*s/rad": "klbf*ft/rpm", "N*m/(rad/s)": "klbf*ft/rpm",
+        "rad/(N*m*s)": "rpm/(klbf*ft)", "rad/s/(N*m)": "rpm/(klbf*ft)",
+        "rad/(N*m)": "rev/(klbf*ft)",
+        "kg*m^2": "lb*ft^2", "kg/m": "lb/ft", "kg/m^3": "lb/gal", "Pa": "psi", "Pa*s": "cP",
+        "W": "hp", "m^4": "in^4", "m": "ft", DIAMETERS: "in",
+    },
 }  # fmt: skip
+_SPOKEN = {"N*m*s/rad": "N m s", "N*m/rad": "N m", "1": ""}  # else as `_plain` has it
 
 
 def displayed(value: Any, si_unit: str, system: System = "si") -> tuple[Any, str]:
@@ -363,16 +378,55 @@ def displayed(value: Any, si_unit: str, system: System = "si") -> tuple[Any, str
     value : float or ndarray
         In `si_unit`.
     si_unit : str
-        SI unit; one that has no usual other form is kept.
+        SI unit, or `DIAMETERS` (m); one that has no usual other form is kept.
     system : {'si', 'field'}
         Whose units.
 
     Returns
     -------
     value, name : float or ndarray, and str
-        Converted, and the unit as it is printed.
+        Converted, and the unit as it is printed; empty for a number without.
     """
-    unit, name = _DISPLAY[system].get(si_unit, (si_unit, si_unit))
-    if unit == si_unit:
-        return value, name
-    return value / _KNOWN[si_unit][unit], name
+    unit = _SHOWN[system].get(si_unit)
+    if unit is None:
+        return value, _SPOKEN.get(si_unit, _plain(si_unit))
+    return value / _KNOWN["m" if si_unit == DIAMETERS else si_unit][unit], _plain(unit)
+
+
+def unit_name(si_unit: str, system: System) -> str:
+    """The unit that people read in place of an SI unit; empty for a number without."""
+    return str(displayed(1.0, si_unit, system)[1])
+
+
+def filed(value: Any, si_unit: str, system: System) -> tuple[Any, str]:
+    """A value as a CSV file has it, and its unit there: plain SI, or the reader's field units."""
+    plain = "" if si_unit == "1" else si_unit
+    return (value, plain) if system == "si" else displayed(value, si_unit, system)
+
+
+def full(value: float, si_unit: str, digits: int = 6) -> str:
+    """A quantity in a text, for `told`."""
+    return f"{value:.{digits}g} {'' if si_unit == '1' else si_unit}".rstrip()
+
+
+def told(text: str, system: System) -> str:
+    """A text whose quantities are written in full, `200 N*m*s/rad`, in units that people read."""
+    return _QUANTITY.sub(lambda match: _told(match[1], match[2], system), text)
+
+
+def _told(number: str, si_unit: str, system: System) -> str:
+    value, unit = displayed(float(number), si_unit, system)
+    return f"{number if value == float(number) else f'{value:.5g}'} {unit}"
+
+
+def _plain(unit: str) -> str:
+    """A unit in plain print."""
+    for power, raised in (("^2", "²"), ("^3", "³"), ("^4", "⁴")):
+        unit = unit.replace(power, raised)
+    return unit.replace("*", " ")
+
+
+_QUANTITY = re.compile(
+    rf"(?<![\w.])({_NUMBER}) ({'|'.join(map(re.escape, sorted(_KNOWN, key=len, reverse=True)))})"
+    r"(?![\w*/^])"
+)

@@ -17,6 +17,7 @@ from drillctl.errors import InputError, MultipleInputError
 from drillctl.studies.base import Option
 
 if TYPE_CHECKING:
+    from drillctl import units
     from drillctl.design import Design
 
 DesignName = Annotated[str, typer.Argument(metavar="DESIGN", help="Path or shipped name.")]
@@ -36,7 +37,8 @@ Json = Annotated[
 ]
 Threads = Annotated[int | None, typer.Option("--threads", min=1, help="Number of threads to use.")]
 Units = Annotated[
-    Literal["si", "field"], typer.Option("--units", help="Units of tables and figures.")
+    Literal["si", "field"] | None,
+    typer.Option("--units", help="Units of tables and figures, in place of the design's."),
 ]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more on stderr.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
@@ -48,7 +50,7 @@ class Common:
 
     out: Path | None
     json: bool
-    units: Literal["si", "field"]
+    units: units.System
     verbose: bool
 
 
@@ -56,7 +58,7 @@ def common_options(
     out: Out = None,
     json: Json = False,
     threads: Threads = None,
-    units: Units = "si",
+    units: Units = None,
     verbose: Verbose = False,
     debug: Debug = False,
 ) -> Common:
@@ -66,7 +68,7 @@ def common_options(
     if verbose:
         logging.basicConfig(format="%(message)s", stream=sys.stderr)
         logging.getLogger("drillctl").setLevel(logging.INFO)
-    return Common(out, json, units, verbose)
+    return Common(out, json, units or "si", verbose)
 
 
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
@@ -86,7 +88,6 @@ def command_of(
     design has the axes of each `--axis`.
     """
     shared = dict(inspect.signature(common_options, eval_str=True).parameters)
-    shared["units"] = shared["units"].replace(default=system)
     parameters = [
         inspect.Parameter("design", _KEYWORD, annotation=DesignName),
         inspect.Parameter("sets", _KEYWORD, default=None, annotation=Sets),
@@ -96,8 +97,10 @@ def command_of(
     ]
 
     def command(**given: Any) -> None:
-        common = common_options(**{one: given.pop(one) for one in shared})
+        asked = {one: given.pop(one) for one in shared}
         design = with_axes(loaded(given.pop("design"), given.pop("sets")), given.pop("axis", None))
+        asked["units"] = asked["units"] or design.tables.units or system
+        common = common_options(**asked)
         perform(design, given, common)
 
     command.__name__, command.__doc__ = name, f"{meaning.rstrip('.')}."

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from drillctl import units
 from drillctl.cli import console
 from drillctl.cli.options import Common, command_of, warn, with_warnings
 from drillctl.errors import InputError
@@ -52,12 +53,12 @@ def perform(study: Study, design: Design, options: dict[str, Any], common: Commo
             result = _computed(study, design, options, folder, common)
             _write_beside(study, result, folder, common)
             for note in study.notes(result):
-                console.note(note)
+                console.note(units.told(note, common.units))
             _show(study, result, folder.summary(), common)
             (console.note if common.json else console.line)(f"results: {folder.shown}")
     failure = study.failure(result)
     if failure is not None:
-        console.note(f"drillctl: {failure}")
+        console.note(f"drillctl: {units.told(failure, common.units)}")
         raise typer.Exit(1)
 
 
@@ -90,7 +91,7 @@ def _write_beside(study: Study, result: Any, folder: RunFolder, common: Common) 
 
     def tables() -> None:
         for table in study.tables(result):
-            write_csv(table, folder.path)
+            write_csv(table, folder.path, common.units)
 
     def pictures() -> None:
         for picture in study.pictures(result):
@@ -98,7 +99,7 @@ def _write_beside(study: Study, result: Any, folder: RunFolder, common: Common) 
                 draw(picture.draw(common.units), folder.path / f"{picture.name}.png")
 
     parts = {"tables": tables, "pictures": pictures,
-             "further files": lambda: study.files(result, folder.path)}  # fmt: skip
+             "further files": lambda: study.files(result, folder.path, common.units)}  # fmt: skip
     with _noted("pictures and tables"), folder.beside():
         for name, write in parts.items():
             with _noted(name):
@@ -140,7 +141,8 @@ def _show(study: Study, result: Any, summary: dict[str, Any], common: Common) ->
         return
     title = result.design.tables.title or result.design.name
     for number, table in enumerate(one for one in study.tables(result) if one.shown):
-        head = f"{title}: {table.title}" if number == 0 else table.title
+        said = table.said(common.units)
+        head = f"{title}: {said}" if number == 0 else said
         console.table(head, table.heads(common.units), table.texts(common.units))
     for remark in study.remarks(result, common.units):
         console.line(remark)

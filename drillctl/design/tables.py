@@ -524,6 +524,7 @@ class OwnTables(Table):
     source: str = ""
     status: str = ""
     notes: str = ""
+    units: Literal["si", "field"] | None = None
     operating_point: OperatingPoint = OperatingPoint()
     drillstring: DrillstringTable
     top_drive: TopDriveTable

@@ -28,7 +28,7 @@ from drillctl.rig.top_drive.law import tracking
 from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
 from drillctl.simulation.measures import BATCH_MEASURES
 from drillctl.store.codec import documented, label
-from drillctl.store.tables import headed, texts
+from drillctl.store.tables import in_columns
 
 SHARED = (
     "drillstring.", "top_drive.", "bha.", "well.", "simulation.",
@@ -63,12 +63,11 @@ def span(axes: tuple[Axis, ...]) -> dict[str, dict[str, float]]:
     }
 
 
-def over_axes(axes: tuple[Axis, ...]) -> dict[str, list[str]]:
-    """Values of the axes (SI) at every cell of their grid, as texts by head of a CSV file."""
-    values = [np.array(texts(a.values), dtype=object) for a in axes]
-    grids = np.meshgrid(*values, indexing="ij")
-    columns = zip(axes, grids, strict=True)
-    return {headed(a.path, a.unit): grid.ravel().tolist() for a, grid in columns}
+def over_axes(axes: tuple[Axis, ...], system: units.System = "si") -> dict[str, list[str]]:
+    """Values of the axes at every cell of their grid, as texts by their head in a file."""
+    columns = in_columns(((a.path, a.values, a.unit) for a in axes), system)
+    grids = np.meshgrid(*(np.array(one, dtype=object) for one in columns.values()), indexing="ij")
+    return {name: grid.ravel().tolist() for name, grid in zip(columns, grids, strict=True)}
 
 
 OF_THE_ROCK = ("friction.", "before.", "weight.", "weight_program.", "set_speed")

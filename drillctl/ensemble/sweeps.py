@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl import units
 from drillctl.arrays import Array, Index, Mask, own_errstate
 from drillctl.design import Design
 from drillctl.ensemble import audit as auditing
@@ -50,7 +51,7 @@ from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES, sta
 from drillctl.store.codec import documented, label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
-from drillctl.store.tables import headed, texts, write_columns
+from drillctl.store.tables import in_columns, write_columns
 
 if TYPE_CHECKING:
     import shapely
@@ -434,9 +435,9 @@ def responses(result: Sweep, count: int = 4) -> list[Simulation]:
     return [simulate(design, engine="batch", interval=0.05) for design in designs]
 
 
-def write_cells(result: Sweep, path: Path) -> None:
-    """Write a row a cell: parameters, measures (SI) and status."""
-    columns = over_axes(result.axes)
-    columns |= {headed(k, MEASURES[k].unit): texts(v) for k, v in result.measures.items()}
+def write_cells(result: Sweep, path: Path, system: units.System = "si") -> None:
+    """Write a row a cell: parameters, measures and status."""
+    figures = ((name, v, MEASURES[name].unit) for name, v in result.measures.items())
+    columns = over_axes(result.axes, system) | in_columns(figures, system)
     columns["status"] = np.array(STATUSES, dtype=object)[result.status.ravel()].tolist()
     write_columns(path, columns)

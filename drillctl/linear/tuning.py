@@ -108,7 +108,7 @@ def drive_impedance(
         label = design.tables.controller.law
         if design.simple_drive:
             kp, ki = design.linear_drive.gains()
-            label += f", Kp {kp:.4g}, Ki {ki:.4g}"
+            label += f", Kp {kp:.4g} N*m*s/rad, Ki {ki:.4g} N*m/rad"
     return DriveImpedance(frequency, impedance, pipe_impedance(design.string), label)
 
 

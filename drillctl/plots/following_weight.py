@@ -133,12 +133,12 @@ def _root(values: Array) -> Array:
 
 
 def _label(result: WeightDelay, number: int, system: units.System) -> str:
-    gain, unit = units.displayed(float(result.gains[number]), "N", system)
+    gain, unit = units.displayed(float(result.gains[number]), "N*s/rad", system)
     crossing = result.limits[number].harmful_from
     limit = f"not harmful up to {result.delays[-1]:g} s"
     if crossing.at is not None:
         limit = f"harmful from {crossing.at:.2f} s"
-    return f"{gain:g} {unit} s/rad, {limit}"
+    return f"{gain:.4g} {unit}, {limit}"
 
 
 @style.picture(result="From `drillctl.advantage`.")

@@ -39,6 +39,7 @@ def drive_impedance(
     results: DriveImpedance | Sequence[DriveImpedance],
     ax: Sequence[Axes] | None = None,
     marks: Mapping[str, float] | Sequence[float] = (),
+    system: units.System = "si",
 ) -> Figure:
     """Draw impedance and reflection of one or several top drives over frequency.
 
@@ -47,13 +48,13 @@ def drive_impedance(
     back: 0 takes all, 1 takes nothing.
     """
     drives = listed(results)
-    names = {drive.label for drive in drives}
+    names = [units.told(drive.label, system) for drive in drives]
     figure, (above, below) = style.grid_or_new(ax, 2, 1, 7.5, 6.0, share_x=True)
-    for number, drive in enumerate(drives):
+    for number, (drive, name) in enumerate(zip(drives, names, strict=True)):
         look = style.look(number)
         frequency = drive.frequency_hz
-        above.loglog(frequency, np.abs(drive.impedance) / drive.pipe, label=drive.label, **look)
-        below.semilogx(frequency, np.abs(drive.reflection), label=drive.label, **look)
+        above.loglog(frequency, np.abs(drive.impedance) / drive.pipe, label=name, **look)
+        below.semilogx(frequency, np.abs(drive.reflection), label=name, **look)
     above.axhline(1.0, color=GREY, linewidth=0.9)
     above.annotate(
         "as the pipe", (0.0, 1.0), xycoords=("axes fraction", "data"), xytext=(4, 3),
@@ -130,7 +131,8 @@ def gain_boundary(
     ax.set_xlim(*sides[0][0])
     ax.set_ylim(*sides[1][0])
     style.legend_under(ax, 2)
-    figure.supxlabel(f"falling slope of the rock {first.slope:.4g} N m s", fontsize=style.SMALL)
+    slope, unit = units.displayed(first.slope, "N*m*s/rad", system)
+    figure.supxlabel(f"falling slope of the rock {slope:.4g} {unit}", fontsize=style.SMALL)
     return figure
 
 

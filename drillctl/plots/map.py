@@ -159,7 +159,9 @@ def error_estimate(result: Doctor, ax: Axes | None = None) -> Figure:
 
 
 @style.picture(result="From `drillctl.regularisation`.", ax="Two panels.")
-def regularisation(result: Regularisation, ax: Sequence[Axes] | None = None) -> Figure:
+def regularisation(
+    result: Regularisation, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
     """Draw the shift of J1 and the size of the regions against the width of the smoothing.
 
     Left: median, 95th percentile and worst relative change of J1 over the cells. Right: cells at
@@ -167,20 +169,21 @@ def regularisation(result: Regularisation, ax: Sequence[Axes] | None = None) -> 
     """
     figure, (left, right) = style.grid_or_new(ax, 1, 2, 10.5, 4.6)
     size = np.abs(result.shifts)
+    widths, unit = units.displayed(np.asarray(result.widths), "rad/s", system)
     for number, (share, name) in enumerate(((0.5, "median cell"), (0.95, "95th percentile"),
                                             (1.0, "worst cell"))):  # fmt: skip
         change = [100.0 * np.nanquantile(x, share) for x in size]
-        left.loglog(result.widths, change, "o", markersize=4, label=name, **style.look(number))
+        left.loglog(widths, change, "o", markersize=4, label=name, **style.look(number))
     for number, level in enumerate(result.levels):
         exact, cells = result.cells(level)
         if exact == 0:
             continue
         right.semilogx(
-            result.widths, np.array(cells) / exact, "o", markersize=4,
+            widths, np.array(cells) / exact, "o", markersize=4,
             label=f"J1 at or under {level:g} s ({exact} cells)", **style.look(number),
         )  # fmt: skip
     right.axhline(1.0, color=style.BLACK, linewidth=0.8)
-    over = "width of the regularisation (rad/s)"
+    over = f"width of the regularisation ({unit})"
     style.dress(left, over, "change of J1 (%)", "Friction smoothed by tanh")
     style.dress(right, over, "cells over those of set-valued friction", "Size of the regions")
     for panel in (left, right):

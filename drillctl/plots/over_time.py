@@ -27,6 +27,7 @@ def time_response(
     results: Simulation | Sequence[Simulation],
     ax: Axes | Sequence[Axes] | None = None,
     paths: Sequence[str] = (),
+    system: units.System = "si",
 ) -> Figure:
     """Speeds of top drive and bit against time."""
     runs = list(results) if isinstance(results, Sequence) else [results]
@@ -37,7 +38,7 @@ def time_response(
         given, rows, columns, 4.2 * columns + 1.8, 2.6 * rows + 1.0, share_x=True, share_y=True
     )
     for panel, run in zip(panels, runs, strict=False):
-        _panel(panel, run, paths)
+        _panel(panel, run, _title(run, paths, system))
     for number in range(len(runs), len(panels)):
         panels[number].set_visible(False)
         above = panels[number - columns]
@@ -50,7 +51,7 @@ def time_response(
     return figure
 
 
-def _panel(ax: Axes, run: Simulation, paths: Sequence[str]) -> None:
+def _panel(ax: Axes, run: Simulation, title: str) -> None:
     bit = run.signals["bit_speed"] / units.RPM
     top = run.signals["top_speed"] / units.RPM
     stuck = run.signals["stuck"] > 0.5
@@ -64,16 +65,20 @@ def _panel(ax: Axes, run: Simulation, paths: Sequence[str]) -> None:
         run.design.speed / units.RPM, color="black", linewidth=0.7, linestyle=":", label="set speed"
     )
     ax.set_xlim(0.0, float(run.time[-1]))
-    style.dress(ax, "time (s)", "speed (rpm)", _title(run, paths))
+    style.dress(ax, "time (s)", "speed (rpm)", title)
     ax.label_outer()
 
 
-def _title(run: Simulation, paths: Sequence[str]) -> str:
+LAW_UNITS = {"kp": "N*m*s/rad", "ki": "N*m/rad", "sensed_inertia": "kg*m^2"}  # else torques
+
+
+def _title(run: Simulation, paths: Sequence[str], system: units.System) -> str:
     if paths:
-        numbers = ", ".join(_named(run, path) for path in paths)
+        numbers = ", ".join(_named(run, path, system) for path in paths)
     elif run.design.simple_drive:
-        law = run.design.linear_drive
-        numbers = ", ".join(f"{k} {v:g}" for k, v in law._asdict().items())  # type: ignore[attr-defined]
+        law = run.design.linear_drive._asdict()  # type: ignore[attr-defined]
+        shown = (units.displayed(v, LAW_UNITS.get(k, "N*m"), system) for k, v in law.items())
+        numbers = ", ".join(f"{k} {v:g} {unit}" for k, (v, unit) in zip(law, shown, strict=True))
     else:
         numbers = run.design.tables.controller.law
     j1 = run.measures.j1
@@ -81,10 +86,10 @@ def _title(run: Simulation, paths: Sequence[str]) -> str:
     return f"{run.status}: {numbers}" if j1 is None else f"J1 {j1:.1f} s: {numbers}"
 
 
-def _named(run: Simulation, path: str) -> str:
+def _named(run: Simulation, path: str, system: units.System) -> str:
     """A parameter of the run's design by its usual name, in the units people read."""
     result = parameter(run.design, path)
-    value, unit = units.displayed(result.value, result.si_unit)
+    value, unit = units.displayed(result.value, result.si_unit, system)
     return f"{style.NAMES.get(path, path.rpartition('.')[2])} {value:g} {unit}".rstrip()
 
 

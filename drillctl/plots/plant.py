@@ -85,8 +85,6 @@ def _name(mode: Mode) -> str:
     return f"{mode.frequency_hz:.4g} Hz{damping}"
 
 
-PER_TORQUE = 1e3 / units.RPM  # revolutions a minute per kN m in one rad/s per N m
-UNIT = "rpm/(kN m)"
 ENDS = (("bit", "bit_torque", "bit_speed"), ("top", "top_torque", "top_speed"))
 """Name, input and output of each end."""
 
@@ -97,11 +95,13 @@ ENDS = (("bit", "bit_torque", "bit_speed"), ("top", "top_torque", "top_speed"))
     raises="Nothing to draw, a result without mobility at the bit, not as many axes as panels.",
 )
 def mobility(
-    results: FrequencyResponse | Sequence[FrequencyResponse], ax: Sequence[Axes] | None = None
+    results: FrequencyResponse | Sequence[FrequencyResponse],
+    ax: Sequence[Axes] | None = None,
+    system: units.System = "si",
 ) -> Figure:
     """Draw the magnitude of the mobility at bit and top.
 
-    In rpm per kN m, of the string alone (`plant`) or with its drive (`closed_loop`, which has no
+    Speed per torque, of the string alone (`plant`) or with its drive (`closed_loop`, which has no
     top torque among its inputs). High peaks at the bit are where the rock's falling slope feeds
     the string; those of an undamped string end where the nearest frequency lies.
     """
@@ -110,12 +110,13 @@ def mobility(
         one.between("bit_torque", "bit_speed")
     shown = [end for end in ENDS if any(_has(one, end) for one in given)]
     figure, panels = style.grid_or_new(ax, len(shown), 1, 7.5, 2.6 * len(shown) + 1.2, share_x=True)
+    scale, unit = units.displayed(1.0, "rad/(N*m*s)", system)
     for panel, end in zip(panels, shown, strict=True):
         for number, one in enumerate(given):
             if _has(one, end):
-                _draw_mobility(panel, one, end, number, len(given))
+                _draw_mobility(panel, one, end, scale, number, len(given))
         title = "Mobility of the string" if panel is panels[0] else ""
-        style.dress(panel, "", f"mobility at the {end[0]} ({UNIT})", title)
+        style.dress(panel, "", f"mobility at the {end[0]} ({unit})", title)
     panels[-1].set_xlabel("frequency (Hz)", fontsize=style.LABEL)
     for panel in panels:
         hertz(panel)
@@ -131,10 +132,11 @@ def _has(one: FrequencyResponse, end: tuple[str, str, str]) -> bool:
 
 
 def _draw_mobility(
-    panel: Axes, one: FrequencyResponse, end: tuple[str, str, str], number: int, count: int
-) -> None:
+    panel: Axes, one: FrequencyResponse, end: tuple[str, str, str], scale: float, number: int,
+    count: int,
+) -> None:  # fmt: skip
     width = style.LINE if count == 1 else WIDTHS[min(number, len(WIDTHS) - 1)]
-    speed = np.abs(one.between(*end[1:])) * PER_TORQUE
+    speed = np.abs(one.between(*end[1:])) * scale
     panel.loglog(one.frequency_hz, speed, label=one.title, **style.look(number, width))
 
 
@@ -155,6 +157,7 @@ def bode(
     ax: Sequence[Axes] | None = None,
     source: str | None = None,
     targets: Sequence[str] | None = None,
+    system: units.System = "si",
 ) -> Figure:
     """Draw magnitude and phase of the response of some signals to one other.
 
@@ -166,7 +169,7 @@ def bode(
     if not names:
         raise InputError("needs one output or more", "targets")
     sources = [source or one.inputs[0] for one in results]
-    unit = _common_unit(results, sources, names)
+    scale, unit = units.displayed(1.0, _common_unit(results, sources, names), system)
     figure, (magnitude, phase) = style.grid_or_new(ax, 2, 1, 7.5, 6.0, share_x=True)
     for order, (one, come_from) in enumerate(zip(results, sources, strict=True)):
         for number, target in enumerate(names):
@@ -176,7 +179,7 @@ def bode(
             if len(results) > 1:
                 label = f"{one.title}: {label}"
             with np.errstate(divide="ignore"):  # a response that is zero has no level
-                level = 20.0 * np.log10(np.abs(response))
+                level = 20.0 * np.log10(scale * np.abs(response))
             magnitude.semilogx(one.frequency_hz, level, **look)
             phase.semilogx(one.frequency_hz, unbroken(response), label=label, **look)
     title = f"Bode plot: {results[0].title.lower()}" if len(results) == 1 else ""
@@ -239,11 +242,7 @@ def _common_unit(
 
 
 def _level(unit: str) -> str:
-    return "magnitude (dB)" if unit in ("", "1") else f"magnitude (dB re 1 {_plain(unit)})"
-
-
-def _plain(unit: str) -> str:
-    return unit.replace("*", " ")
+    return f"magnitude (dB re 1 {unit})" if unit else "magnitude (dB)"
 
 
 def _look(order: int, number: int, results: int, targets: int) -> dict[str, Any]:

@@ -108,7 +108,9 @@ def _shown(result: Uncertainty, cell: int, axis: Axis, system: units.System) -> 
 
 
 @style.picture(result="With indices.", raises="The result has no indices.")
-def sensitivity_bars(result: Uncertainty, ax: Sequence[Axes] | None = None) -> Figure:
+def sensitivity_bars(
+    result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
     """First and total Sobol indices with their intervals, a panel a figure that they explain."""
     sobol = result.sensitivity
     if sobol is None:
@@ -133,7 +135,7 @@ def sensitivity_bars(result: Uncertainty, ax: Sequence[Axes] | None = None) -> F
         panel.set_yticks(places, names if left else [""] * len(places))
         panel.invert_yaxis()
         panel.set_xlim(-0.25, 1.1)  # what reaches further is error
-        style.dress(panel, "Sobol index", "", _short(one.of))
+        style.dress(panel, "Sobol index", "", _short(units.told(one.of, system)))
     figure.legend(
         *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2,
         fontsize=style.SMALL, frameon=False,
@@ -144,10 +146,10 @@ def sensitivity_bars(result: Uncertainty, ax: Sequence[Axes] | None = None) -> F
 
 
 def _short(of: str) -> str:
-    """What is explained, by the usual names and without the units of gains."""
+    """What is explained, by the usual names."""
     for path, name in style.NAMES.items():
         of = of.replace(path, name)
-    return of.replace(" N*m*s/rad", "").replace(" N*m/rad", "")
+    return of
 
 
 SHADES = {OUTER: "#D6E6F2", MEDIAN: "#8FBFE0", INNER: style.BLUE}

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from drillctl.design import Design, parameter
 from drillctl.plots.style import NAMES
 from drillctl.simulation.measures import Measure
-from drillctl.store.tables import NOTHING, displayed_unit, number, scaled
 from drillctl.store.tables import Table as Results
+from drillctl.store.tables import quantity
 from drillctl.studies.base import Check, Picture
+from drillctl.units import DIAMETERS, displayed, told, unit_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
@@ -109,19 +110,18 @@ class Document:
     left_out: tuple[tuple[str, str], ...]  # titles of omitted sections, with reasons
 
 
-def figure(picture: Picture, name: str, draw: Callable[[], Drawn]) -> Figure:
+def figure(picture: Picture, name: str, draw: Callable[[], Drawn], system: units.System) -> Figure:
     """A picture of a study as a block of a report."""
-    return Figure(picture.name, picture.caption, picture.alt, draw, (name,), picture.paper)
+    alt = told(picture.alt, system)
+    return Figure(picture.name, picture.caption, alt, draw, (name,), picture.paper)
 
 
 def block(table: Results, system: units.System) -> Table:
     """A table of a study as a block of a report."""
     heads, rows = tuple(table.heads(system)), tuple(map(tuple, table.texts(system)))
-    caption = table.title[0].upper() + table.title[1:]
+    said = table.said(system)
+    caption = said[0].upper() + said[1:]
     return Table(table.name, caption, heads, rows)
-
-
-_INCH = 0.0254
 
 
 @dataclass(frozen=True)
@@ -132,17 +132,15 @@ class Words:
 
     def quantity(self, value: float | None, si_unit: str, digits: int = 4) -> str:
         """Format an SI value with its displayed unit."""
-        if value is None:
-            return NOTHING
-        return f"{number(self.scaled(value, si_unit), digits)} {self.unit(si_unit)}".rstrip()
+        return quantity(value, si_unit, self.system, digits)
 
     def unit(self, si_unit: str) -> str:
         """The displayed unit for an SI unit."""
-        return displayed_unit(si_unit, self.system)
+        return unit_name(si_unit, self.system)
 
     def scaled(self, value: float, si_unit: str) -> float:
         """Convert an SI value to the displayed unit."""
-        return scaled(value, si_unit, self.system)
+        return float(displayed(value, si_unit, self.system)[0])
 
     def measure(self, one: Measure) -> str:
         """Label of a measure with its unit in brackets."""
@@ -150,11 +148,7 @@ class Words:
 
     def diameter(self, value: float | None) -> str:
         """Format a diameter (m) in mm or inches."""
-        if value is None:
-            return NOTHING
-        if self.system == "field":
-            return f"{number(value / _INCH)} in"
-        return f"{number(1e3 * value)} mm"
+        return self.quantity(value, DIAMETERS)
 
     def named(self, design: Design, path: str, value: float) -> str:
         """A parameter of a design with a value (SI) and its unit."""

@@ -210,7 +210,7 @@ class Gathered:
         said = tuple(Text(remark) for remark in kind.remarks(result, system))
         draw = partial(drawn, kind.pictures, study.folder, study.key, system=system)
         pictures = [
-            (one.name, figure(one, name, partial(draw, name=one.name)), True)
+            (one.name, figure(one, name, partial(draw, name=one.name), system), True)
             for one in kind.pictures(result)
         ]
         tables = [(one.name, block(one, system), one.shown) for one in kind.tables(result)]

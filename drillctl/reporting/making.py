@@ -134,7 +134,7 @@ def _facts(gathered: Gathered) -> tuple[tuple[str, str], ...]:
         ("profile", f"{gathered.profile.name} ({gathered.profile.meaning})"),
         ("program", f"drillctl {drillctl.__version__}"),
         ("seed", str(table.seed)),
-        ("units", "field (klbf, klbf ft, ft)" if gathered.words.system == "field" else "SI"),
+        ("units", "field (klbf, klbf ft, ft, in)" if gathered.words.system == "field" else "SI"),
     ]
     if design.tables.status:
         facts.append(("status of the model", design.tables.status))
@@ -169,7 +169,7 @@ def report(
     sections: Iterable[str] | None = None,
     title: str | None = None,
     formats: Iterable[str] = ("html",),
-    system: units.System = "field",
+    system: units.System | None = None,
     progress: Progress = SILENT,
     processes: int = 1,
 ) -> Report:
@@ -190,8 +190,8 @@ def report(
         Instead of the design's own.
     formats : iterable of str
         `html`, `pdf` and `md`.
-    system : {'si', 'field'}
-        Units of tables and pictures.
+    system : {'si', 'field'}, optional
+        Units of tables and pictures; by default those of the design, else field units.
     progress : Progress
         Receives tasks and finished parts.
     processes : int
@@ -215,11 +215,12 @@ def report(
     wanted, named = chosen_sections(sections), set(formats)
     _known(named, FORMATS, "format", "--format")
     kinds = tuple(name for name in FORMATS if name in named) or ("html",)
+    words = Words(system or design.tables.units or "field")
     with (
         store.claim("report", design, folder, profile=spent.name) as run,
         drawing_helpers(processes - 1) as helpers,
     ):
-        return _report(design, run, spent, wanted, title, kinds, Words(system), progress, helpers)
+        return _report(design, run, spent, wanted, title, kinds, words, progress, helpers)
 
 
 def _report(

@@ -19,7 +19,7 @@ from drillctl.reporting.pictures import FigureFiles, themed
 from drillctl.text import clean
 
 _UNIT = re.compile(
-    r"(?<=[\d∞]) (?=%|(?:s|Hz|ms|rpm|kN|klbf|ft|m|N|kg|dB|in|mm|kJ)\b)"
+    r"(?<=[\d∞]) (?=%|(?:s|Hz|ms|rpm|kN|klbf|ft|m|N|kg|lb|dB|in|mm|kJ)\b)"
     r"|(?<=\bN) (?=m\b)|(?<=\bN m) (?=s\b)|(?<=\bklbf) (?=ft\b)|(?<=\bkN) (?=m\b)"
 )
 _NUMBER = re.compile(r"^[−-]?[\d.]+( × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?( [%°]| s| Hz| ms)?$|^–$|^∞$")

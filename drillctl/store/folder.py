@@ -43,7 +43,7 @@ def difference(path: Path, design: Design, grown: tuple[str, ...] = ()) -> str:
     here = _leaves(to_tree(design.tables))
     keys = [
         key for key in dict.fromkeys((*held, *here))
-        if held.get(key) != here.get(key) and key not in grown
+        if held.get(key) != here.get(key) and key not in ("units", *grown)
     ]  # fmt: skip
     if not keys:
         return ""
@@ -149,7 +149,9 @@ def resolved(folder: str | Path, where: str = "--out") -> Path:
 
 def identity(verb: str, design: Design, **settings: Any) -> str:
     """Hash that identifies a run: command, resolved design, version, other settings."""
-    text = "\n".join([verb, drillctl.__version__, repr(settings), to_toml(design)])
+    # whatever units it is read in
+    same = replace(design, tables=design.tables.model_copy(update={"units": None}))
+    text = "\n".join([verb, drillctl.__version__, repr(settings), to_toml(same)])
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -1,7 +1,7 @@
 """Tables of results: one object for the terminal, CSV files and reports.
 
-Cells hold SI numbers, text or None. Terminal and report use the units of the reader; a CSV file
-keeps SI, with two more columns for the ends of an interval.
+Cells hold SI numbers, text or None. Terminal and report use the units of the reader. A CSV file has
+plain SI, or field units where the reader has; its heads name them. Ends of an interval are columns.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from drillctl.arrays import Array
 
 NOTHING = "–"  # shown in place of a missing number
-GAIN_OF_WEIGHT = "N*s/rad"  # of a weight on bit per bit speed: read in the unit of the weight
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -61,6 +60,24 @@ class Quantity(NamedTuple):
     unit: str
 
 
+class Told(str):
+    """Text with quantities in full (SI), which is told in the units of the reader."""
+
+    __slots__ = ()
+
+
+class Unit(str):
+    """An SI unit in a column of units, which a file has as its quantities."""
+
+    __slots__ = ()
+
+
+def place(at: Mapping[str, float], unit_of: Mapping[str, str]) -> Told:
+    """Values (SI) by path as text; `design` without any."""
+    named = (f"{path} = {units.full(value, unit_of[path], 4)}" for path, value in at.items())
+    return Told(", ".join(named) or "design")
+
+
 Cell = Any  # text, a number (SI), an `Estimate`, a `Quantity`, or None
 
 
@@ -79,7 +96,7 @@ class Column:
 
     def head(self, system: units.System) -> str:
         """The head for a reader, with its unit."""
-        unit = "%" if self.percent else displayed_unit(self.unit, system)
+        unit = "%" if self.percent else units.unit_name(self.unit, system)
         text = self.label or self.name
         return f"{text} ({unit})" if unit else text
 
@@ -89,10 +106,10 @@ class Column:
             return self._estimate(cell, system)
         if isinstance(cell, Quantity):
             text = replace(self, unit=cell.unit).text(cell.value, system)
-            unit = "" if text == NOTHING else displayed_unit(cell.unit, system)
+            unit = "" if text == NOTHING else units.unit_name(cell.unit, system)
             return f"{text} {unit}".rstrip()
         if isinstance(cell, str):
-            return cell
+            return units.told(cell, system) if isinstance(cell, Told) else cell
         if isinstance(cell, bool):
             return "yes" if cell else "no"
         if isinstance(cell, int) and not self.percent and not self.unit:
@@ -102,7 +119,7 @@ class Column:
     def _number(self, value: float | None, system: units.System) -> str:
         if value is None or math.isnan(value):
             return NOTHING
-        shown = 100.0 * value if self.percent else scaled(value, self.unit, system)
+        shown = 100.0 * value if self.percent else units.displayed(value, self.unit, system)[0]
         text = number(shown, self.digits)
         return f"+{text}" if self.signed and shown > 0.0 else text
 
@@ -113,20 +130,21 @@ class Column:
         low, high = (self._number(end, system) for end in cell.interval)
         return f"{text} ({low} to {high})"
 
-    def heads(self) -> list[str]:
+    def heads(self, system: units.System) -> list[str]:
         """Heads in a CSV file."""
-        endings = ("", "_low", "_high") if self.interval else ("",)
-        return [headed(f"{self.name}{ending}", self.unit) for ending in endings]
+        ends = ("", "_low", "_high") if self.interval else ("",)
+        return [headed(f"{self.name}{end}", self.unit, system) for end in ends]
 
-    def fields(self, cell: Cell) -> list[Any]:
+    def fields(self, cell: Cell, system: units.System) -> list[Any]:
         """Fields of a cell in a CSV file; empty without a finite number."""
         if isinstance(cell, Quantity):
-            return self.fields(cell.value)
+            return replace(self, unit=cell.unit).fields(cell.value, system)
         if not self.interval:
-            return [_field(cell)]
+            return [_field(cell, self.unit, system)]
         if not isinstance(cell, Estimate):
-            return [_field(cell), "", ""]
-        return [_field(one) for one in (cell.value, *(cell.interval or (None, None)))]
+            return [_field(cell, self.unit, system), "", ""]
+        ends = cell.interval or (None, None)
+        return [_field(one, self.unit, system) for one in (cell.value, *ends)]
 
 
 @dataclass(frozen=True)
@@ -138,6 +156,10 @@ class Table:
     columns: tuple[Column, ...]
     rows: Iterable[Sequence[Cell]]
     shown: bool = True  # on terminal and in reports; else in the CSV file only
+
+    def said(self, system: units.System) -> str:
+        """The title for a reader."""
+        return units.told(self.title, system) if isinstance(self.title, Told) else self.title
 
     def heads(self, system: units.System) -> list[str]:
         """Heads for a reader."""
@@ -155,19 +177,20 @@ class Table:
         ]
 
 
-def headed(name: str, unit: str) -> str:
-    """The head of a column in a CSV file: its name, and its SI unit if it has one."""
-    return name if unit in ("", "1") else f"{name} ({unit})"
+def headed(name: str, si_unit: str, system: units.System) -> str:
+    """The head of a column in a CSV file: its name, and its unit if it has one."""
+    unit = units.filed(1.0, si_unit, system)[1]
+    return f"{name} ({unit})" if unit else name
 
 
-def write_csv(table: Table, folder: Path) -> None:
-    """Write a table as `NAME.csv`, in SI, atomically."""
+def write_csv(table: Table, folder: Path, system: units.System = "si") -> None:
+    """Write a table as `NAME.csv`, in plain SI or field units, atomically."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([head for column in table.columns for head in column.heads()])
+    writer.writerow([head for column in table.columns for head in column.heads(system)])
     for row in table.rows:
         cells = zip(table.columns, row, strict=True)
-        writer.writerow([field for column, cell in cells for field in column.fields(cell)])
+        writer.writerow([field for column, cell in cells for field in column.fields(cell, system)])
     write_text(folder / f"{table.name}.csv", text.getvalue())
 
 
@@ -188,6 +211,16 @@ def texts(values: Array) -> list[str]:
     return ["" if v != v else repr(v) for v in values.ravel().tolist()]
 
 
+def in_columns(
+    figures: Iterable[tuple[str, Array, str]], system: units.System
+) -> dict[str, list[str]]:
+    """Columns by their heads, for `write_columns`, of names, numbers and SI units."""
+    return {
+        headed(name, unit, system): texts(units.filed(values, unit, system)[0])
+        for name, values, unit in figures
+    }
+
+
 def write_columns(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
     """Write columns of texts without commas, quotes or line breaks: fast for many rows."""
     with replaced(path) as part, part.open("x", newline="", encoding="utf-8") as stream:
@@ -195,10 +228,16 @@ def write_columns(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
         stream.writelines(f"{','.join(row)}\n" for row in zip(*columns.values(), strict=True))
 
 
-def _field(value: Cell) -> Any:
+def _field(value: Cell, si_unit: str, system: units.System) -> Any:
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return ""
-    return float(value) if isinstance(value, float) else value
+    if isinstance(value, float):
+        return float(units.filed(value, si_unit, system)[0])
+    if isinstance(value, Unit):
+        return units.filed(1.0, value, system)[1] or str(value)
+    if isinstance(value, Told):
+        return units.told(value, system)
+    return value
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -238,28 +277,9 @@ def chance(share: float, interval: Iterable[float | None]) -> str:
     return f"{percent(share)} ({between(100.0 * low, 100.0 * high, 3)} %)"
 
 
-def displayed_unit(si_unit: str, system: units.System) -> str:
-    """The displayed unit for an SI unit; empty for a pure number."""
-    if si_unit in ("", "1"):
-        return ""
-    if si_unit == GAIN_OF_WEIGHT:
-        return f"{displayed_unit('N', system)} s/rad"
-    name = "kJ" if si_unit == "J" else units.displayed(1.0, si_unit, system)[1]
-    return str(name).replace("^2", "²").replace("*", " ")
-
-
-def scaled(value: float, si_unit: str, system: units.System) -> float:
-    """Convert an SI value to the displayed unit."""
-    if si_unit in ("", "1"):
-        return value
-    if si_unit == GAIN_OF_WEIGHT:
-        return scaled(value, "N", system)
-    return value / 1e3 if si_unit == "J" else float(units.displayed(value, si_unit, system)[0])
-
-
 def quantity(value: float | None, si_unit: str, system: units.System, digits: int = 4) -> str:
     """Format an SI value with its displayed unit."""
     if value is None or math.isnan(value):
         return NOTHING
-    unit = displayed_unit(si_unit, system)
-    return f"{number(scaled(value, si_unit, system), digits)} {unit}".rstrip()
+    shown, unit = units.displayed(value, si_unit, system)
+    return f"{number(shown, digits)} {unit}".rstrip()

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from drillctl import registry
 from drillctl.progress import SILENT, Progress
-from drillctl.store.tables import Column, Table
+from drillctl.store.tables import Column, Table, Told
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -187,7 +187,7 @@ class Study:
     the study in `kind`. Without it `call` is called, with the options of the command by their
     names and `progress`; by default that is the function called `python` in `compute.py` of the
     package. The other functions take that result; `tables`, `pictures` and `remarks` give what
-    people see, `notes` what deserves attention on stderr.
+    people see, in units of theirs, `notes` what deserves attention on stderr.
     """
 
     name: str
@@ -206,13 +206,13 @@ class Study:
     checks: Callable[[Any], Iterable[Check]] = _none  # of the numbers, for a report
     notes: Callable[[Any], Iterable[str]] = _none
     summary: Callable[[Any], dict[str, Any]] = _summary
-    files: Callable[[Any, Path], None] = _nothing  # further files of a folder
+    files: Callable[[Any, Path, units.System], None] = _nothing  # further files of a folder
     failure: Callable[[Any], str | None] = _nothing  # why the command ends with exit code 1
     growing: Callable[[Design], Growing | None] = _nothing
     check: Callable[[Design], None] = _nothing  # what `validate` refuses of its settings
     recipes: tuple[Recipe, ...] = ()
     sections: tuple[Section, ...] = ()
-    system: Literal["si", "field"] = "si"  # units that people read unless they ask for others
+    system: Literal["si", "field"] = "si"  # units that people read unless they or the design say
     module: str = ""
 
     def __post_init__(self) -> None:
@@ -301,11 +301,6 @@ def in_batch(request: Requested) -> str:
     return ""
 
 
-def spelled(at: Mapping[str, float]) -> str:
-    """Values (SI) by path as text; `design` without any."""
-    return ", ".join(f"{path} = {value:.4g}" for path, value in at.items()) or "design"
-
-
 def audited(audit: Audit, what: str, cells: str) -> Iterator[Check]:
     """Whether the reference solver agrees, if anything was audited."""
     if len(audit.cells):
@@ -337,7 +332,7 @@ def audit_tables(
     yield Table(f"audit{ending}", title, columns, rows, shown=audit.verdict == "check")
     runs = (audit.batch, audit.finer, audit.reference)
     lines = [
-        [place(int(audit.cells[k])), *(float(one["j1"][k]) for one in runs)]
+        [Told(place(int(audit.cells[k]))), *(float(one["j1"][k]) for one in runs)]
         for k in audit.verge.nonzero()[0]
     ]
     heads = (

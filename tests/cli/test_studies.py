@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import json
 import os
+import re
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.text import Text
 from strict_json import strict
 
 import drillctl
+from drillctl import units
 from drillctl.cli import run
 from drillctl.studies.base import Study, studies
 
@@ -72,6 +76,7 @@ class Ran:
     code: int
     out: str
     err: str
+    drawn: list[str]  # every text in its pictures, which are in field units as its files
 
     def call(self, *more: str) -> tuple[int, str, str]:
         """The same command again, from the folder above that of the run."""
@@ -91,20 +96,21 @@ def called(*arguments: str) -> tuple[int, str, str]:
     return code, out.getvalue(), err.getvalue()
 
 
-def small(figure, path):
-    """A picture that is rendered, in few pixels."""
-    figure.savefig(path, dpi=30)
-
-
 @pytest.fixture(scope="module", params=COMMANDS, ids=[study.name for study in COMMANDS])
 def ran(request, tmp_path_factory):
-    study, above = request.param, tmp_path_factory.mktemp("study")
+    study, above, drawn = request.param, tmp_path_factory.mktemp("study"), []
+
+    def small(figure, path):
+        """A picture that is rendered, in few pixels."""
+        figure.savefig(path, dpi=30)
+        drawn.extend(text.get_text() for text in figure.findobj(Text))
+
     arguments = QUICK.get(study.name, (DESIGN, *SHORT))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(verb, "draw", small)
         patch.chdir(above)
-        said = called(study.name, *arguments, "--out", "once", "--json")
-    return Ran(study, arguments, above / "once", *said)
+        said = called(study.name, *arguments, "--out", "once", "--json", "--units", "field")
+    return Ran(study, arguments, above / "once", *said, drawn)
 
 
 def stamps(folder):
@@ -131,6 +137,30 @@ def test_its_folder_holds_every_table_and_picture(ran):
         assert len(lines) >= 1 + len(list(table.rows))
     for name in pictures:
         assert (ran.folder / name).stat().st_size > 2000
+
+
+OF_SI = re.compile(
+    r"(?<![\w×])(?:[kM]?N|rad|kg|mm|k?J|[kM]?W|[kMG]?Pa)\b(?!-)|(?:[\d.] |[(\[]|re 1 )m(?![\w])"
+)
+"""What no text in field units holds, but for what the design itself is called."""
+
+
+def test_in_field_units_nothing_is_in_si(ran):
+    result, study, system = ran.result, ran.study, "field"
+    said = [*study.remarks(result, system), *ran.drawn]
+    said += [units.told(note, system) for note in study.notes(result)]
+    said += [f"{one.question} {one.detail}" for one in study.checks(result)]
+    for table in study.tables(result):
+        said += [table.said(system), *table.heads(system), *itertools.chain(*table.texts(system))]
+    for picture in study.pictures(result):
+        said += [picture.caption, units.told(picture.alt, system)]
+    for file in ran.folder.glob("*.csv"):
+        said += file.read_text(encoding="utf-8").splitlines()
+    title = result.design.tables.title
+    own = (title, title.replace("$", r"\$"), *(one.name for one in getattr(result, "cases", ())))
+    for name in own:
+        said = [text.replace(name, "") for text in said]
+    assert [text for text in said if OF_SI.search(text)] == []
 
 
 def test_it_reads_back_as_it_was(ran, tmp_path):

@@ -82,7 +82,7 @@ def _section(ax: Axes, part: _Part, order: int, words: Words) -> None:
     table = part.table
     if table.stiffness is not None:
         _spring(ax, part)
-        text = f"{table.name}: spring {number(table.stiffness)} N m/rad"
+        text = f"{table.name}: spring {words.quantity(table.stiffness, 'N*m/rad')}"
     else:
         colour = style.COLOURS[order % len(style.COLOURS)]
         ax.add_patch(
@@ -111,7 +111,9 @@ def _spring(ax: Axes, part: _Part) -> None:
 def _ends(ax: Axes, design: Design, words: Words) -> None:
     tables = design.tables
     ax.add_patch(Rectangle((-0.24, -0.09), 0.48, 0.085, facecolor=style.SKY, edgecolor="black"))
-    text = f"top drive: {number(tables.top_drive.at_pipe)} kg m²\n{tables.controller.law}"
+    text = (
+        f"top drive: {words.quantity(tables.top_drive.at_pipe, 'kg*m^2')}\n{tables.controller.law}"
+    )
     ax.text(0.28, -0.05, text, va="center", fontsize=style.SMALL)
     ax.add_patch(Rectangle((-0.1, 1.0), 0.2, 0.035, facecolor="#888888", edgecolor="black"))
     bit = [(-0.1, 1.035), (0.1, 1.035), (0.05, 1.075), (-0.05, 1.075)]
@@ -121,7 +123,7 @@ def _ends(ax: Axes, design: Design, words: Words) -> None:
                   alpha=0.7)
     )  # fmt: skip
     weight = words.quantity(tables.operating_point.weight_on_bit, "N")
-    text = f"BHA: {number(tables.bha.inertia)} kg m², {weight} on bit"
+    text = f"BHA: {words.quantity(tables.bha.inertia, 'kg*m^2')}, {weight} on bit"
     ax.text(WIDEST + 0.06, 1.045, text, va="center", fontsize=style.SMALL)
 
 
@@ -134,19 +136,23 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
             table.name, _kind(table),
             words.quantity(table.span, "m") if table.span else NOTHING,
             *(words.diameter(x) for x in table.diameters or (None, None)),
-            f"{number(part.stiffness)}", f"{number(part.inertia + part.end_inertia)}",
+            number(words.scaled(part.stiffness, "N*m/rad")),
+            number(words.scaled(part.inertia + part.end_inertia, "kg*m^2")),
             made.said if made.lumped_into else str(made.elements),
         )
         for table, part, made in zip(tables, map(section, tables), design.mesh, strict=True)
     )  # fmt: skip
+    inertia = f"inertia ({words.unit('kg*m^2')})"
     heads = (
         "section", "given as", "length", "outer diameter", "inner diameter",
-        "stiffness (N m/rad)", "inertia (kg m²)", "elements",
+        f"stiffness ({words.unit('N*m/rad')})", inertia, "elements",
     )  # fmt: skip
-    bodies = (
-        ("top drive", number(design.tables.top_drive.at_pipe),
-         number(design.tables.top_drive.damping)),
-        ("BHA with bit", number(design.tables.bha.inertia), number(design.tables.bha.damping)),
+    top, bha = design.tables.top_drive, design.tables.bha
+    bodies = tuple(
+        (name, number(words.scaled(inertia_, "kg*m^2")),
+         number(words.scaled(damping, "N*m*s/rad")))
+        for name, inertia_, damping in (
+            ("top drive", top.at_pipe, top.damping), ("BHA with bit", bha.inertia, bha.damping))
     )  # fmt: skip
     blocks: list[Block] = [
         Figure(
@@ -154,8 +160,8 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
             _alt(gathered), partial(rig_drawing, design, words),
         ),
         Table("sections", "Sections from top to bottom", heads, rows),
-        Table("bodies", "Bodies at the ends", ("body", "inertia (kg m²)",
-              "damping to ground (N m s/rad)"), bodies),
+        Table("bodies", "Bodies at the ends", ("body", inertia,
+              f"damping to ground ({words.unit('N*m*s/rad')})"), bodies),
         Text(f"Source: {design.tables.source}" if design.tables.source else "No source given."),
     ]  # fmt: skip
     if design.tables.notes:

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drillctl import plots
+from drillctl import plots, units
 from drillctl.design import parameter, to_toml
 from drillctl.provenance import provenance
 from drillctl.reporting.blocks import Block, Checks, Code, Figure, Table, Words
@@ -45,14 +45,14 @@ def build_responses(gathered: Gathered) -> tuple[Block, ...]:
         "Speeds of bit and top drive at the current, the best and a bad setting, in this order; "
         "grey: bit at rest.",
         _alt(runs),
-        partial(_drawn, [(one.folder, one.key) for one in runs.values()], paths),
+        partial(_drawn, [(one.folder, one.key) for one in runs.values()], paths, words.system),
         tuple(runs),
     )
     return figure, table
 
 
-def _drawn(runs: list[tuple[Path, str]], paths: list[str]) -> Drawn:
-    return plots.time_response([opened(*one) for one in runs], paths=paths)
+def _drawn(runs: list[tuple[Path, str]], paths: list[str], system: units.System) -> Drawn:
+    return plots.time_response([opened(*one) for one in runs], paths=paths, system=system)
 
 
 def _value(study: Study, one: Measure, words: Words) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
 from drillctl.simulation.measures import MEASURES, STATUSES
-from drillctl.store.tables import Column, Quantity, Table, quantity
+from drillctl.store.tables import Column, Quantity, Table, Unit, quantity
 from drillctl.studies.base import (
     DRAWS,
     SEED,
@@ -57,7 +57,7 @@ def _measures(result: Comparison) -> Table:
             of = case.distribution(name)
             apart = None if case is result.baseline else result.paired[case.name][name]
             rows.append([
-                name, measure.label, case.name, measure.unit,
+                name, measure.label, case.name, Unit(measure.unit),
                 *(Quantity(of[key], measure.unit) for key in ("mean", "std", *QUANTILES)),
                 of["defined"], Quantity(apart, measure.unit), apart and apart.draws,
             ])  # fmt: skip

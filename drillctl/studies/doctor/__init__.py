@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
-from drillctl.store.tables import Column, Table, number
-from drillctl.studies.base import Check, Option, Picture, Recipe, Run, Study, spelled
+from drillctl.store.tables import Column, Table, Told, number, place
+from drillctl.studies.base import Check, Option, Picture, Recipe, Run, Study
 
 if TYPE_CHECKING:
     from drillctl.design import Design
@@ -43,7 +43,7 @@ def tables(result: Doctor) -> Iterator[Table]:
     yield _scheme(summary["scheme"])
     yield _errors(result, summary["estimate"])
     if summary["audit"]["lanes"]:
-        yield _audited(summary["audit"])
+        yield _audited(result, summary["audit"])
     speed = summary["speed"]
     rows = [
         ["lanes per second", f"{speed['lanes_per_second']:,.0f} on {speed['threads']} threads"],
@@ -63,10 +63,11 @@ def _scheme(scheme: dict[str, Any]) -> Table:
         why = "whole steps to the changes of the program"
     rows = [["step", f"{1e3 * scheme['step']:.4g} ms", why]]
     for name, step in sorted(scheme["bounds"].items(), key=lambda bound: bound[1]):
-        rows.append([f"bound: {name}", f"{1e3 * step:.4g} ms", scheme["reasons"][name]])
+        reason = Told(scheme["reasons"][name])
+        rows.append([f"bound: {name}", f"{1e3 * step:.4g} ms", reason])
     left = f", {scheme['modes_left_out']} left out" if scheme["modes_left_out"] else ""
     rows.append(["modes", f"{scheme['modes']}{left}", MODES[scheme["modes_by"]]])
-    turn = f"turns {scheme['turn']:.2f} rad in a step"
+    turn = Told(f"turns {scheme['turn']:.2f} rad in a step")
     rows.append(["highest mode", f"{scheme['highest_frequency_hz']:.3g} Hz", turn])
     strings = scheme["strings"]
     several = "" if strings == 1 else f"the shortest step of {strings} strings"
@@ -93,16 +94,20 @@ def _errors(result: Doctor, estimate: dict[str, Any]) -> Table:
     return Table("errors", title, columns, rows)
 
 
-def _audited(audit: dict[str, Any]) -> Table:
+def _audited(result: Doctor, audit: dict[str, Any]) -> Table:
+    from drillctl.design import parameter
+
+    paths = {path for lane in audit["lanes"] for path in lane["at"]}
+    unit_of = {path: parameter(result.design, path).si_unit for path in paths}
     rows = [
         [
-            spelled(lane["at"]), lane["j1"], lane["reference_j1"], lane["relative_difference"],
-            lane["estimated_error"],
+            place(lane["at"], unit_of), lane["j1"], lane["reference_j1"],
+            lane["relative_difference"], lane["estimated_error"],
         ]
         for lane in audit["lanes"]
     ]  # fmt: skip
     columns = (
-        Column("lane", "lane (SI)"), Column("j1", "J1", "s", 6),
+        Column("lane"), Column("j1", "J1", "s", 6),
         Column("reference_j1", "reference solver", "s", 6),
         Column("difference", digits=2), Column("estimated", digits=2),
     )  # fmt: skip

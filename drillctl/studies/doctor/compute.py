@@ -128,7 +128,7 @@ def _bounds(string: Drillstring, table: SimulationTable, fall: float) -> tuple[B
         ),
     ]
     if fall > 0.0:
-        reason = f"the friction falls by up to {fall:.4g} N m s/rad: one root at the bit"
+        reason = f"the friction falls by up to {fall:.4g} N*m*s/rad: one root at the bit"
         bounds.append(Bound("friction", STEEPEST * bit_inertia(string) / fall, reason))
     return tuple(bounds)
 

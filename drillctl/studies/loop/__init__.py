@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl import units
-from drillctl.store.tables import Column, Quantity, Table
+from drillctl.store.tables import Column, Quantity, Table, Unit
 from drillctl.studies.base import Option, Picture, Recipe, Run, Section, Study
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
         ("critical speed (stability changes)", result.critical_speed, "rad/s"),
         ("nearest weight at which stability changes", result.critical_weight_on_bit, "N"),
     )
-    return [[name, Quantity(value, unit), unit] for name, value, unit in rows]
+    return [[name, Quantity(value, unit), Unit(unit)] for name, value, unit in rows]
 
 
 def _margins(result: LoopAnalysis) -> list[list[Any]]:
@@ -91,7 +91,7 @@ def _margin_row(
 ) -> list[Any]:
     """A figure, and beside one that the mesh decides that of the exact string."""
     head, value, unit, name = row
-    own = [head, Quantity(value, unit), unit]
+    own = [head, Quantity(value, unit), Unit(unit)]
     if name not in limited:
         return [*own, "", ""]
     exact = limited[name]
@@ -141,7 +141,7 @@ def notes(result: LoopAnalysis) -> Iterator[str]:
         )
 
 
-def files(result: LoopAnalysis, folder: Path) -> None:
+def files(result: LoopAnalysis, folder: Path, system: units.System) -> None:
     """The linear models for MATLAB and NumPy."""
     from drillctl.linear.export import write_matrices
 

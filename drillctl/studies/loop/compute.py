@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drillctl import plots
+from drillctl import plots, units
 from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.ensemble.grid import axes_of
@@ -82,7 +82,7 @@ def loop_pictures(result: LoopAnalysis) -> Iterator[Picture]:
         "mobility",
         "Mobility at bit and top: speed per torque, of the string alone and in the loop.",
         "Bode plot of the mobility at bit and top; sharp peaks of the string alone are flattened "
-        "in the loop near its first mode.", lambda system: _mobility(design),
+        "in the loop near its first mode.", lambda system: _mobility(design, system),
     )  # fmt: skip
     if any(design.linear_drive.gains()):
         if bit.path is None or bit.path.observer is None:
@@ -94,22 +94,23 @@ def loop_pictures(result: LoopAnalysis) -> Iterator[Picture]:
             "impedance",
             "Impedance of the drive and what it reflects; vertical line: the stick-slip frequency.",
             "Drive impedance and reflection coefficient over frequency, the stick-slip frequency "
-            "marked.", lambda system: _impedance(design),
+            "marked.", lambda system: _impedance(design, system),
         )  # fmt: skip
 
 
-def _mobility(design: Design) -> Figure:
+def _mobility(design: Design, system: units.System) -> Figure:
     frequencies = telling_frequencies(design.string)
     strings = [frequency_response(design, frequencies)]
     if design.string.parts.modal_damping == 0.0:
         strings.append(frequency_response(design, frequencies, model="wave"))
     closed = frequency_response(design, frequencies, "closed_loop")
-    return plots.mobility([*strings, closed])
+    return plots.mobility([*strings, closed], system=system)
 
 
-def _impedance(design: Design) -> Figure:
+def _impedance(design: Design, system: units.System) -> Figure:
     mark = stick_slip_frequency(design.string) / (2.0 * math.pi)
-    return plots.drive_impedance(drive_impedance(design), marks={"stick-slip": mark})
+    marks = {"stick-slip": mark}
+    return plots.drive_impedance(drive_impedance(design), marks=marks, system=system)
 
 
 def _of_loop(result: LoopAnalysis) -> Iterator[Picture]:
@@ -131,7 +132,7 @@ def _of_loop(result: LoopAnalysis) -> Iterator[Picture]:
     yield Picture(
         "closed-loop", "Bode plot from the set speed to the speeds of top and bit.",
         "Magnitude and phase from the set speed to top speed and bit speed.",
-        lambda system: plots.bode(closed()),
+        lambda system: plots.bode(closed(), system=system),
     )  # fmt: skip
     yield Picture(
         "nyquist",

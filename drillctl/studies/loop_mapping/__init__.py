@@ -42,7 +42,11 @@ def pictures(result: LoopMap) -> Iterator[Picture]:
     if len(result.axes) != 2:
         return
     best = result.best
-    largest = "" if best is None else f" The largest is {best[0]:.4g} N m s."
+    largest = (
+        ""
+        if best is None
+        else f" The largest is {units.full(best[0], result.unit('slope_margin'), 4)}."
+    )
     yield Picture(
         "slope-margin", "Slope margin over the map: the falling slope that the loop tolerates.",
         f"Map of the slope margin; {int(result.stable.sum())} of {result.stable.size} cells are "

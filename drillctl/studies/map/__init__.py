@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
-from drillctl.store.tables import Column, Table, quantity
+from drillctl.store.tables import Column, Table, place
 from drillctl.studies.base import (
     Check,
     Option,
@@ -20,7 +20,6 @@ from drillctl.studies.base import (
     audited,
     doubted,
     mapped_in_batch,
-    spelled,
 )
 
 if TYPE_CHECKING:
@@ -62,7 +61,8 @@ def tables(result: Sweep) -> Iterator[Table]:
     )  # fmt: skip
     from drillctl.ensemble.grid import place_of
 
-    yield from audit_tables(result.audit, lambda cell: spelled(place_of(result.axes, cell)))
+    unit_of = {axis.path: axis.unit for axis in result.axes}
+    yield from audit_tables(result.audit, lambda cell: place(place_of(result.axes, cell), unit_of))
 
 
 def pictures(result: Sweep) -> Iterator[Picture]:
@@ -84,23 +84,23 @@ def pictures(result: Sweep) -> Iterator[Picture]:
         yield Picture(
             "responses", "Speeds of bit and top drive at cells of growing J1.",
             "Time responses at the best cell and at cells of growing J1.",
-            lambda system: _responses(result),
+            lambda system: _responses(result, system),
         )  # fmt: skip
 
 
-def _responses(result: Sweep) -> Any:
+def _responses(result: Sweep, system: units.System) -> Any:
     from drillctl.ensemble.sweeps import responses
 
-    return plots.time_response(responses(result), paths=[axis.path for axis in result.axes])
+    paths = [axis.path for axis in result.axes]
+    return plots.time_response(responses(result), paths=paths, system=system)
 
 
 def remarks(result: Sweep, system: units.System) -> Iterator[str]:
     """Minimum, audit and time."""
     if result.minimum is not None:
         value, at = result.minimum
-        units_of = {axis.path: axis.unit for axis in result.axes}
-        place = ", ".join(f"{path} {quantity(x, units_of[path], system)}" for path, x in at.items())
-        yield f"minimum J1 {value:.3f} s at {place}"
+        where = place(at, {axis.path: axis.unit for axis in result.axes})
+        yield f"minimum J1 {value:.3f} s at {units.told(where, system)}"
     for name, one in result.over_yield.items():
         yield (
             f"peak torque of the uppermost pipe: up to {one['largest_share']:.0%} of the torsional "
@@ -125,11 +125,11 @@ def notes(result: Sweep) -> Iterator[str]:
     yield from doubted(result.audit)
 
 
-def files(result: Sweep, folder: Path) -> None:
+def files(result: Sweep, folder: Path, system: units.System) -> None:
     """Every cell with its measures."""
     from drillctl.ensemble.sweeps import write_cells
 
-    write_cells(result, folder / "map.csv")
+    write_cells(result, folder / "map.csv", system)
 
 
 def check(design: Design) -> None:

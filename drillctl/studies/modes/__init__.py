@@ -76,7 +76,7 @@ def pictures(result: Modes) -> Iterator[Picture]:
         "bode", "Bode plot of the string without control, from the top torque to both speeds.",
         "Magnitude and phase of top speed and bit speed per top torque over frequency.",
         lambda system: plots.bode(
-            frequency_response(design.string, telling_frequencies(design.string))
+            frequency_response(design.string, telling_frequencies(design.string)), system=system
         ),
     )  # fmt: skip
     yield Picture(

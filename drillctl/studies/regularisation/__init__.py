@@ -40,7 +40,7 @@ def pictures(result: Regularisation) -> Iterator[Picture]:
     yield Picture(
         "regularisation", "Change of J1 by smoothing the friction, against the width of tanh.",
         "Median and largest change of J1 over the cells of the map against the width.",
-        lambda system: plots.regularisation(result),
+        lambda system: plots.regularisation(result, system=system),
     )  # fmt: skip
 
 

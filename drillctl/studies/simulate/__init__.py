@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from drillctl import plots, units
 from drillctl.simulation.measures import MEASURES
-from drillctl.store.tables import Column, Quantity, Table, number
+from drillctl.store.tables import Column, Quantity, Table, Unit, number
 from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Study, in_batch
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def computed(design: Design, run: Run) -> Simulation:
 def tables(result: Simulation) -> Iterator[Table]:
     """Measures, status and engine."""
     rows: list[list[Any]] = [
-        [one.label, Quantity(getattr(result.measures, one.name), one.unit), one.unit]
+        [one.label, Quantity(getattr(result.measures, one.name), one.unit), Unit(one.unit)]
         for one in MEASURES.values()
         # Some are measured of compared cases alone.
         if hasattr(result.measures, one.name) and one.name not in HIDDEN
@@ -79,7 +79,7 @@ def pictures(result: Simulation) -> Iterator[Picture]:
     yield Picture(
         "time-response", "Speeds of bit and top drive over time; grey where the bit stands still.",
         f"Time response: {result.status.replace('_', ' ')}, J1 {j1}.",
-        lambda system: plots.time_response(result),
+        lambda system: plots.time_response(result, system=system),
     )  # fmt: skip
 
 

@@ -30,7 +30,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
-from drillctl.store.tables import Column, Estimate, Quantity, Table, chance, number, percent
+from drillctl.store.tables import (
+    Column,
+    Estimate,
+    Quantity,
+    Table,
+    Unit,
+    chance,
+    number,
+    percent,
+    place,
+    quantity,
+)
 from drillctl.studies.base import (
     Check,
     Option,
@@ -44,7 +55,6 @@ from drillctl.studies.base import (
     audited,
     doubted,
     in_batch,
-    spelled,
 )
 
 if TYPE_CHECKING:
@@ -53,6 +63,7 @@ if TYPE_CHECKING:
     from drillctl.studies.tune.compute import Tune
 
 
+SLOPE = "N*m*s/rad"
 SHOWN = ("q50", "q95", "q99")  # quantiles of J1 that people are shown
 
 
@@ -96,7 +107,7 @@ def _tolerance(result: Tune) -> Table:
         ends = (one.low, one.high) if kept else (None, None)
         numbers = (one.value, *ends, tuned.low, tuned.high)
         cells = [Quantity(value, one.unit) for value in numbers]
-        rows.append([one.path, one.unit, *cells, one.low_at_bound, one.high_at_bound])
+        rows.append([one.path, Unit(one.unit), *cells, one.low_at_bound, one.high_at_bound])
     columns = (
         Column("parameter"), Column("unit", hidden=True), Column("value", digits=6),
         Column("low", "down to", digits=6), Column("high", "up to", digits=6),
@@ -163,21 +174,23 @@ def remarks(result: Tune, system: units.System) -> Iterator[str]:
                 f"realizations of the search, which has {search.value:.4g} s from {share:.1%} of "
                 "them"
             )
-    yield from _certified(result)
+    yield from _certified(result, system)
     yield (
         f"search: {search.trajectories:,} trajectories at {search.realizations} realizations, "
         f"{search.seconds:.1f} s; certificate: {certificate.trajectories:,} trajectories, "
         f"{certificate.seconds:.1f} s; {result.total_seconds:.1f} s in all"
     )
-    yield result.message
+    yield units.told(result.message, system)
 
 
-def _certified(result: Tune) -> Iterator[str]:
+def _certified(result: Tune, system: units.System) -> Iterator[str]:
     """Worst draw, draws without a rig, requirements, margins, audit."""
     certificate = result.certificate
     if (worst := certificate.worst) is not None:
-        drawn = spelled({path: v[worst] for path, v in certificate.drawn.items()})
-        yield f"worst realization (SI): J1 {certificate.runs.j1[worst]:.4g} s at {drawn}"
+        unit_of = {one.path: one.unit for one in certificate.draws}
+        drawn = place({path: v[worst] for path, v in certificate.drawn.items()}, unit_of)
+        where = units.told(drawn, system)
+        yield f"worst realization: J1 {certificate.runs.j1[worst]:.4g} s at {where}"
     for failure in certificate.failures:
         yield (
             f"{failure.count} draws that no rig has count as over the level; {failure.reason}: "
@@ -187,9 +200,10 @@ def _certified(result: Tune) -> Iterator[str]:
         yield f"at the fresh realizations {name} is missed by {missed:.2%} of its limit"
     if margins := certificate.margins:
         disk = margins["disk_margin"] or {"gain_db": None, "phase_deg": None}
+        margin, slope = (quantity(margins[x], SLOPE, system) for x in ("slope_margin", "slope"))
         yield (
-            f"loop: slope margin {number(margins['slope_margin'], 4)} N m s/rad (the rock has "
-            f"{number(margins['slope'], 4)}), disk margins {number(disk['gain_db'], 3)} dB and "
+            f"loop: slope margin {margin} (the rock has {slope}), "
+            f"disk margins {number(disk['gain_db'], 3)} dB and "
             f"{number(disk['phase_deg'], 3)} deg, peak sensitivity "
             f"{number(margins['peak_sensitivity'], 3)}"
         )
@@ -215,7 +229,7 @@ def notes(result: Tune) -> Iterator[str]:
     yield from doubted(result.certificate.audit)
 
 
-def files(result: Tune, folder: Path) -> None:
+def files(result: Tune, folder: Path, system: units.System) -> None:
     """The design with its tuned gains, ready to run, the result on top as comments."""
     from drillctl.design import to_toml
     from drillctl.store.json_files import write_text

@@ -27,7 +27,7 @@ from drillctl.studies.tune.certificate import Certificate, FreshDraws, FreshRuns
 from drillctl.studies.tune.linear_design import linear_design
 from drillctl.studies.tune.problem import PRICE, GainProblem
 from drillctl.studies.tune.search import Tuning, search, search_problem
-from drillctl.studies.tune.tuned import Tuned, by_path, tuned_parameters
+from drillctl.studies.tune.tuned import Tuned, by_path, spelled, tuned_parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +70,7 @@ class Tune(Result, kind="tune"):
         result = self.certificate.message + self._nearer
         if self.tuning.share < self.certificate.required:
             return f"{self.tuning.message}; {result}"
-        at = ", ".join(f"{path} = {value:.6g}" for path, value in self.gains.items())
-        return f"{result}; the closest is {at}"
+        return f"{result}; the closest is {spelled(self.tuning.tuned, self.tuning.values)}"
 
     @property
     def _nearer(self) -> str:
@@ -101,9 +100,10 @@ class Tune(Result, kind="tune"):
                 continue
             if not _allowed(self.design, one.path, further):
                 continue
+            at, end_, beyond = (units.full(x, one.unit) for x in (value, end, further))
             texts.append(
-                f"{one.path} = {value:.6g} lies at the end of its range, {end:.6g}: better values "
-                f"may lie beyond; search as far as {further:.6g} with [tune.parameters]"
+                f"{one.path} = {at} lies at the end of its range, {end_}: better values "
+                f"may lie beyond; search as far as {beyond} with [tune.parameters]"
             )
         return tuple(texts)
 

@@ -68,6 +68,7 @@ from drillctl.studies.tune.tuned import (
     designs_at,
     drive_numbers,
     put,
+    spelled,
     spread,
     tuned_parameters,
     unmet,
@@ -479,15 +480,15 @@ def linear_design(
 
 
 def _message(best: LoopsState, missed: dict[str, float]) -> str:
-    at = ", ".join(f"{k} = {v:.6g}" for k, v in by_path(best.problem.tuned, best.values).items())
+    at = spelled(best.problem.tuned, best.values)
     if missed:
         return unmet(at, missed)
     if best.excess < 0.0:
         return (
             f"no gains between these bounds are stable: at the best gains, {at}, the slope of the "
-            f"rock exceeds the slope margin by {-best.excess:.4g} N m s/rad"
+            f"rock exceeds the slope margin by {-best.excess:.4g} N*m*s/rad"
         )
-    return f"largest slope margin at {at}: {best.excess:.4g} N m s/rad above the slope of the rock"
+    return f"largest slope margin at {at}: {best.excess:.4g} N*m*s/rad above the slope of the rock"
 
 
 def _starts(problem: Loops) -> list[LoopsState]:

@@ -41,6 +41,7 @@ from drillctl.studies.tune.tuned import (
     TunedGains,
     by_path,
     put,
+    spelled,
     spread,
     tuned_parameters,
     unmet,
@@ -225,7 +226,7 @@ def _linear(design: Design, verbose: bool) -> Array | None:
 
 
 def _message(problem: GainProblem, best: Point, missed: dict[str, float]) -> str:
-    at = ", ".join(f"{k} = {v:.6g}" for k, v in by_path(problem.tuned, best.values).items())
+    at = spelled(problem.tuned, best.values)
     table = problem.table
     if missed:
         return unmet(at, missed) + " of its limit"

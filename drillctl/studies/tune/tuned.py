@@ -183,6 +183,14 @@ class TunedGains:
         return folder
 
 
+def spelled(tuned: tuple[Tuned, ...], values: Array) -> str:
+    """Tuned values in words, in full units."""
+    return ", ".join(
+        f"{one.path} = {units.full(float(value), one.unit)}"
+        for one, value in zip(tuned, values, strict=True)
+    )
+
+
 def unmet(at: str, missed: Mapping[str, float]) -> str:
     """A sentence about requirements that are missed at the closest point."""
     worst = max(missed, key=lambda key: missed[key])

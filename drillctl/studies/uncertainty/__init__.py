@@ -15,7 +15,16 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from drillctl import plots, units
 from drillctl.errors import InputError
-from drillctl.store.tables import Column, Estimate, Table, chance, number, open_estimate
+from drillctl.store.tables import (
+    Column,
+    Estimate,
+    Table,
+    Told,
+    chance,
+    number,
+    open_estimate,
+    place,
+)
 from drillctl.studies.base import (
     SEED,
     Check,
@@ -31,7 +40,6 @@ from drillctl.studies.base import (
     doubted,
     in_batch,
     mapped_in_batch,
-    spelled,
 )
 
 if TYPE_CHECKING:
@@ -76,8 +84,9 @@ def tables(result: Uncertainty) -> Iterator[Table]:
     """Areas of the regions, best cells, Sobol indices, and how areas settle."""
     yield _areas("areas", "share of the map by probability (95 % interval)", result)
     for k, (value, one) in enumerate(result.slices().items(), start=1):
-        title = f"the same at {result.axes[2].path} = {value:g} {result.axes[2].unit}".rstrip()
-        yield _areas(f"areas-{k}", title, one)
+        last = result.axes[2]
+        named = Told(f"the same at {last.path} = {units.full(value, last.unit)}")
+        yield _areas(f"areas-{k}", named, one)
     yield _best(result)
     if result.sensitivity is not None:
         yield indices(result)
@@ -92,10 +101,10 @@ def tables(result: Uncertainty) -> Iterator[Table]:
     ]
     title = "areas of the inner regions against the number of draws"
     yield Table("convergence", title, columns, rows, shown=False)
-    cells = result.nominal.size
+    cells, unit_of = result.nominal.size, {axis.path: axis.unit for axis in result.axes}
     yield from audit_tables(
         result.audit,
-        lambda lane: f"draw {lane // cells}, {spelled(result.at(lane % cells))}",
+        lambda lane: f"draw {lane // cells}, {place(result.at(lane % cells), unit_of)}",
     )
 
 
@@ -148,7 +157,7 @@ def indices(result: Uncertainty) -> Table:
     )  # fmt: skip
     rows = [
         [
-            one.of, path,
+            Told(one.of), path,
             *(float(x[k]) for x in (one.first, one.first_error, one.total, one.total_error)),
         ]
         for one in sensitivity.indices
@@ -178,7 +187,7 @@ def pictures(result: Uncertainty) -> Iterator[Picture]:
         yield Picture(
             "sensitivity", "First and total Sobol indices with their intervals.",
             "Bars of first and total index for each uncertain parameter.",
-            lambda system: plots.sensitivity_bars(result),
+            lambda system: plots.sensitivity_bars(result, system=system),
         )  # fmt: skip
 
 
@@ -236,11 +245,11 @@ def notes(result: Uncertainty) -> Iterator[str]:
     yield from doubted(result.audit)
 
 
-def files(result: Uncertainty, folder: Path) -> None:
+def files(result: Uncertainty, folder: Path, system: units.System) -> None:
     """Cells, draws and contours."""
     from drillctl.studies.uncertainty.compute import write_columns_of
 
-    write_columns_of(result, folder)
+    write_columns_of(result, folder, system)
 
 
 def audited_as_profile(request: Requested) -> Design:

@@ -27,7 +27,7 @@ from drillctl.ensemble.sweeps import kept_measures, sweep
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
 from drillctl.store.json_files import replaced
-from drillctl.store.tables import headed, texts, write_columns
+from drillctl.store.tables import headed, in_columns, write_columns
 from drillctl.studies.uncertainty import sensitivity as indices
 from drillctl.studies.uncertainty.result import (
     Look,
@@ -308,25 +308,29 @@ class Interim:
         self._next = time.monotonic() + self._every
 
 
-def write_columns_of(result: Uncertainty, folder: Path) -> None:
-    """Write what has many rows (SI): `cells.csv`, `draws.csv`, and `contours.csv` on request."""
-    columns: dict[str, Array] = {}
+def write_columns_of(result: Uncertainty, folder: Path, system: units.System) -> None:
+    """Write what has many rows: `cells.csv`, `draws.csv`, and `contours.csv` on request."""
+    figures: list[tuple[str, Array, str]] = []
     for level, one in result.maps.items():
         ends = dict(zip(("", "_low", "_high"), (one.probability, *one.interval), strict=True))
-        columns |= {f"probability_{level:g}{end}": values for end, values in ends.items()}
-    columns |= {f"j1_{name} (s)": values for name, values in result.known.items()}
-    columns["nominal_j1 (s)"] = result.nominal
-    cells = over_axes(result.axes) | {name: texts(v) for name, v in columns.items()}
+        figures += [(f"probability_{level:g}{end}", share, "1") for end, share in ends.items()]
+    figures += [(f"j1_{name}", values, "s") for name, values in result.known.items()]
+    figures.append(("nominal_j1", result.nominal, "s"))
+    cells = over_axes(result.axes, system) | in_columns(figures, system)
     write_columns(folder / "cells.csv", cells)
     unit_of = {one.path: one.unit for one in uncertain_parameters(result.design)}
-    draws = {headed(path, unit_of[path]): texts(v) for path, v in result.drawn.items()}
-    write_columns(folder / "draws.csv", draws)
+    drawn = ((path, values, unit_of[path]) for path, values in result.drawn.items())
+    write_columns(folder / "draws.csv", in_columns(drawn, system))
     if result.design.tables.uncertainty.contours:
-        heads = ["level (s)", "realization", "polygon", "ring"]
-        heads += [headed(a.path, a.unit) for a in result.axes]
-        rows = [[f"{one}" for one in row] for row in _contours(result)]
-        columns_ = zip(*rows, strict=True) if rows else [[] for _ in heads]
-        write_columns(folder / "contours.csv", dict(zip(heads, columns_, strict=True)))
+        heads = {"level": "s", "realization": "1", "polygon": "1", "ring": "1"}
+        heads |= {axis.path: axis.unit for axis in result.axes}
+        rows = list(_contours(result))
+        columns = zip(*rows, strict=True) if rows else [[] for _ in heads]
+        written = {
+            headed(name, unit, system): [f"{units.filed(one, unit, system)[0]}" for one in values]
+            for (name, unit), values in zip(heads.items(), columns, strict=True)
+        }
+        write_columns(folder / "contours.csv", written)
 
 
 def _contours(result: Uncertainty) -> Iterator[tuple[Any, ...]]:
