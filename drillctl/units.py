@@ -404,6 +404,11 @@ def filed(value: Any, si_unit: str, system: System) -> tuple[Any, str]:
     return (value, plain) if system == "si" else displayed(value, si_unit, system)
 
 
+def filed_text(text: str, system: System) -> str:
+    """A text with quantities in full as a CSV file has it."""
+    return str(text) if system == "si" else told(text, system)
+
+
 def full(value: float, si_unit: str, digits: int = 6) -> str:
     """A quantity in a text, for `told`."""
     return f"{value:.{digits}g} {'' if si_unit == '1' else si_unit}".rstrip()
@@ -427,6 +432,6 @@ def _plain(unit: str) -> str:
 
 
 _QUANTITY = re.compile(
-    rf"(?<![\w.])({_NUMBER}) ({'|'.join(map(re.escape, sorted(_KNOWN, key=len, reverse=True)))})"
+    rf"(?<![\w.-])({_NUMBER}) ({'|'.join(map(re.escape, sorted(_KNOWN, key=len, reverse=True)))})"
     r"(?![\w*/^])"
 )

@@ -236,7 +236,7 @@ def _field(value: Cell, si_unit: str, system: units.System) -> Any:
     if isinstance(value, Unit):
         return units.filed(1.0, value, system)[1] or str(value)
     if isinstance(value, Told):
-        return units.told(value, system)
+        return units.filed_text(value, system)
     return value
 
 

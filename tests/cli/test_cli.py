@@ -338,6 +338,18 @@ def test_units_of_tables(call):
     assert call("map", DESIGN, "--units", "furlongs")[0] == 2
 
 
+def test_units_of_a_design_hold_unless_others_are_asked_for(call):
+    Path("mine.toml").write_text(f'schema = 1\nmodel = "{DESIGN}"\nunits = "field"\n')
+    code, out, err = call("modes", "mine.toml", "--out", "run")
+    assert (code, "of (ft)" in out) == (0, True), err
+    assert Path("run/mesh.csv").read_text().startswith("section,elements,element_length (ft),")
+    code, out, err = call("modes", "mine.toml", "--out", "run", "--units", "si")
+    assert (code, "of (m)" in out) == (0, True)  # no other run
+    assert "already done" in err
+    code, _, err = call("modes", "mine.toml", "--set", "units=imperial")
+    assert (code, "units: got 'imperial'; allowed: field, si" in err) == (2, True), err
+
+
 def test_threads_change_nothing(call):
     one = call("map", DESIGN, *SMALL, "--threads", "1", "--out", "one")
     assert one[0] == 0

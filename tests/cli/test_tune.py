@@ -85,7 +85,7 @@ def test_json_has_the_keys_of_the_contract_and_the_folder_all_files(quick, call)
     )
     assert shown[0] == 0
     assert "already done: r" in shown[2]
-    assert "N m s" in shown[1]  # gains stay as they are
+    assert "klbf ft/rpm" in shown[1]
     assert "tuned" in shown[1]
 
 

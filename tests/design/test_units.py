@@ -86,6 +86,26 @@ def test_text_is_read_in_its_unit(text, kind, si):
     assert units.parse(text, kind) == pytest.approx(si, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("text", "si", "field"),
+    [
+        ("Kp 200 N*m*s/rad", "Kp 200 N m s", "Kp 0.015447 klbf ft/rpm"),
+        ("at 140000 N, 12.5 rad/s", "at 140 kN, 119.37 rpm", "at 31.473 klbf, 119.37 rpm"),
+        ("3000 m of pipe, 33 s", "3000 m of pipe, 33 s", "9842.5 ft of pipe, 33 s"),
+        ("pipe-2 m, 5 min, N 3 mm", "pipe-2 m, 5 min, N 3 mm", "pipe-2 m, 5 min, N 3 mm"),
+    ],
+)
+def test_quantities_in_a_text_are_told_in_the_units_of_the_reader(text, si, field):
+    assert (units.told(text, "si"), units.told(text, "field")) == (si, field)
+
+
+def test_units_that_people_read_are_read_as_well():
+    for system in ("si", "field"):
+        for si_unit, unit in units._SHOWN[system].items():
+            for kind in (kind for kind in KINDS if kind.si == si_unit):
+                assert units.parse(f"2 {unit}", kind) == 2.0 * units._KNOWN[si_unit][unit]
+
+
 def test_a_drillers_fraction_is_not_a_product():
     assert units.parse("4 1/2 in", units.DIAMETER) == 0.1143
 

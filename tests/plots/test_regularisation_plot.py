@@ -16,7 +16,7 @@ def test_panels_show_the_shift_and_the_regions():
     )
     result = regularisation(drillctl.load("monteiro-trindade-140kn"), (0.1, 0.5), axes)
     left, right = plots.regularisation(result).axes
-    assert "rad/s" in left.get_xlabel()
+    assert "(rpm)" in left.get_xlabel()
     assert "%" in left.get_ylabel()
     median = left.get_lines()[0]
     np.testing.assert_allclose(median.get_ydata(), 100 * np.median(np.abs(result.shifts), (1, 2)))

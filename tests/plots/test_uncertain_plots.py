@@ -132,7 +132,7 @@ def test_bars_are_the_indices(result):
     one = result.sensitivity.indices[0]
     widths = [bar.get_width() for bar in figure.axes[0].patches]
     np.testing.assert_allclose(widths, [*one.first, *one.total])
-    assert figure.axes[0].get_title(loc="left").startswith("J1 at Kp 600, Ki 100")
+    assert figure.axes[0].get_title(loc="left").startswith("J1 at Kp 600 N m s, Ki 100 N m")
 
 
 def test_axes_may_be_given(result):

@@ -59,7 +59,7 @@ def test_units_of_the_field_and_axes_of_others(result):
     figure = Figure()
     axes = figure.subplots(1, 2)
     assert plots.weight_delay(result, ax=axes, system="field") is figure
-    assert any("klbf s/rad" in str(x.get_label()) for x in axes[0].get_lines())
+    assert any("klbf/rpm" in str(x.get_label()) for x in axes[0].get_lines())
     with pytest.raises(InputError, match="needs 2 axes"):
         plots.weight_delay(result, ax=axes[:1])
 

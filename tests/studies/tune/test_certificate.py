@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl import units
 from drillctl.design import to_toml
 from drillctl.ensemble.audit import by_reference
 from drillctl.ensemble.cases import share_interval
@@ -287,7 +288,9 @@ def test_its_section_of_a_report_holds_its_message_tables_and_pictures(found, tm
                 SECTIONS["tuning"].build(gathered)
             continue
         blocks = SECTIONS["tuning"].build(gathered)
-    assert found.message in {block.text for block in blocks if isinstance(block, Text)}
+    assert units.told(found.message, "si") in {
+        block.text for block in blocks if isinstance(block, Text)
+    }
     tables = {block.name: block for block in blocks if isinstance(block, Table)}
     assert set(tables) - {"verge"} == {"tolerance", "baselines"}
     assert tables["tolerance"].rows[0][:2] == (
@@ -342,11 +345,11 @@ def test_values_at_the_end_of_their_range_are_reported_with_a_wider_one(found):
         )
 
     (kp,) = at(799.0, 100.0).on_bounds
-    assert "controller.kp = 799 lies at the end of its range, 800" in kp
-    assert "as far as 1800 with" in kp  # what the rig suggests
+    assert "controller.kp = 799 N*m*s/rad lies at the end of its range, 800 N*m*s/rad" in kp
+    assert "as far as 1800 N*m*s/rad with" in kp  # what the rig suggests
     (low,) = at(401.0, 0.0).on_bounds  # less than 0 is no gain
     assert "controller.kp = 401" in low
-    assert "as far as 0 with" in low
+    assert "as far as 0 N*m*s/rad with" in low
     assert list(notes(at(799.0, 199.0)))[:2] == list(at(799.0, 199.0).on_bounds)
 
 
