@@ -4,6 +4,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := runs/demo
+DEMO_PARTS := simulate modes loop map
+# What is never imported need not be compiled: 15 instead of 44 s of processor time.
+INSTALL := $(BIN)/python -m pip install --quiet --no-compile
 
 .PHONY: demo test test-all test-lowest lint format docs bench reports clean
 
@@ -11,20 +14,22 @@ DEMO := runs/demo
 $(VENV)/product: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=24"
-	$(BIN)/python -m pip install --quiet -e .
+	$(INSTALL) -e .
 	@touch $@
 
 $(VENV)/test $(VENV)/lint $(VENV)/docs $(VENV)/bench: $(VENV)/%: $(VENV)/product
-	$(BIN)/python -m pip install --quiet -e ".[$*]"
+	$(INSTALL) -e ".[$*]"
 	@touch $@
 
 # The source paper's case: modes, loop, one run, the J1 map; figures, data and summaries.
 demo: $(VENV)/product
-	$(BIN)/drillctl modes monteiro-trindade-140kn --out $(DEMO)/modes
-	$(BIN)/drillctl loop monteiro-trindade-140kn --out $(DEMO)/loop
-	$(BIN)/drillctl simulate monteiro-trindade-140kn --out $(DEMO)/simulate
-	$(BIN)/drillctl map monteiro-trindade-140kn --out $(DEMO)/map
+	@$(MAKE) --no-print-directory -j 2 $(DEMO_PARTS:%=demo-%)
 	@echo "pictures, data and summaries: $(CURDIR)/$(DEMO)"
+
+demo-%:
+	$(BIN)/drillctl $* monteiro-trindade-140kn --out $(DEMO)/$*
+
+demo-map: demo-simulate  # which compiles the solver that both need
 
 test: $(VENV)/test
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow"
