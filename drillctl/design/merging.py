@@ -32,7 +32,9 @@ WHOLE = ("tune.parameters",)
 """Tables that say what there is to do: the upper layer's stands in place of the lower one's."""
 
 
-def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
+def overlay(
+    base: Tree, top: Mapping[str, Any], path: str = "", whole: tuple[str, ...] = WHOLE
+) -> Tree:
     """Return `base` with `top` laid over it.
 
     Tables merge key by key, sections by name (a new name is added at the bottom). A table
@@ -62,10 +64,10 @@ def overlay(base: Tree, top: Mapping[str, Any], path: str = "") -> Tree:
         below = merged.get(key)
         if place == "drillstring.sections" and isinstance(value, list):
             merged[key] = _overlay_sections(below, value)
-        elif place in WHOLE:
+        elif place in whole:
             merged[key] = value
         elif isinstance(value, Mapping) and isinstance(below, Mapping):
-            merged[key] = overlay(dict(below), value, place)
+            merged[key] = overlay(dict(below), value, place, whole)
         else:
             merged[key] = value
     return merged
@@ -130,7 +132,9 @@ def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
             tree = {**tree, "controller": controller.model_dump(exclude={"drive"})}
         if "weight_on_bit" not in tree and path.startswith("weight_on_bit."):
             tree = {**tree, "weight_on_bit": {"law": "constant"}}
-        tree = overlay(tree, branch(path, values[path], tree))
+        # A value within such a table is set in what stands there.
+        whole = tuple(place for place in WHOLE if not path.startswith(f"{place}."))
+        tree = overlay(tree, branch(path, values[path], tree), whole=whole)
     return tree
 
 

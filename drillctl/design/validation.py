@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from difflib import get_close_matches
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -89,11 +90,10 @@ def _reported(problem: Any, tree: Tree) -> InputError:
     if kind == "extra_forbidden":
         *parents, key = problem["loc"]
         allowed = sorted(_keys_at(tuple(parents)))
-        homes = [
-            f"[{home}]"
-            for home in _homes(DesignTables, str(key))
-            if home != ".".join(map(str, parents))
-        ]
+        here = ".".join(map(str, parents))
+        misspelt = get_close_matches(str(key), allowed, n=1, cutoff=0.85)
+        homes = [] if misspelt else _homes(DesignTables, str(key))
+        homes = [f"[{home}]" for home in homes if home != here]
         elsewhere = f"; it stands in {' or '.join(homes[:3])}" if homes else ""
         return InputError(f"unknown key{elsewhere}; {nearest(str(key), allowed)}", where)
     if kind == "missing":

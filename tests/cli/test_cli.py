@@ -867,19 +867,13 @@ def test_a_reader_that_leaves_and_a_poor_terminal():
 
 
 def test_a_request_to_terminate_says_how_to_resume(tmp_path):
-    words = [
-        "map",
-        DESIGN,
-        "--axis",
-        "controller.kp=0:1000:300",
-        "--axis",
-        "controller.ki=0:500:300",
-    ]
+    axes = [f"--axis=controller.{gain}:300" for gain in ("kp=0:1000", "ki=0:500")]
+    words = ["map", DESIGN, *axes]
     with subprocess.Popen(
         [sys.executable, "-m", "drillctl", *words, "--audit", "0", "--out", str(tmp_path / "run")],
         stderr=subprocess.PIPE, text=True,
     ) as running:  # fmt: skip
-        while not any((tmp_path / "run").glob("blocks/*.npz")):
+        while not any((tmp_path / "run").glob("blocks/map/0*.npz")):
             assert running.poll() is None
             time.sleep(0.02)
         running.send_signal(signal.SIGTERM)

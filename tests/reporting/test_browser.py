@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 from collections.abc import Iterator
@@ -137,6 +138,13 @@ def place(seen: Seen, i: int, j: int, within: float = 0.5) -> tuple[float, float
     return box["x"] + across * box["width"], box["y"] + (1.0 - up) * box["height"]
 
 
+# N m s/rad in klbf ft/rpm, N m/rad in klbf ft/rev
+FOOT_POUND = 1.3558179483314
+PER_RPM, PER_TURN = math.pi / 30 / FOOT_POUND / 1e3, 2 * math.pi / FOOT_POUND / 1e3
+CELLS = r"Kp (\S+) klbf ft/rpm, Ki (\S+) klbf ft/rev: J1 (\S+) s, (.*)"
+CELL = f"Kp {400 * PER_RPM:.4g} klbf ft/rpm, Ki {200 * PER_TURN:.4g} klbf ft/rev"
+
+
 def test_pointing_at_a_cell_tells_its_values(seen, small):
     import drillctl
 
@@ -144,9 +152,9 @@ def test_pointing_at_a_cell_tells_its_values(seen, small):
     for i, j, within in ((0, 0, 0.5), (4, 3, 0.04), (2, 1, 0.5), (1, 1, 0.96), (3, 2, 0.04)):
         seen.page.mouse.move(*place(seen, i, j, within))
         kp, ki = swept.axes[0].values[i], swept.axes[1].values[j]
-        told = re.fullmatch(r"Kp (\S+) N m s, Ki (\S+) N m: J1 (\S+) s, (.*)", seen.values())
-        assert float(told[1]) == kp
-        assert float(told[2]) == ki
+        told = re.fullmatch(CELLS, seen.values())
+        assert float(told[1]) == pytest.approx(kp * PER_RPM, rel=1e-3)
+        assert float(told[2]) == pytest.approx(ki * PER_TURN, rel=1e-3)
         assert float(told[3]) == pytest.approx(swept.j1[i, j], rel=1e-3)
         mark = seen.page.locator(".over .cell").bounding_box()
         x, y = place(seen, i, j)
@@ -159,7 +167,7 @@ def test_a_click_shows_the_response_of_that_cell(seen):
     first = seen.shown()
     seen.page.mouse.click(*place(seen, 0, 3))
     assert seen.shown() != first
-    assert "Kp 400 N m s, Ki 200 N m" in seen.shown()
+    assert CELL in seen.shown()
     lines = seen.page.locator(".trace svg path")
     assert lines.count() == 2
     assert len(lines.first.get_attribute("d")) > 2000
@@ -174,9 +182,9 @@ def test_the_keyboard_does_the_same(seen):
     for _ in range(9):
         seen.page.keyboard.press("ArrowLeft")
         seen.page.keyboard.press("ArrowUp")
-    assert seen.values().startswith("Kp 400 N m s, Ki 200 N m")
+    assert seen.values().startswith(CELL)
     seen.page.keyboard.press("Enter")
-    assert "Kp 400 N m s, Ki 200 N m" in seen.shown()
+    assert CELL in seen.shown()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -256,8 +256,9 @@ def test_rows_have_two_registers_of_the_machine(features, lanes):
 
 
 def test_a_run_that_nobody_can_mean_is_refused_with_the_count():
-    with pytest.raises(drillctl.errors.InputError, match=r"1e\+11 steps of 1 ns .*at most 1e\+08"):
-        measured(paper(600, 100, 140, **{"simulation.step": "1 ns"}))
+    long = {"simulation.duration": "1000 s", "simulation.step": "1 us"}
+    with pytest.raises(drillctl.errors.InputError, match=r"1e\+09 steps of 1 us .*at most 1e\+08"):
+        measured(paper(600, 100, 140, **long))
     sampled = {"controller.drive": {"sampling_period": "1 ns"}}
     with pytest.raises(drillctl.errors.InputError, match="sampling_period"):
         measured(paper(600, 100, 140, **sampled))
@@ -350,15 +351,18 @@ def test_who_is_given_up_does_not_depend_on_company():
 
 
 def test_a_string_kept_for_resumed_runs_comes_back_whole(tmp_path):
-    from drillctl.ensemble.storing import stored_string
+    from drillctl.ensemble.storing import Folder
+    from drillctl.ensemble.sweeps import Cells
 
+    job = Cells(paper(600, 100, 140), (), ("j1",))
     sampled = {"controller.drive": {"sampling_period": "20 ms", "torque_limit": "30 kN*m"}}
     for number, values in enumerate(({}, sampled, {"bha.damping": "50 N*m*s"})):
         design = paper(600, 100, 140, **SHORT, **values)
         lanes = single_lane(design)
         made = prepare(lanes, design.tables.simulation)
-        stored_string(tmp_path, number, lambda made=made: made)
-        back = stored_string(tmp_path, number, lambda: pytest.fail("prepared twice"))
+        blocks = Folder(tmp_path)("map", job)
+        blocks.prepared(number, lambda made=made: made)
+        back = blocks.prepared(number, lambda: pytest.fail("prepared twice"))
         assert back.scheme == made.scheme
         assert type(back.stepper.string) is type(made.stepper.string)
         assert measures_of(run_batch(lanes, back), 0) == measures_of(run_batch(lanes, made), 0)

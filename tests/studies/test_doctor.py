@@ -143,7 +143,7 @@ def test_a_step_that_is_impossible_is_an_error():
 def test_a_design_without_gains_is_a_sample_of_one():
     found = examined(
         "navarro-lopez-2dof", None,
-        **{"controller.law": "constant-torque", "controller.torque": "9 kN*m",
+        **{"controller.law": "constant-torque", "controller.torque": "0 N*m",
            "simulation.duration": "20 s"},
     )  # fmt: skip
     assert found.axes == ()
