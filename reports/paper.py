@@ -191,7 +191,7 @@ def _figures(found: dict[str, Any]) -> list[tuple[str, str, str]]:
             "reference solver.",
         ),
         (
-            "Table 2 and Figure 6: uncertain friction", f"{unsure}/uncertain-regions.png",
+            "Table 2 and Figure 6: uncertain friction", f"{unsure}/regions.png",
             "a1 and a2 lognormal about their printed values, 5 %; 10 draws as in the paper, whose "
             "own draws are not printed.",
         ),
