@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design, Parameter, parameter
@@ -140,6 +139,8 @@ def correlation_root(table: UncertaintyTable, paths: tuple[str, ...]) -> Array |
 
 def correlated(points: Mapping[str, Array], root: Array) -> dict[str, Array]:
     """Points with the dependence of a Gaussian copula."""
+    from scipy.special import ndtr, ndtri
+
     scores = [ndtri(column) for column in points.values()]
     results = {}
     for path, weights in zip(points, root, strict=True):
@@ -187,6 +188,8 @@ class Uncertain:
             number = np.ceil(probabilities * len(self.samples)).astype(int) - 1
             return np.asarray(self.samples)[np.maximum(number, 0)]
         if self.distribution == "lognormal":  # the usual one, without the wait for `stats`
+            from scipy.special import ndtri  # a quarter of a second that a check of a file can save
+
             spread, scale = self._lognormal_numbers
             return np.asarray(np.exp(spread * ndtri(probabilities)) * scale)
         return np.asarray(self.law().ppf(probabilities), dtype=float)
