@@ -250,9 +250,10 @@ def _decide(rig: Any, time: float, phase: int, what: int, state: Any, unused: An
         return -1
     holding = f.rates_of(rig, time, f.STUCK, state, unused)
     slack = 1.0 + 1e-12 if what == AT_STOP else 1.0
-    if what == BY_ITSELF and phase == f.STUCK:
-        slack = 0.0
-    if abs(holding) <= f.static_torque(rig, time, state) * slack:
+    # A bit that was held is not held again at once: where a rock without weight bears no torque,
+    # and there is none, the phase would end for ever.
+    released = what == BY_ITSELF and phase == f.STUCK
+    if not released and abs(holding) <= f.static_torque(rig, time, state) * slack:
         return f.STUCK
     return 1 if holding > 0.0 else -1
 

@@ -134,3 +134,14 @@ def test_a_changed_rock_is_another_law():
 def test_bad_programs_are_refused(values, message):
     with pytest.raises(InputError, match=message):
         drillctl.load(DESIGN, **(FIXED | {"simulation.duration": "60 s"} | values))
+
+
+def test_a_string_at_rest_off_bottom_waits_for_its_drive():
+    """Neither weight nor torque: nothing holds the bit, and nothing moves it, for five seconds."""
+    design = drillctl.load("start-up-140kn")
+    exact = drillctl.simulate(design)
+    assert exact.measures.sticks <= 1
+    assert exact.measures.peak_bit_speed > 9.0
+    assert exact.energy.relative_residual < 1e-8
+    batch = drillctl.simulate(design, engine="batch")
+    assert batch.measures.j1 == pytest.approx(exact.measures.j1, rel=1e-3)
