@@ -9,7 +9,8 @@ import difflib
 import os
 import stat
 import tomllib
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -113,21 +114,27 @@ def find_model(model: str, design: Path) -> Path:
 
 def _file(text: str) -> Path:
     """The file at a path, or the reason why there is none."""
-    try:
+    with _reasons(shown(text)):  # unreadable, ~nobody, null byte
         path = Path(text).expanduser()
         if path.is_file():
             return path
-        if path.exists():
-            raise InputError(_not_regular(path.stat().st_mode), text)
+        mode = path.stat().st_mode if path.exists() else None
         beside = [p.stem for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-    except InputError:
-        raise
-    except (OSError, RuntimeError, ValueError) as error:  # unreadable, ~nobody, null byte
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot be read: {reason}", shown(text)) from None
+    if mode is not None:
+        raise InputError(_not_regular(mode), text)
     close = difflib.get_close_matches(path.stem, beside, n=1)
     hint = f"; did you mean '{close[0]}.toml'?" if close else ""
     raise InputError(f"no such file{hint}", text)
+
+
+@contextmanager
+def _reasons(where: str) -> Iterator[None]:
+    """Report why a file cannot be read."""
+    try:
+        yield
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"cannot be read: {reason}", where) from None
 
 
 def _at_once(path: str, flags: int) -> int:
@@ -155,17 +162,11 @@ def read_bytes(path: Path, where: str) -> bytes:
     InputError
         It cannot be read, is a folder, a pipe or a device, or is larger than 16 MiB.
     """
-    try:
-        with open(path, "rb", opener=_at_once) as stream:
-            mode = os.fstat(stream.fileno()).st_mode
-            if not stat.S_ISREG(mode):
-                raise InputError(_not_regular(mode), where)
-            data = stream.read(MOST_BYTES + 1)
-    except InputError:
-        raise
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot be read: {reason}", where) from None
+    with _reasons(where), open(path, "rb", opener=_at_once) as stream:
+        mode = os.fstat(stream.fileno()).st_mode
+        data = stream.read(MOST_BYTES + 1) if stat.S_ISREG(mode) else b""
+    if not stat.S_ISREG(mode):
+        raise InputError(_not_regular(mode), where)
     if len(data) > MOST_BYTES:
         raise InputError(f"is larger than {MOST_BYTES // 2**20} MiB", where)
     return data
