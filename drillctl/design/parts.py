@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,7 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 from drillctl import units
-from drillctl.design.tables import DesignTables, SectionTable
+from drillctl.design.tables import DesignTables, SectionTable, SpeedProgramTable, WeightProgramTable
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.law import changed_rock, form_of, friction_laws
@@ -26,7 +27,7 @@ from drillctl.rig.drillstring.catalogue import HWDP_YIELD, Homogenised, homogeni
 from drillctl.rig.drillstring.mesh import MeshedSection, meshed, what_was_done
 from drillctl.rig.drillstring.mud import jointed_drag
 from drillctl.rig.drillstring.section import torsional_yield
-from drillctl.rig.program import STILL, Program, Ramp
+from drillctl.rig.program import MOST_RAMPS, STILL, Path, Program, Ramp
 from drillctl.rig.table import MOST_TORQUE, SPRING, WHEEL
 from drillctl.rig.top_drive.ideal import ConstantTorqueTable
 from drillctl.rig.top_drive.law import DriveTable
@@ -275,7 +276,7 @@ def weight_on_bit(tables: DesignTables) -> WeightLaw:
 def weight_moves(tables: DesignTables) -> bool:
     """Whether the weight on bit changes while the bit drills, by its law or by the clock."""
     by_law = weight_laws()[tables.weight_on_bit.law].moves
-    return by_law or tables.scenario.weight_on_bit.start is not None
+    return by_law or bool(_points(tables.scenario.weight_on_bit))
 
 
 def bit_rock_before(tables: DesignTables) -> BitRockLaw:
@@ -322,42 +323,75 @@ def program(tables: DesignTables) -> Program:
     for name, table in (("speed", scenario.speed), ("weight_on_bit", scenario.weight_on_bit)):
         if table.start is None and table.end > 0.0:
             raise InputError("is missing: what the program starts from", f"scenario.{name}.start")
-        if table.end >= duration:
+        key, end = ("points", table.points[-1][0]) if table.points else ("end", table.end)
+        if end >= duration:
             raise InputError(
-                f"{table.end:g} s: the run ends at {duration:g} s, before the final value",
-                f"scenario.{name}.end",
+                f"{end:g} s: the run ends at {duration:g} s, before the final value",
+                f"scenario.{name}.{key}",
             )
-    if scenario.bit_rock.until >= duration:
-        raise InputError(
-            f"{scenario.bit_rock.until:g} s: the run ends at {duration:g} s",
-            "scenario.bit_rock.until",
-        )
-    rock = scenario.bit_rock
-    if rock.until == 0.0 and (rock.static_factor, rock.sliding_factor, rock.decay_factor) != (
-        1,
-        1,
-        1,
-    ):
-        raise InputError(
-            "is missing: when the rock becomes the design's own", "scenario.bit_rock.until"
-        )
+    _refuse_rock_program(tables)
     period = tables.controller.drive.sampling_period
     if period >= duration:
         raise InputError(
             f"{period:g} s: the run ends at {duration:g} s", "controller.drive.sampling_period"
         )
-    speed = weight = STILL
-    if scenario.speed.start is not None:
-        first = scenario.speed.start - point.speed
-        speed = Ramp(first, scenario.speed.begin, scenario.speed.end)
-    if scenario.weight_on_bit.start is not None:
-        if point.weight_on_bit == 0.0:
-            raise InputError(
-                "must be > 0: final weight of the program", "operating_point.weight_on_bit"
-            )
-        first = scenario.weight_on_bit.start / point.weight_on_bit - 1.0
-        weight = Ramp(first, scenario.weight_on_bit.begin, scenario.weight_on_bit.end)
-    return Program(speed, weight, scenario.bit_rock.until)
+    if point.weight_on_bit == 0.0 and _points(scenario.weight_on_bit):
+        raise InputError(
+            "must be > 0: final weight of the program", "operating_point.weight_on_bit"
+        )
+    load = point.weight_on_bit
+    speed = _ramps(scenario.speed, point.speed, 1.0, "speed")
+    weight = _ramps(scenario.weight_on_bit, load, load, "weight_on_bit")
+    until, lag = scenario.bit_rock.until, scenario.speed.lag if speed else 0.0
+    if len(speed) > 1 or len(weight) > 1 or lag:
+        return Program(Path.of(speed, lag), Path.of(weight), until)
+    return Program((speed or [STILL])[0], (weight or [STILL])[0], until)
+
+
+def _refuse_rock_program(tables: DesignTables) -> None:
+    rock, duration = tables.scenario.bit_rock, tables.simulation.duration
+    if rock.until >= duration:
+        raise InputError(
+            f"{rock.until:g} s: the run ends at {duration:g} s", "scenario.bit_rock.until"
+        )
+    factors = (rock.static_factor, rock.sliding_factor, rock.decay_factor)
+    if rock.until == 0.0 and factors != (1, 1, 1):
+        raise InputError(
+            "is missing: when the rock becomes the design's own", "scenario.bit_rock.until"
+        )
+
+
+AnyProgram = SpeedProgramTable | WeightProgramTable
+
+
+def _points(table: AnyProgram) -> tuple[tuple[float, Any], ...]:
+    """Points of a program, `set` the last; none where nothing moves."""
+    if table.start is not None:
+        return (table.begin, table.start), (table.end, "set")
+    return table.points
+
+
+def _ramps(table: AnyProgram, final: float, unit: float, where: str) -> list[Ramp]:
+    """What the way of a value to the final one is the sum of, in a unit.
+
+    A piece is a ramp to zero from what it changes by, as what follows it adds up to the rest.
+    """
+    points = [(time, final if value == "set" else value) for time, value in _points(table)]
+    if points and not math.isclose(points[-1][1], final, rel_tol=1e-9):
+        raise InputError(
+            f"the last value must be that of operating_point.{where}; write it as 'set'",
+            f"scenario.{where}.points",
+        )
+    ramps = [
+        Ramp(a / unit - b / unit, begin, end)
+        for (begin, a), (end, b) in itertools.pairwise(points)
+        if a != b
+    ]
+    if len(ramps) > MOST_RAMPS:
+        raise InputError(
+            f"{len(ramps)} changes; allowed are {MOST_RAMPS}", f"scenario.{where}.points"
+        )
+    return ramps
 
 
 def drive_of(tables: DesignTables) -> DriveTable:

@@ -6,6 +6,7 @@ the class that holds both.
 
 from __future__ import annotations
 
+import itertools
 import math
 from importlib import import_module
 from importlib.util import find_spec
@@ -410,35 +411,55 @@ class StartTable(Table):
         return self
 
 
-def _refuse_backwards(begin: float, end: float) -> None:
-    if end < begin:
-        raise InputError(f"end {end:g} s must not come before begin {begin:g} s")
+class ProgramTable(Table):
+    """How a value comes to that of the operating point."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _points_alone(cls, value: object) -> object:
+        return {"points": value} if isinstance(value, list | tuple) else value
+
+    @model_validator(mode="after")
+    def _in_order(self) -> ProgramTable:
+        start, begin, end, points = (
+            getattr(self, key) for key in ("start", "begin", "end", "points")
+        )
+        if end < begin:
+            raise InputError(f"end {end:g} s must not come before begin {begin:g} s")
+        if points and (begin or end or start is not None):
+            raise InputError("points is not allowed with start, begin and end: give one of the two")
+        for (before, _), (time, _) in itertools.pairwise(points):
+            if time < before:
+                raise InputError(f"points: {time:g} s must not come after {before:g} s")
+        return self
 
 
-class SpeedProgramTable(Table):
-    """Set speed: `start` up to `begin`, the operating speed from `end` on, straight between."""
+class SpeedProgramTable(ProgramTable):
+    """Set speed: `start` up to `begin`, the operating speed from `end` on, straight between.
+
+    Or `points` of time and speed, straight between them, a step where a time stands twice; the
+    last is the operating speed, which may be written `set`. `[scenario] speed = [["0 s", "0 rpm"],
+    ["30 s", "set"]]` is the same. `lag`: time constant of first order behind which the drive
+    follows all that.
+    """
 
     start: q.Speed | None = None
     begin: q.TimeOrZero = 0.0
     end: q.TimeOrZero = 0.0
-
-    @model_validator(mode="after")
-    def _in_order(self) -> SpeedProgramTable:
-        _refuse_backwards(self.begin, self.end)
-        return self
+    points: tuple[tuple[q.TimeOrZero, Literal["set"] | q.Speed], ...] = ()
+    lag: q.Lag = 0.0
 
 
-class WeightProgramTable(Table):
-    """Nominal weight: `start` up to `begin`, that of the operating point from `end` on."""
+class WeightProgramTable(ProgramTable):
+    """Nominal weight: `start` up to `begin`, that of the operating point from `end` on.
+
+    Or `points` of time and weight, as with the speed.
+    """
 
     start: q.Weight | None = None
     begin: q.TimeOrZero = 0.0
     end: q.TimeOrZero = 0.0
-
-    @model_validator(mode="after")
-    def _in_order(self) -> WeightProgramTable:
-        _refuse_backwards(self.begin, self.end)
-        return self
+    points: tuple[tuple[q.TimeOrZero, Literal["set"] | q.Weight], ...] = ()
 
 
 class RockProgramTable(Table):

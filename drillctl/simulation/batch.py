@@ -93,7 +93,7 @@ def _turns(lanes: Lanes) -> Array:
     """Times (s) at which a program begins, ends or jumps, each once."""
     program = lanes.program
     moments = [np.where(program.rock_until > 0.0, program.rock_until, 0.0)]
-    for ramp in (program.speed, program.weight):
+    for ramp in (*program.speed.ramps, *program.weight.ramps):
         moments += [np.where(ramp.first != 0.0, time, 0.0) for time in (ramp.begin, ramp.end)]
     result = np.unique(np.concatenate(moments))
     return result[result > 0.0]

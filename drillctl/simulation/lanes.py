@@ -126,7 +126,8 @@ class Lanes:
 
     def _weights(self) -> Any:
         """Weights (N) that a law which does not act at once may ask for."""
-        over = 1.0 + np.maximum(self.program.weight.first, 0.0)
+        # Ramps of both signs: not more than what all that fall make of it.
+        over = 1.0 + sum(np.maximum(ramp.first, 0.0) for ramp in self.program.weight.ramps)
         if not hasattr(self.weight, "gain"):
             return self.weight[0] * over
         speeds = self.set_speed * np.linspace(0.0, 8.0, SPEEDS)[:, None]
@@ -135,7 +136,9 @@ class Lanes:
     @property
     def weight_at_rest(self) -> Array:
         """Weight on a bit at rest at time zero (N)."""
-        over = 1.0 + np.where(self.program.weight.end > 0.0, self.program.weight.first, 0.0)
+        over = 1.0 + sum(
+            np.where(ramp.end > 0.0, ramp.first, 0.0) for ramp in self.program.weight.ramps
+        )
         nominal = self.weight[0] * over
         if isinstance(self.weight, AlarmWeight):
             return np.asarray(nominal)
@@ -146,8 +149,8 @@ class Lanes:
 
 
 def kinds(design: Design) -> tuple[Any, ...]:
-    """What lanes that run together have in common: types of the laws, and whether they sample."""
-    laws = (design.bit_rock, design.top_drive, design.weight_on_bit)
+    """What lanes that run together have in common: types of laws and programs, and sampling."""
+    laws = (design.bit_rock, design.top_drive, design.weight_on_bit, design.program.speed)
     return (*(type(law) for law in laws), getattr(design.weight_on_bit, "period", 0.0) > 0.0)
 
 

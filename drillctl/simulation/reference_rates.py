@@ -22,7 +22,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from drillctl.arrays import Array
-from drillctl.rig.program import Ramp
+from drillctl.rig.program import MOST_RAMPS, Ramp
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.top_drive.real_drive import MEMORY, SAMPLED_MEMORY, respond, respond_held, sample
 from drillctl.simulation import kernel_cache
@@ -109,6 +109,7 @@ TOP_ANGLE, TOP_SPEED, NEXT_ANGLE, NEXT_SPEED, BIT_ANGLE, BIT_SPEED, LAST_ANGLE =
 
 _ramp = from_numbers(Ramp)
 _ramp_at, _ramp_integral = jitted(Ramp.at), jitted(Ramp.integral)
+_late_at = jitted(Ramp.late_at)
 _real, _sampled = from_numbers(RealDrive), from_numbers(SampledDrive)
 _respond, _respond_held, _sample = jitted(respond), jitted(respond_held), jitted(sample)
 MEMORIES = (0, len(MEMORY), len(SAMPLED_MEMORY))  # numbers of memory of each kind of drive
@@ -404,12 +405,38 @@ def past(rig: Any, time: float) -> float:
 
 
 @compiled
+def _path_at(numbers: Any, time: float) -> float:
+    """`Path.at`, or `Ramp.at` where zeros follow its numbers."""
+    lag, total = numbers[3 * MOST_RAMPS], 0.0
+    for k in range(0, 3 * MOST_RAMPS, 3):
+        if numbers[k] == 0.0:
+            break
+        ramp = _ramp(numbers[k : k + 3])
+        total += _ramp_at(ramp, time) if lag == 0.0 else _late_at(ramp, lag, time)
+    return total
+
+
+@compiled
+def _path_integral(numbers: Any, time: float) -> float:
+    """`Path.integral`, likewise."""
+    lag, total = numbers[3 * MOST_RAMPS], 0.0
+    for k in range(0, 3 * MOST_RAMPS, 3):
+        if numbers[k] == 0.0:
+            break
+        ramp = _ramp(numbers[k : k + 3])
+        total += _ramp_integral(ramp, time)
+        if lag != 0.0:
+            total -= lag * (_late_at(ramp, lag, time) - ramp.first)
+    return total
+
+
+@compiled
 def _nominal(rig: Any, time: float) -> float:
     """Nominal weight (N), the first number of any law, under its program."""
     program = law(rig, WEIGHT_PROGRAM)
     if program[0] == 0.0:
         return law(rig, WEIGHT)[0]
-    return law(rig, WEIGHT)[0] * (1.0 + _ramp_at(_ramp(program), time))
+    return law(rig, WEIGHT)[0] * (1.0 + _path_at(program, time))
 
 
 @compiled
@@ -552,10 +579,10 @@ def drive_torque(rig: Any, time: float, state: Any, free: float, gain: float, ra
     n, numbers, program = rig.nodes, law(rig, DRIVE), law(rig, SPEED_PROGRAM)
     angle, speed, lead = state[0], state[n], 0.0
     if program[0] != 0.0:
-        lead = _ramp_at(_ramp(program), time)
+        lead = _path_at(program, time)
     if rig.drive_kind == IDEAL:
         if program[0] != 0.0:
-            angle -= _ramp_integral(_ramp(program), time)
+            angle -= _path_integral(program, time)
         return _drive_law(rig, numbers, angle, speed - lead, 0.0, 0.0)
     first = 2 * n + WORKS
     memory = state[first : first + rig.drive_states]
@@ -578,7 +605,7 @@ def sample_drive(rig: Any, time: float, state: Any) -> None:
     """Let a sampled controller work."""
     n, first = rig.nodes, 2 * rig.nodes + WORKS
     speed, memory = state[n], state[first : first + rig.drive_states]
-    lead = _ramp_at(_ramp(law(rig, SPEED_PROGRAM)), time)
+    lead = _path_at(law(rig, SPEED_PROGRAM), time)
     after = _sample(_sampled(law(rig, DRIVE)), memory, speed, lead, speed + rig.set_speed)
     for i in range(9):
         memory[i] = after[i]

@@ -10,6 +10,7 @@ import scipy.linalg
 
 from drillctl.arrays import Array
 from drillctl.linear.observer import Observer
+from drillctl.rig.program import Path
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
 from drillctl.simulation.lanes import Start
@@ -169,9 +170,11 @@ def observer_step(observer: Observer | None, step: float, start: Start) -> Any:
 
 def program_step(program: Any) -> Any:
     """The kernel's form of the programs of all lanes; nothing where none moves."""
-    from drillctl.simulation.kernels.program_step import NoProgram, Programs
+    from drillctl.simulation.kernels.program_step import LongPrograms, NoProgram, Programs
 
-    moves = np.any(program.speed.first != 0.0) or np.any(program.weight.first != 0.0)
+    ramps = (*program.speed.ramps, *program.weight.ramps)
+    moves = any(np.any(ramp.first != 0.0) for ramp in ramps)
     if not moves and not np.any(program.rock_until > 0.0):
         return NoProgram(np.zeros(1))
-    return Programs(*(*program.speed, *program.weight, program.rock_until))
+    kind: Any = LongPrograms if isinstance(program.speed, Path) else Programs
+    return kind(*program.speed, *program.weight, program.rock_until)

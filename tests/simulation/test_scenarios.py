@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.integrate
 
 import drillctl
+from drillctl import units
 from drillctl.errors import InputError
 from drillctl.rig.program import NONE, Ramp
 
@@ -28,13 +30,28 @@ SPEED = {"scenario.speed": {"start": "0 rpm", "begin": "2 s", "end": "22 s"}, "s
 WEIGHT = {"scenario.weight_on_bit": {"start": "20 kN", "begin": "25 s", "end": "40 s"}}
 STEP = {"scenario.weight_on_bit": {"start": "120 kN", "begin": "30 s", "end": "30 s"}}
 JUMP = {"scenario.speed": {"start": "80 rpm", "begin": "30 s", "end": "30 s"}}
+STOP = [
+    ["0 s", "100 rpm"],
+    ["10 s", "100 rpm"],
+    ["15 s", "0 rpm"],
+    ["30 s", "0 rpm"],
+    ["40 s", "set"],
+]
+CONNECTION = {"scenario.speed": {"points": STOP, "lag": "1 s"}}
+WEIGHTS = {"scenario.weight_on_bit": [["0 s", "20 kN"], ["20 s", "80 kN"], ["30 s", "set"]]}
+LATE = {"scenario.speed": {"start": "0 rpm", "lag": "1 s"}, "start.kind": "rest"}
 ROCK = {"scenario.bit_rock": {"until": "30 s", "static_factor": 0.9, "sliding_factor": 0.95}}
 
 
-@pytest.mark.parametrize("name", ["start-up", "weight step", "speed step", "rock"])
-def test_engines_agree(name):
-    values = {"start-up": SPEED | WEIGHT, "weight step": STEP, "speed step": JUMP, "rock": ROCK}
-    design = rig(**values[name], **{"simulation.step": "5 ms"})
+RUNS = {
+    "start-up": SPEED | WEIGHT, "weight step": STEP, "speed step": JUMP, "rock": ROCK,
+    "connection": CONNECTION | WEIGHTS, "set speed behind a lag": LATE,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("values", RUNS.values(), ids=RUNS)
+def test_engines_agree(values):
+    design = rig(**values, **{"simulation.step": "5 ms"})
     batch, reference = (
         drillctl.simulate(design, engine=e).measures for e in ("batch", "reference")
     )
@@ -43,7 +60,7 @@ def test_engines_agree(name):
     assert batch.mean_weight_on_bit == pytest.approx(reference.mean_weight_on_bit, rel=1e-4)
 
 
-@pytest.mark.parametrize("values", [STEP, JUMP, ROCK])
+@pytest.mark.parametrize("values", [STEP, JUMP, ROCK, LATE])
 def test_jumps_cost_no_order(values):
     expected = drillctl.simulate(rig(**values)).measures.j1
     apart = [
@@ -96,6 +113,39 @@ def test_a_ramp_and_its_integral():
     assert (jump.at(1.999), jump.at(2.0), jump.integral(5.0)) == (1.0, 0.0, 2.0)
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.7])
+def test_a_path_goes_through_its_points_behind_its_lag(lag):
+    """Against the lag's differential equation, integrated with steps that meet every corner."""
+    points = [["1 s", "40 rpm"], ["3 s", "90 rpm"], ["3 s", "20 rpm"], ["5 s", "20 rpm"]]
+    program = {"points": [*points, ["8 s", "set"]], "lag": f"{lag} s"}
+    path = rig(**{"scenario.speed": program}).program.speed
+    times = np.linspace(0.0, 12.0, 12001)
+    corners = [0.0, 1.0, 3.0, 3.0 + 1e-12, 5.0, 8.0, 12.0]
+    inputs = np.interp(times, corners, np.array([40, 40, 90, 20, 20, 100, 100]) - 100.0)
+    expected = inputs * units.RPM
+    if lag:
+        decay = np.exp(-1e-3 / lag)
+        for k in range(1, len(times)):
+            # Exact for an input that is straight over the step; the jump at 3 s is before it.
+            begin = inputs[k - 1] if times[k - 1] != 3.0 else -80.0
+            rise = (inputs[k] if times[k] != 3.0 else -10.0) - begin
+            straight = begin + rise - rise * lag / 1e-3 * (1.0 - decay)
+            expected[k] = expected[k - 1] * decay + units.RPM * (straight - begin * decay)
+    values = np.array([path.at(t) for t in times])
+    apart = np.abs(values - expected)
+    assert np.delete(apart, 3000).max() < 1e-9
+    sums = [path.integral(t) for t in times[::500]]
+    whole = scipy.integrate.cumulative_trapezoid(values, times, initial=0.0)[::500]
+    # The trapezoidal rule sees the jump a step late without a lag.
+    assert np.abs(np.array(sums) - whole).max() < (1e-5 if lag else 6e-3)
+
+
+def test_a_program_of_two_points_is_the_table():
+    points = [["2 s", "0 rpm"], ["22 s", "100 rpm"]]
+    assert rig(**{"scenario.speed": points}).program == rig(**SPEED).program
+    assert rig(**{"scenario.speed": {"points": points}}).program == rig(**SPEED).program
+
+
 def test_a_changed_rock_is_another_law():
     design = rig(**ROCK)
     before, after = design.bit_rock_before, design.bit_rock
@@ -121,6 +171,26 @@ def test_a_changed_rock_is_another_law():
             "scenario.bit_rock.static_factor: static torque would be less",
         ),
         ({"scenario.bit_rock": {"static_factor": 0.9}}, "scenario.bit_rock.until: is missing"),
+        (
+            {"scenario.speed": [["0 s", "0 rpm"], ["20 s", "80 rpm"]]},
+            "scenario.speed.points: the last value must be that of operating_point.speed; write",
+        ),
+        (
+            {"scenario.speed": [["9 s", "0 rpm"], ["2 s", "set"]]},
+            "scenario.speed: points: 2 s must not come after 9 s",
+        ),
+        (
+            {"scenario.speed": [["0 s", "0 rpm"], ["90 s", "set"]]},
+            "scenario.speed.points: 90 s: the run ends at 60 s",
+        ),
+        (
+            {"scenario.speed": [[f"{k} s", f"{k % 2} rpm"] for k in range(10)] + [["11 s", "set"]]},
+            "scenario.speed.points: 10 changes; allowed are 8",
+        ),
+        (
+            {"scenario.speed": {"points": [["0 s", "0 rpm"], ["2 s", "set"]], "end": "3 s"}},
+            "points is not allowed with start, begin and end",
+        ),
         ({"scenario.sped": {}}, "scenario.sped: unknown key; did you mean 'speed'"),
         (
             {

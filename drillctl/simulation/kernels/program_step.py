@@ -5,11 +5,15 @@ What changes by the clock: set speed, nominal weight, rock.
 
 from __future__ import annotations
 
+import functools
+import operator
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 from drillctl.rig.bit_rock import contact
+from drillctl.rig.program import Path, Ramp
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import any_of, exp, law_at, least, load_block
+from drillctl.simulation.kernels.arithmetic import any_of, exp, law_at, least, load_block, most
 from drillctl.simulation.kernels.vectors import at, pick, put, when
 from drillctl.simulation.kernels.weight_step import acting
 
@@ -21,7 +25,7 @@ class NoProgram(NamedTuple):
 
 
 class Programs(NamedTuple):
-    """`drillctl.rig.program.Program` of every lane."""
+    """`drillctl.rig.program.Program` of every lane, of two `Ramp`s."""
 
     # set speed less the final one (rad/s) up to a time, zero from a time on (s)
     speed_first: Any
@@ -34,6 +38,11 @@ class Programs(NamedTuple):
     rock_until: Any  # time until which the rock is another one (s)
 
 
+_PATHS: list[str] = [f"{name}_{field}" for name in ("speed", "weight") for field in Path._fields]
+LongPrograms: Any = namedtuple("LongPrograms", [*_PATHS, "rock_until"])  # type: ignore[misc]
+"""The same where a value goes through several ramps, or behind a lag: two `Path`s."""
+
+NO_LAG = 1e-12  # time constant (s) in the place of none under a line
 ROUNDING = 1e-6  # share of a step by which a moment that falls on its end may miss it
 
 
@@ -47,7 +56,7 @@ def begin_program(program: Any, before: Any, work: Any, first: Any) -> None:
 def _first_rows(program: Any, before: Any, work: Any, first: Any) -> None:
     load_block(program, work, r.PROGRAM, first)
     law = law_at(program, work, r.PROGRAM)
-    put(work, r.LEAD, _value(law.speed_first, law.speed_begin, law.speed_end, 0.0))
+    put(work, r.LEAD, _value(_speed(law), 0.0))
     put(work, r.NOMINAL, at(work, r.WEIGHT))
     _set_nominal(law, work, 0.0)
     load_block(before, work, r.FRICTION, first)
@@ -62,18 +71,59 @@ def advance_program(
     return _move(program, friction, weight, work, first, begin, step)
 
 
-def _value(first: Any, begin: Any, end: Any, time: Any) -> Any:
-    """A ramp to zero, at a time; of a step, the value after it."""
-    ramp = pick(begin >= time, first, first * (end - time) / (end - begin))
-    return pick(end <= time, 0.0, ramp)
+def _speed(law: Any) -> Any:
+    """Ramp or path of the set speed."""
+    return Ramp(*law[:3]) if isinstance(law, Programs) else Path(*law[: len(Path._fields)])
 
 
-def _integral(first: Any, begin: Any, end: Any, time: Any) -> Any:
+def _weight(law: Any) -> Any:
+    """Ramp or path of the nominal weight."""
+    return Ramp(*law[3:6]) if isinstance(law, Programs) else Path(*law[len(Path._fields) : -1])
+
+
+def _value(path: Any, time: Any) -> Any:
+    """A ramp or path at a time; of a step, the value after it."""
+    if isinstance(path, Path):
+        return _sum(_late_value(ramp, path.lag, time) for ramp in path.ramps)
+    return _ramp_value(path, time)
+
+
+def _integral(path: Any, time: Any) -> Any:
     """Its integral from zero."""
+    if isinstance(path, Path):
+        return _sum(_late_integral(ramp, path.lag, time) for ramp in path.ramps)
+    return _ramp_integral(path, time)
+
+
+def _sum(values: Any) -> Any:
+    return functools.reduce(operator.add, values)
+
+
+def _ramp_value(ramp: Any, time: Any) -> Any:
+    first, begin, end = ramp
+    sloped = pick(begin >= time, first, first * (end - time) / (end - begin))
+    return pick(end <= time, 0.0, sloped)
+
+
+def _ramp_integral(ramp: Any, time: Any) -> Any:
+    first, begin, end = ramp
     level = first * least(begin, time)
     passed = least(end, time) - begin
     sloped = first * passed * (1.0 - 0.5 * passed / (end - begin))
     return level + pick((begin < time) & (end > begin), sloped, 0.0)
+
+
+def _late_value(ramp: Any, lag: Any, time: Any) -> Any:
+    """`Ramp.late_at` where there is a lag, else the ramp itself."""
+    first, begin, end = ramp
+    plain, rate = _ramp_value(ramp, time), 1.0 / most(lag, NO_LAG)
+    behind = first * lag / (end - begin) * (1.0 - exp((begin - least(end, time)) * rate))
+    behind = pick(end > begin, behind, first) * exp((end - most(end, time)) * rate)
+    return pick(lag > 0.0, pick(begin >= time, first, plain + behind), plain)
+
+
+def _late_integral(ramp: Any, lag: Any, time: Any) -> Any:
+    return _ramp_integral(ramp, time) - lag * (_late_value(ramp, lag, time) - ramp.first)
 
 
 def _move(
@@ -82,13 +132,14 @@ def _move(
     # A moment that falls on the end of a step does so but for rounding.
     end, late = begin + step, ROUNDING * step
     law = law_at(program, work, r.PROGRAM)
-    put(work, r.LEAD, _value(law.speed_first, law.speed_begin, law.speed_end, begin + late))
-    put(work, r.SHIFT, _integral(law.speed_first, law.speed_begin, law.speed_end, begin))
-    put(work, r.SHIFT_NEW, _integral(law.speed_first, law.speed_begin, law.speed_end, end))
+    put(work, r.LEAD, _value(_speed(law), begin + late))
+    put(work, r.SHIFT, _integral(_speed(law), begin))
+    put(work, r.SHIFT_NEW, _integral(_speed(law), end))
     since, now = begin - step + late, begin + late
     changes = (law.rock_until > since) & (law.rock_until <= now)
-    jumps = (law.weight_end > since) & (law.weight_end <= now)
-    with when(any_of(changes | jumps)):
+    for ramp in _weight(law).ramps:
+        changes = changes | ((ramp.end > since) & (ramp.end <= now))
+    with when(any_of(changes)):
         _turn(program, friction, weight, work, first, now)
     _set_nominal(law, work, end - late)
 
@@ -110,5 +161,5 @@ def _turn(program: Any, friction: Any, weight: Any, work: Any, first: Any, now: 
 
 def _set_nominal(law: Any, work: Any, time: Any) -> None:
     """Nominal weight of the hour: the first number of every weight law."""
-    over = _value(law.weight_first, law.weight_begin, law.weight_end, time)
+    over = _value(_weight(law), time)
     put(work, r.WEIGHT, at(work, r.NOMINAL) * (1.0 + over))

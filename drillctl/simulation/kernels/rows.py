@@ -48,8 +48,8 @@ def _next(rows: int = 1) -> int:
 FRICTION = _next(32)
 DRIVE = _next(32)
 WEIGHT = _next(16)
-PROGRAM = _next(8)
-MOST_FIELDS = {FRICTION: 32, DRIVE: 32, WEIGHT: 16, PROGRAM: 8}
+PROGRAM = _next(52)
+MOST_FIELDS = {FRICTION: 32, DRIVE: 32, WEIGHT: 16, PROGRAM: 52}
 """Most numbers that a law may have, by where its rows begin."""
 
 # Constants of a lane.

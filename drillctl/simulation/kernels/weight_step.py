@@ -121,7 +121,7 @@ def stays(weight: Any, program: Any) -> bool:
 
 
 def _changes(program: Any) -> bool:
-    return hasattr(program, "weight_end")
+    return hasattr(program, "rock_until")
 
 
 def acting(weight: Any, work: Any) -> Any:

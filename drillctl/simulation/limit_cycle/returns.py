@@ -137,7 +137,7 @@ def long_run(
     design: Design, period: float, periods: int, start: Kind | None, tolerance: float
 ) -> Returns:
     """Simulate for many expected periods and take the returns of the second half."""
-    programmed = max(design.program.breaks(), default=0.0)  # the second half is to be free of it
+    programmed = design.program.settled  # the second half is to be free of it
     values: dict[str, Any] = {
         "simulation.duration": f"{max(period * periods, 2.0 * programmed)!r} s",
         "simulation.j1_from": "0 s",
