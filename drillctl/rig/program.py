@@ -73,9 +73,8 @@ class Ramp(NamedTuple):
 
 
 MOST_RAMPS = 8  # of a path: two connections, each down and up, and as many changes again
-_Numbers: Any = namedtuple(  # type: ignore[misc]
-    "_Numbers", [*(f"{name}_{k}" for k in range(MOST_RAMPS) for name in Ramp._fields), "lag"]
-)
+OF_A_PATH = (*(f"{name}_{k}" for k in range(MOST_RAMPS) for name in Ramp._fields), "lag")
+_Numbers: Any = namedtuple("_Numbers", OF_A_PATH)  # type: ignore[misc]
 
 
 class Path(_Numbers):

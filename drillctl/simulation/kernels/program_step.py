@@ -11,7 +11,7 @@ from collections import namedtuple
 from typing import Any, NamedTuple
 
 from drillctl.rig.bit_rock import contact
-from drillctl.rig.program import Path, Ramp
+from drillctl.rig.program import OF_A_PATH, Path, Ramp
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import any_of, exp, law_at, least, load_block, most
 from drillctl.simulation.kernels.vectors import at, pick, put, when
@@ -38,8 +38,10 @@ class Programs(NamedTuple):
     rock_until: Any  # time until which the rock is another one (s)
 
 
-_PATHS: list[str] = [f"{name}_{field}" for name in ("speed", "weight") for field in Path._fields]
-LongPrograms: Any = namedtuple("LongPrograms", [*_PATHS, "rock_until"])  # type: ignore[misc]
+LongPrograms: Any = namedtuple(  # type: ignore[misc]
+    "LongPrograms",
+    [*(f"{name}_{number}" for name in ("speed", "weight") for number in OF_A_PATH), "rock_until"],
+)
 """The same where a value goes through several ramps, or behind a lag: two `Path`s."""
 
 NO_LAG = 1e-12  # time constant (s) in the place of none under a line
@@ -73,12 +75,12 @@ def advance_program(
 
 def _speed(law: Any) -> Any:
     """Ramp or path of the set speed."""
-    return Ramp(*law[:3]) if isinstance(law, Programs) else Path(*law[: len(Path._fields)])
+    return Ramp(*law[:3]) if isinstance(law, Programs) else Path(*law[: len(OF_A_PATH)])
 
 
 def _weight(law: Any) -> Any:
     """Ramp or path of the nominal weight."""
-    return Ramp(*law[3:6]) if isinstance(law, Programs) else Path(*law[len(Path._fields) : -1])
+    return Ramp(*law[3:6]) if isinstance(law, Programs) else Path(*law[len(OF_A_PATH) : -1])
 
 
 def _value(path: Any, time: Any) -> Any:
