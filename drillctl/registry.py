@@ -35,6 +35,7 @@ WEIGHT_LAWS = (
 """Each module holds `LAWS`, a tuple of `drillctl.rig.weight_on_bit.law.WeightOnBitLaw`."""
 
 STUDIES: tuple[str, ...] = (
+    "drillctl.studies.log",
     "drillctl.studies.modes",
     "drillctl.studies.loop",
     "drillctl.studies.loop_mapping",

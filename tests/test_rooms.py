@@ -17,8 +17,8 @@ GROUND = (
     "arrays", "text", "units", "errors", "progress", "provenance", "registry", "catalog",
 )  # fmt: skip
 ROOMS = (
-    "drillctl", "ground", "rig", "design", "store", "linear", "simulation", "ensemble", "plots",
-    "studies", "reporting", "cli", "__main__",
+    "drillctl", "ground", "rig", "design", "store", "linear", "simulation", "logs", "ensemble",
+    "plots", "studies", "reporting", "cli", "__main__",
 )  # fmt: skip
 
 

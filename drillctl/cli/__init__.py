@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from drillctl.cli import files
 from drillctl.cli.app import app, run
-from drillctl.cli.verb import command
+from drillctl.cli.verb import command, log
 from drillctl.studies.base import Group, studies
 
 VERBS: dict[str, tuple[Callable[..., None], Group]] = {
@@ -19,6 +19,7 @@ VERBS: dict[str, tuple[Callable[..., None], Group]] = {
     "new": (files.new, "Describe a rig"),
     "show": (files.show, "Describe a rig"),
     "validate": (files.validate, "Describe a rig"),
+    "log": (log, "Describe a rig"),
     "report": (files.report, "Hand over"),
 }
 """Commands that are not studies, with their groups in the help."""

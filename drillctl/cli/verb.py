@@ -6,13 +6,27 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from drillctl import units
 from drillctl.cli import console
-from drillctl.cli.options import Common, command_of, warn, with_warnings
+from drillctl.cli.options import (
+    Common,
+    Debug,
+    Json,
+    Out,
+    Sets,
+    Threads,
+    Units,
+    Verbose,
+    command_of,
+    common_options,
+    loaded,
+    warn,
+    with_warnings,
+)
 from drillctl.errors import InputError
 from drillctl.store.json_files import replaced
 from drillctl.studies.base import Run, Study
@@ -31,6 +45,28 @@ def command(study: Study) -> Callable[..., None]:
     return command_of(
         study.name, study.help, study.options, partial(perform, study), study.axes, study.system
     )
+
+
+def log(
+    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Logs of one well.")],
+    design: Annotated[
+        str | None, typer.Option(metavar="DESIGN", help="Take string and columns from this rig.")
+    ] = None,
+    sets: Sets = None, out: Out = None, json: Json = False, threads: Threads = None,
+    units: Units = None, verbose: Verbose = False, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Read logs: faults, oscillations, windows ranked."""
+    from drillctl.design import parse_setting
+    from drillctl.studies.base import studies
+    from drillctl.studies.log.compute import stand_in
+
+    if design is None:
+        values = dict(parse_setting(text) for text in sets or [])
+        made = stand_in(Path(files[0]).stem, values)
+    else:
+        made = loaded(design, sets)
+    common = common_options(out, json, threads, units or made.tables.units, verbose, debug)
+    perform(studies()["log"], made, {"files": files, "known": design is not None}, common)
 
 
 def perform(study: Study, design: Design, options: dict[str, Any], common: Common) -> None:

@@ -60,6 +60,7 @@ class Option(NamedTuple):
     least: float | None = None
     opposite: str = ""  # name of the flag that says no
     formerly: str = ""  # flag of an earlier version, which does the same
+    files: bool = False  # whether it is a list of files, whose content makes a run another one
 
     @property
     def flag(self) -> str:
@@ -230,7 +231,7 @@ class Study:
     def settings(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """What a result depends on beside its design."""
         return {
-            one.name: options[one.name]
+            one.name: _stamped(options[one.name]) if one.files else options[one.name]
             for one in self.options
             if not (one.sets or one.how) and options.get(one.name, one.default) != one.default
         }
@@ -258,6 +259,12 @@ class Study:
         """Compute without a folder, as Python does; `progress` goes to the `Run`."""
         progress = options.pop("progress", SILENT)
         return self.computed(design, Run(self.defaults() | options, progress))
+
+
+def _stamped(files: Iterable[str | Path]) -> list[str]:
+    """Files by name, size and date: what tells one content from another."""
+    held = [(Path(file), Path(file).stat()) for file in files if Path(file).is_file()]
+    return [f"{file.resolve()} {about.st_size} {about.st_mtime_ns}" for file, about in held]
 
 
 @cache
