@@ -431,7 +431,8 @@ def _plain(unit: str) -> str:
     return unit.replace("*", " ")
 
 
+_IN_FULL = sorted((*_KNOWN, DIAMETERS), key=len, reverse=True)
 _QUANTITY = re.compile(
-    rf"(?<![\w.-])({_NUMBER}) ({'|'.join(map(re.escape, sorted(_KNOWN, key=len, reverse=True)))})"
+    rf"(?<![\w.-])({_NUMBER}) ({'|'.join(map(re.escape, _IN_FULL))})"
     r"(?![\w*/^])"
 )

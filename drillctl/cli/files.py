@@ -16,6 +16,7 @@ from drillctl.cli.options import (
     DesignName,
     Json,
     Sets,
+    Units,
     command_of,
     loaded,
     warn,
@@ -23,6 +24,7 @@ from drillctl.cli.options import (
 )
 from drillctl.errors import InputError
 from drillctl.studies.base import Option
+from drillctl.units import DIAMETERS, displayed, full, told, unit_name
 
 if TYPE_CHECKING:
     from drillctl.design import Design
@@ -50,12 +52,19 @@ def designs(json: Json = False, debug: Debug = False) -> None:
     _listed("designs", json)
 
 
-def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug = False) -> None:
+def show(
+    design: DesignName,
+    sets: Sets = None,
+    json: Json = False,
+    units: Units = None,
+    debug: Debug = False,
+) -> None:
     """Print a design with its model and every default."""
     from drillctl.design import to_toml
     from drillctl.design.reading import to_tree
 
     loaded_design = loaded(design, sets)
+    system = units or loaded_design.tables.units or "si"
     if json:
         found = {
             "mesh": [one.summary() for one in loaded_design.mesh],
@@ -64,27 +73,30 @@ def show(design: DesignName, sets: Sets = None, json: Json = False, debug: Debug
         console.emit(with_warnings(to_tree(loaded_design.tables) | found, loaded_design))
     else:
         console.line(to_toml(loaded_design).rstrip())
-        for text in _rock(loaded_design):
-            console.line(text)
-        console.line("\n# Elements of the sections:")
-        for one in loaded_design.mesh:
-            count = f"{one.elements} of {one.length:.4g} m, " if one.length > 0.0 else ""
-            console.line(f"# {one.name}: {count}{one.said}")
-        for name, factors in _joints(loaded_design):
-            console.line(
-                f"# tool joints of {name}: inertia of the body x {factors.inertia:.4f}, "
-                f"stiffness x {factors.stiffness:.4f}"
-            )
-        for text in _mud(loaded_design):
-            console.line(f"# {text}")
-    warn(loaded_design)
+        for text in _derived(loaded_design):
+            console.line(told(text, system))
+    warn(loaded_design, system)
+
+
+def _derived(design: Design) -> Iterator[str]:
+    """What follows from a design, as comments; quantities in full."""
+    yield from _rock(design)
+    yield "\n# Elements of the sections:"
+    for one in design.mesh:
+        count = f"{one.elements} of {full(one.length, 'm', 4)}, " if one.length > 0.0 else ""
+        yield f"# {one.name}: {count}{one.said}"
+    for name, factors in _joints(design):
+        yield (
+            f"# tool joints of {name}: inertia of the body x {factors.inertia:.4f}, "
+            f"stiffness x {factors.stiffness:.4f}"
+        )
+    yield from _mud(design)
 
 
 def _rock(design: Design) -> Iterator[str]:
     """The rock as coefficients and in drillers' numbers."""
     from drillctl.rig.bit_rock import NavarroLopezSuarez
     from drillctl.rig.bit_rock.aggressiveness import EXAMPLE_BIT, drillers_numbers
-    from drillctl.units import RPM
 
     law, own = design.bit_rock, getattr(design.tables.bit_rock, "bit_diameter", None)
     whose = "" if own else " (an example: the design gives no size)"
@@ -92,11 +104,12 @@ def _rock(design: Design) -> Iterator[str]:
         return
     size = EXAMPLE_BIT if own is None else own
     numbers = drillers_numbers(law, size)
-    yield f"\n# Rock: a1 = {law.a1:.4g} m, a2 = {law.a2:.4g} m, beta = {law.beta:.4g} s/rad"
+    a1, a2, beta = full(law.a1, "m", 4), full(law.a2, "m", 4), full(law.beta, "s/rad", 4)
+    yield f"\n# Rock: a1 = {a1}, a2 = {a2}, beta = {beta}"
     yield (
-        f"# as a bit of {size * 1e3:.4g} mm{whose}: aggressiveness "
+        f"# as a bit of {full(size, DIAMETERS)}{whose}: aggressiveness "
         f"{numbers.aggressiveness:.4g}, high-speed ratio "
-        f"{numbers.high_speed_ratio:.4g}, speed scale {numbers.speed_scale / RPM:.4g} rpm"
+        f"{numbers.high_speed_ratio:.4g}, speed scale {full(numbers.speed_scale, 'rad/s')}"
     )
 
 
@@ -111,7 +124,8 @@ def _mud(design: Design) -> Iterator[str]:
     for _, one, length, hole in clearances(design.tables):
         outer = one.diameters[0] if one.diameters else 0.0
         drag = jointed_drag(well.mud_viscosity, outer, one.spacing, one.joint, hole)
-        text = f"mud at {one.name}, {length:.4g} m in {hole * 1e3:.4g} mm: {drag:.4g} N*s/rad"
+        hole_, drag_ = full(hole, DIAMETERS), full(drag, "N*s/rad", 4)
+        text = f"# mud at {one.name}, {full(length, 'm', 4)} in {hole_}: {drag_}"
         if well.mud_density is not None and drag > 0.0:
             number = taylor_number(well.mud_viscosity, well.mud_density, outer, hole, design.speed)
             less = "" if number < LAMINAR else ", so that vortices take more"
@@ -127,7 +141,19 @@ def _joints(design: Design) -> list[tuple[str, Homogenised]]:
     return [(name, factors) for name, factors in made if factors is not None]
 
 
-def catalog(json: Json = False, debug: Debug = False) -> None:
+COLUMNS = (
+    ("od", "outer_diameter", DIAMETERS, ".5g"),
+    ("id", "inner_diameter", DIAMETERS, ".5g"),
+    ("mass", "mass_per_length", "kg/m", ".1f"),
+    ("with joints", "mass_per_length_with_joints", "kg/m", ".1f"),
+    ("inertia x", "inertia_factor", "1", ".3f"),
+    ("stiffness x", "stiffness_factor", "1", ".3f"),
+    ("yield", "yield_torque", "N*m", ".1f"),
+)
+"""Head, key in JSON, SI unit and digits of what `catalog` prints."""
+
+
+def catalog(json: Json = False, units: Units = None, debug: Debug = False) -> None:
     """List pipes, collars and tools known by name."""
     from drillctl.rig.drillstring import GRADES, PIPES
     from drillctl.rig.drillstring.catalogue import CATALOGUE, summary
@@ -136,26 +162,20 @@ def catalog(json: Json = False, debug: Debug = False) -> None:
     if json:
         console.emit({"components": rows, "grades": GRADES})
         return
-    heads = ["name", "od", "id", "kg/m", "with joints", "inertia x", "stiffness x", "yield"]
-    console.table(
-        "components: mm; with tool joints of the highest grade listed; yield of S-135, kN m",
-        heads,
+    system = units or "si"
+    heads = [f"{head} {unit_name(unit, system)}".rstrip() for head, _, unit, _ in COLUMNS]
+    cells = [
         [
-            [
-                row["name"], f"{row['outer_diameter'] * 1e3:.1f}",
-                f"{row['inner_diameter'] * 1e3:.1f}", f"{row['mass_per_length']:.1f}",
-                *(
-                    "" if row[key] is None else f"{row[key] * scale:{form}}"
-                    for key, scale, form in (
-                        ("mass_per_length_with_joints", 1.0, ".1f"),
-                        ("inertia_factor", 1.0, ".3f"), ("stiffness_factor", 1.0, ".3f"),
-                        ("yield_torque", 1e-3, ".1f"),
-                    )
-                ),
-            ]
-            for row in rows
-        ],
-    )  # fmt: skip
+            "" if row[key] is None else f"{displayed(row[key], unit, system)[0]:{form}}"
+            for _, key, unit, form in COLUMNS
+        ]
+        for row in rows
+    ]
+    console.table(
+        "components; with tool joints of the highest grade listed; yield of S-135",
+        ["name", *heads],
+        [[row["name"], *texts] for row, texts in zip(rows, cells, strict=True)],
+    )
     console.line(f"Sources and what was checked of each: {CATALOGUE}")
     console.line(f"Grades: {', '.join(GRADES)}")
 
@@ -252,7 +272,7 @@ def _report(design: Design, given: dict[str, Any], common: Common) -> None:
         for path in result.files.values():
             console.line(f"report: {path}")
         console.line(f"results: {result.folder}")
-    warn(design)
+    warn(design, common.units)
     if result.interrupted:
         raise typer.Exit(130)
     if result.problems or result.unwritten:

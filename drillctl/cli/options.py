@@ -143,10 +143,10 @@ def _of_option(error: InputError, values: Iterable[str]) -> InputError:
     return error
 
 
-def warn(design: Design) -> None:
+def warn(design: Design, system: units.System | None = None) -> None:
     """Print the warnings of a design, after what was asked for and not beside an error."""
     for warning in design.warnings:
-        console.note(f"warning: {warning}")
+        console.note(f"warning: {warning.said(system or design.tables.units or 'si')}")
 
 
 def with_warnings(summary: dict[str, Any], design: Design) -> dict[str, Any]:

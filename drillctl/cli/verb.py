@@ -171,7 +171,7 @@ def draw(figure: Figure, path: Path) -> None:
 
 def _show(study: Study, result: Any, summary: dict[str, Any], common: Common) -> None:
     """Print the summary as JSON, or tables and remarks; the warnings of the design."""
-    warn(result.design)
+    warn(result.design, common.units)
     if common.json:
         console.emit(with_warnings(summary, result.design))
         return

@@ -51,7 +51,11 @@ class DesignWarning(NamedTuple):
 
     def __str__(self) -> str:
         """One line."""
-        return f"{self.text}; set {self.key}, usually {self.usual}"
+        return self.said("si")
+
+    def said(self, system: units.System) -> str:
+        """One line in the units of a reader; the parts have their quantities in SI, in full."""
+        return units.told(f"{self.text}; set {self.key}, usually {self.usual}", system)
 
 
 def warnings_of(
@@ -93,9 +97,10 @@ def _implausible(tables: DesignTables) -> Iterator[DesignWarning]:
             continue
         low, high = one.kind.usual
         if not low <= abs(one.value) <= high:
-            least, most = (units.write(end, one.kind) for end in (low, high))
+            unit = units.DIAMETERS if one.kind is units.DIAMETER else one.kind.si
+            value, least, most = (units.full(x, unit) for x in (one.value, low, high))
             yield DesignWarning(
-                f"{one.path} {units.write(one.value, one.kind)} is far from that of any rig",
+                f"{one.path} {value} is far from that of any rig",
                 one.path, f"up to {most}" if low == 0.0 else f"{least} to {most}",
             )  # fmt: skip
 
@@ -107,10 +112,10 @@ def _weak_drive(tables: DesignTables, static: float) -> DesignWarning | None:
         return None
     key = "controller.drive.torque_limit" if own == limit else "top_drive.intermittent_torque"
     return DesignWarning(
-        f"{key} {limit / 1e3:.4g} kN*m is less than the static torque of "
-        f"the bit, {static / 1e3:.4g} kN*m: once stuck it cannot be freed (status stalled)",
+        f"{key} {units.full(limit, 'N*m')} is less than the static torque of "
+        f"the bit, {units.full(static, 'N*m')}: once stuck it cannot be freed (status stalled)",
         key,
-        f"more than {static / 1e3:.4g} kN*m",
+        f"more than {units.full(static, 'N*m')}",
     )
 
 
@@ -166,7 +171,7 @@ def _light_bit(parts: Parts, fall: float) -> DesignWarning | None:
         f"N*m*s/rad; it chatters with the fastest modes of the mesh, up to {fastest / 6.2832:.3g} "
         "Hz",
         "bha.inertia" if more else f"drillstring.sections.{last.name}.stiffness_damping",
-        "50 to 400 kg*m^2" if more else "1e-3 s",
+        "50 kg*m^2 to 400 kg*m^2" if more else "1e-3 s",
     )  # fmt: skip
 
 

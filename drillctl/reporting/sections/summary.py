@@ -118,7 +118,10 @@ def build(gathered: Gathered) -> tuple[Block, ...]:
     if result.checks:
         caption = "Checks of the current setting: all must be yes to pass"
         blocks.append(Checks("verdict", caption, result.checks))
-    blocks += [Text(f"Warning: {one}.", "warning") for one in gathered.design.warnings]
+    blocks += [
+        Text(f"Warning: {one.said(gathered.words.system)}.", "warning")
+        for one in gathered.design.warnings
+    ]
     if best := _best(gathered):
         blocks.append(best)
     blocks += [part for name, part, _ in gathered.shown("map").parts if name == "regions"]
