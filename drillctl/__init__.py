@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from drillctl.studies.compare.compute import compare as compare
     from drillctl.studies.regularisation.compute import regularisation as regularisation
     from drillctl.studies.three_regions.compute import three_regions as three_regions
+    from drillctl.studies.torque_drag.compute import torque_drag as torque_drag
     from drillctl.studies.tune.compute import tune as tune
     from drillctl.studies.uncertainty.compute import uncertainty as uncertainty
 

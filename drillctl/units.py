@@ -69,6 +69,8 @@ POWER = Kind("power", "W", ("kW", "MW", "W", "hp"))
 TORQUE_RATE = Kind("torque rate", "N*m/s", ("kN*m/s", "N*m/s"))
 FORCE_RATE = Kind("force rate", "N/s", ("kN/s", "N/s"))
 INTEGRAL_GAIN = Kind("gain", "N*m/rad", ("N*m/rad",))
+ANGLE = Kind("angle", "rad", ("deg", "rad"))
+VELOCITY = Kind("axial speed", "m/s", ("m/h", "m/min", "m/s", "ft/h"), (0.0, 5.0))
 
 # What the common units are in SI, as pint has it to the bit: pint takes half a second to start, and
 # reads the others alone.
@@ -102,8 +104,9 @@ _KNOWN: dict[str, dict[str, float]] = {
     "W": {"W": 1.0, "kW": 1e3, "MW": 1e6, "hp": 745.6998715822701},
     "N*m/s": {"N*m/s": 1.0, "kN*m/s": 1e3, "klbf*ft/s": 1355.8179483314004},
     "N/s": {"N/s": 1.0, "kN/s": 1e3, "klbf/s": 4448.221615260501},
+    "rad": {"rad": 1.0, "deg": 0.017453292519943295, "rev": 6.283185307179586},
+    "m/s": {"m/s": 1.0, "m/min": 1.0 / 60.0, "m/h": 1.0 / 3600.0, "ft/h": 0.3048 / 3600.0},
     # shown alone
-    "rad": {"rev": 6.283185307179586},
     "J": {"kJ": 1e3, "klbf*ft": 1355.8179483314004},
     "rad/(N*m*s)": {"rpm/(kN*m)": 0.00010471975511965977, "rpm/(klbf*ft)": 7.723732765784518e-05},
     "rad/s/(N*m)": {"rpm/(klbf*ft)": 7.723732765784518e-05},

@@ -71,7 +71,7 @@ def test_every_command_of_the_readme_exists():
     from drillctl.cli import app
 
     known = {c.name or c.callback.__name__ for c in app.registered_commands}
-    named = set(re.findall(r"`drillctl (\w+)", README))
+    named = set(re.findall(r"`drillctl ([\w-]+)", README))
     assert named <= known
     assert known <= named
 

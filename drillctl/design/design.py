@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from drillctl import registry
-from drillctl.design import parts
+from drillctl.design import parts, well
 from drillctl.design.lines import place, without_place
 from drillctl.design.merging import Tree, with_values
 from drillctl.design.tables import DesignTables
@@ -23,6 +23,7 @@ from drillctl.rig.program import Program
 from drillctl.rig.top_drive import PI, ConstantTorque, TopDriveLaw
 from drillctl.rig.top_drive.law import top_drive
 from drillctl.rig.weight_on_bit import RealWeight, WeightLaw
+from drillctl.rig.well.wall import Wall
 
 if TYPE_CHECKING:
     import control
@@ -97,6 +98,11 @@ class Design:
     def string(self) -> Drillstring:
         """The assembled drillstring."""
         return parts.drillstring(self.tables)
+
+    @cached_property
+    def wall(self) -> Wall | None:
+        """Friction of the wall on the string; None without any."""
+        return well.wall(self.tables, self.string)
 
     @property
     def mesh(self) -> tuple[MeshedSection, ...]:

@@ -20,6 +20,7 @@ from drillctl.design.tables import Table
 from drillctl.design.tally import Tally, with_tally
 from drillctl.design.uncertain_tables import with_samples
 from drillctl.design.validation import validated
+from drillctl.design.well import with_survey
 from drillctl.errors import InputError, shown
 from drillctl.text import one_line
 
@@ -49,7 +50,8 @@ def load(name_or_path: str | Path, **values: Any) -> Design:
     if "drillstring.tally" in values:
         tree = _without_sections(tree)
     try:
-        tree = with_tally(with_samples(with_values(tree, values), Path()), Path())
+        tree = with_samples(with_values(tree, values), Path())
+        tree = with_survey(with_tally(tree, Path()), Path())
     except InputError as error:
         raise error.within(str(path)) from None
     return Design(one_line(path.stem), validated(tree, str(path)), tree, str(path))
@@ -61,7 +63,7 @@ def _merged(path: Path, seen: tuple[Path, ...]) -> Tree:
         tree = with_samples(_read(path), path.parent)
         string = tree.get("drillstring")
         whole = isinstance(string, dict) and "tally" in string
-        tree = with_tally(tree, path.parent)
+        tree = with_survey(with_tally(tree, path.parent), path.parent)
     except InputError as error:
         raise (error if error.where.startswith(str(path)) else error.within(str(path))) from None
     model = tree.pop("model", None)

@@ -61,7 +61,9 @@ class SectionTable(Table):
     has its length there. `length` is that of one piece, of which there are `repeat`. `inertia` is a
     point inertia at the lower end of each. Tool joints, one in each `joint_spacing` (a piece, or
     31 ft), enter by their compliance and inertia: those given, or with `tool_joints` those of the
-    catalogue for this pipe and grade. `tool_joint_factor` multiplies the inertia by hand.
+    catalogue for this pipe and grade. `tool_joint_factor` multiplies the inertia by hand. In a well
+    count also `linear_mass`, of its steel per length, and `contact_diameter`, at which it touches
+    the wall: by default those of the body with its tool joints.
     """
 
     name: q.Name
@@ -82,6 +84,8 @@ class SectionTable(Table):
     youngs_modulus: q.Modulus | None = None
     poisson_ratio: q.PoissonRatio | None = None
     density: q.Density | None = None
+    linear_mass: q.LinearMass | None = None
+    contact_diameter: q.Diameter | None = None
     tool_joint_factor: q.Factor = 1.0
     stiffness: q.Stiffness | None = None
     inertia: q.Inertia | None = None
@@ -182,7 +186,8 @@ class SectionTable(Table):
     def _only_lumped_keys(self) -> None:
         distributed = (
             "length", "grade", "inner_diameter", "shear_modulus", "youngs_modulus",
-            "poisson_ratio", "density", *JOINT, "joint_spacing",
+            "poisson_ratio", "density", "linear_mass", "contact_diameter", *JOINT,
+            "joint_spacing",
         )  # fmt: skip
         given = [key for key in distributed if getattr(self, key) is not None]
         given += ["drag"] if self.drag else []
@@ -359,23 +364,41 @@ class TopDriveTable(Table):
 
 
 class HoleTable(Table):
-    """A run of hole or casing of one inner diameter, down to `to`; the last, to the bit."""
+    """A run of hole or casing of one inner diameter, down to `to`; the last, to the bit.
+
+    `friction_factor`: of this run, in place of that of the well.
+    """
 
     to: q.Length | None = None
     diameter: q.Diameter
+    friction_factor: q.FrictionFactor | None = None
 
 
 class WellTable(Table):
-    """The well: its holes from the top down, and the mud in it.
+    """The well: its path, its holes from the top down, the mud in it, the friction of its wall.
 
-    With `mud_viscosity` the mud takes a viscous torque from every section with an outer diameter,
-    that of laminar flow between concentric cylinders. `mud_density` does not enter it; it says
-    whether the flow is laminar (`drillctl show` prints the Taylor number).
+    `survey`: a CSV file, its lines, or stations [measured depth, inclination, azimuth]; a well
+    without one is vertical. With `mud_viscosity` the mud takes a viscous torque from every section
+    with an outer diameter, that of laminar flow between concentric cylinders. `mud_density` does
+    not enter it; it lightens the string (`drillctl torque-drag`), and says whether the flow is
+    laminar (`drillctl show` prints the Taylor number).
+
+    `friction_factor` times the side force of a soft string is the dry friction of the wall, at
+    rest up to that, and beyond `critical_speed` a `friction_ratio` of it. It acts at
+    `friction_nodes` nodes, the bit among them. `tension = false` leaves the tension out of the side
+    force. `axial_speed`: downwards while drilling ahead, which turns part of the friction upwards.
     """
 
+    survey: tuple[tuple[q.Depth, q.Angle, q.Angle], ...] = ()
     holes: tuple[HoleTable, ...] = ()
     mud_density: q.Density | None = None
     mud_viscosity: q.Viscosity | None = None
+    friction_factor: q.FrictionFactor | None = None
+    friction_ratio: q.Share = 1.0
+    critical_speed: q.SpeedOrZero = 1.5
+    friction_nodes: q.Count = 12
+    tension: bool = True
+    axial_speed: q.Velocity = 0.0
 
     @model_validator(mode="after")
     def _downwards(self) -> WellTable:

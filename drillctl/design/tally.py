@@ -123,7 +123,7 @@ def read(source: object, begins: object, folder: Path, where: str = "drillstring
         path = folder / Path(source).expanduser()
         place, text = str(path), _text_of(path, where)
     try:
-        rows = [(n, row) for n, row in enumerate(_rows(text), 1) if any(row)]
+        rows = [(n, row) for n, row in enumerate(rows_of(text), 1) if any(row)]
     except csv.Error as error:
         raise InputError(str(error), place) from None
     return _read(place, text, rows, str(begins))
@@ -161,7 +161,7 @@ def _written(value: object) -> str:
     return f"{value:.15g}" if isinstance(value, float) else str(value).strip()
 
 
-def _rows(text: str) -> list[list[str]]:
+def rows_of(text: str) -> list[list[str]]:
     """Rows of cells; the delimiter is the one that a line has most of, heads or not."""
     lines = text.splitlines()
     delimiter = max(",;\t|", key=lambda one: max(line.count(one) for line in lines[:10]))
@@ -271,6 +271,11 @@ def _head(text: str) -> _Head:
 def _is_unit(text: str) -> bool:
     kinds = (units.DIAMETER, units.LINEAR_MASS, units.INERTIA, units.FORCE)
     return text in ("kg", "lb", "lbs") or any(text in units.spellings(kind) for kind in kinds)
+
+
+def is_unit_of(unit: str, kind: units.Kind) -> bool:
+    """Whether a text is a unit of this kind."""
+    return bool(unit) and not _problem(f"1 {unit}", kind)
 
 
 def _fits(unit: str, kind: units.Kind | None) -> bool:

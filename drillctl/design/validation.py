@@ -52,9 +52,11 @@ def validated(tree: Tree, origin: str) -> DesignTables:
 def _impossible(tables: DesignTables) -> Iterator[InputError]:
     """What no rig can be, of tables that are valid each for itself."""
     from drillctl.design import parts
+    from drillctl.design.well import refuse_impossible_well
 
     each = (
-        parts.refuse_impossible_string, parts.bit_rock_before, parts.weight_on_bit, parts.program
+        parts.refuse_impossible_string, refuse_impossible_well, parts.bit_rock_before,
+        parts.weight_on_bit, parts.program,
     )  # fmt: skip
     found = False
     for check in (*each, _refuse_impossible_drive):

@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from drillctl.plots.uncertainty import region_error as region_error
     from drillctl.plots.uncertainty import sensitivity_bars as sensitivity_bars
     from drillctl.plots.uncertainty import uncertain_regions as uncertain_regions
+    from drillctl.plots.well import friction_sweep as friction_sweep
+    from drillctl.plots.well import torque_drag as torque_drag
 
 _MODULES = {
     "comparison": (
@@ -82,6 +84,7 @@ _MODULES = {
         "sensitivity_bars",
         "uncertain_regions",
     ),
+    "well": ("friction_sweep", "torque_drag"),
 }
 
 __all__ = [name for names in _MODULES.values() for name in names]

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from drillctl.studies.doctor.compute import doctor as doctor
     from drillctl.studies.loop_mapping.compute import LoopMap as LoopMap
     from drillctl.studies.loop_mapping.compute import loop_map as loop_map
+    from drillctl.studies.torque_drag.compute import TorqueDrag as TorqueDrag
     from drillctl.studies.uncertainty.result import Uncertainty as Uncertainty
 
 _MODULES = {
@@ -37,6 +38,7 @@ _MODULES = {
     "studies.delay.compute": ("WeightDelay", "weight_delay"),
     "studies.doctor.compute": ("Doctor", "doctor"),
     "studies.loop_mapping.compute": ("LoopMap", "loop_map"),
+    "studies.torque_drag.compute": ("TorqueDrag",),
     "studies.uncertainty.result": ("Uncertainty",),
 }
 

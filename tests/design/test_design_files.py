@@ -86,7 +86,8 @@ def test_shipped_file_loads_complete(name):
     assert design.tables.title
     assert design.tables.source
     assert design.string.nodes >= 2
-    assert design.bit_rock.static_torque(design.tables.operating_point.weight_on_bit) > 0
+    rock = design.bit_rock.static_torque(design.tables.operating_point.weight_on_bit)
+    assert rock + (design.wall.total if design.wall else 0.0) > 0
     assert design.top_drive.gains() is not None
     assert design.weight_on_bit.weight(10.0) == design.tables.operating_point.weight_on_bit
 

@@ -1,0 +1,83 @@
+"""Dry friction of the wall, set-valued at rest, gathered at some nodes of a string.
+
+The torque of a length is mu r N at rest and for |w| < w_c, a share of it beyond (after Aarsnes &
+Shor 2018). N is that of the string rotating off bottom or under weight; it does not change in a
+run. Each cell's torque goes to the two nodes about it, in inverse proportion to their distance.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from drillctl.arrays import Array
+from drillctl.rig.well.soft_string import Line, tension
+
+
+class Wall(NamedTuple):
+    """Friction at nodes of a string, from the top down; the last is the bit."""
+
+    nodes: tuple[int, ...]
+    torque: Array  # shape (nodes,): at rest, at most (N m)
+    ratio: float  # of it that is left beyond the critical speed
+    critical: float  # speed (rad/s)
+
+    @property
+    def total(self) -> float:
+        """Torque at rest of the whole string, at most (N m)."""
+        return float(self.torque.sum())
+
+
+def cell_torque(line: Line, factor: Array, weight_on_bit: float, coupled: bool) -> Array:
+    """Largest torque of the wall on each cell of a string that turns (N m)."""
+    along = tension(line, -weight_on_bit, 0.0 * factor)
+    if not coupled:
+        along = 0.0 * along
+    ends = (along[:-1], 0.5 * (along[:-1] + along[1:]), along[1:])
+    sides = [line.side_force(k, force) for k, force in enumerate(ends)]
+    mean = (sides[0] + 4.0 * sides[1] + sides[2]) / 6.0
+    return np.asarray(mean * factor * line.radius * line.length)
+
+
+@lru_cache(maxsize=16)
+def choose_nodes(
+    line: Line, depth: tuple[float, ...], count: int, coupled: bool
+) -> tuple[int, ...]:
+    """Nodes between which the wall takes equal shares of the torque, the bit the last.
+
+    Of the string in air without weight on bit and with one friction factor: other numbers of the
+    same string have the same nodes.
+    """
+    bit = len(depth) - 1
+    if count == 1:
+        return (bit,)
+    torque = cell_torque(line, np.ones(len(line.run)), 0.0, coupled)
+    sums = np.concatenate([[0.0], np.cumsum(torque)])
+    if sums[-1] == 0.0:
+        return (bit,)
+    wanted = np.interp(np.linspace(1e-6, 1.0, count) * sums[-1], sums, line.depth)
+    found = {int(np.abs(np.array(depth) - place).argmin()) for place in wanted}
+    return tuple(sorted((found | {bit}) - {0}))
+
+
+def lumped(
+    line: Line, depth: Array, nodes: tuple[int, ...], factor: Array, weight_on_bit: float,
+    well: Any,
+) -> Wall:  # fmt: skip
+    """Friction of a well (its table) at nodes."""
+    torque = cell_torque(line, factor, weight_on_bit, well.tension)
+    middle = 0.5 * (line.depth[:-1] + line.depth[1:])
+    places = depth[list(nodes)]
+    below = np.clip(np.searchsorted(places, middle), 1, max(len(nodes) - 1, 1))
+    at = np.zeros(len(nodes))
+    if len(nodes) == 1:
+        at[0] = torque.sum()
+    else:
+        share = np.clip((middle - places[below - 1]) / np.diff(places)[below - 1], 0.0, 1.0)
+        np.add.at(at, below, share * torque)
+        np.add.at(at, below - 1, (1.0 - share) * torque)
+    critical = well.critical_speed if well.friction_ratio < 1.0 else math.inf
+    return Wall(nodes, at, well.friction_ratio, critical)
