@@ -51,6 +51,7 @@ STUDIES: tuple[str, ...] = (
     "drillctl.studies.delay",
     "drillctl.studies.advantage",
     "drillctl.studies.tune",
+    "drillctl.studies.recommend",
 )
 """Each package holds `STUDY`; its keys in a design file, if any, are in its `settings.py`."""
 

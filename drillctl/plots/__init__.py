@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from drillctl.plots.plant import friction_curves as friction_curves
     from drillctl.plots.plant import mobility as mobility
     from drillctl.plots.plant import mode_shapes as mode_shapes
+    from drillctl.plots.recommend import recommended as recommended
     from drillctl.plots.tune import tune_baselines as tune_baselines
     from drillctl.plots.tune import tune_neighbourhood as tune_neighbourhood
     from drillctl.plots.uncertainty import area_convergence as area_convergence
@@ -75,6 +76,7 @@ _MODULES = {
     "map": ("error_estimate", "regularisation", "stability_map", "sweep_line", "three_regions"),
     "over_time": ("limit_cycle", "time_response"),
     "plant": ("bode", "friction_curves", "mobility", "mode_shapes"),
+    "recommend": ("recommended",),
     "tune": ("tune_baselines", "tune_neighbourhood"),
     "uncertainty": (
         "area_convergence",

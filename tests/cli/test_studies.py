@@ -49,6 +49,13 @@ QUICK = {
         "--set", "tune.starts=1", "--set", "tune.certificate.audit=1",
         "--set", "simulation.accuracy=fast", "--set", "tune.probability=0.8",
     ),
+    "recommend": (
+        "robust-gains-140kn", *SHORT, "--realizations", "16", "--fresh", "40",
+        "--set", "tune.starts=1", "--set", "simulation.accuracy=fast",
+        "--set", "tune.level=9", "--set", "tune.probability=0.5",
+        "--set", "recommend.laws=['pi', 'soft-torque']",
+        "--set", "recommend.speed_step=20 rpm", "--set", "recommend.weight_step=20 kN",
+    ),
     "delay": (
         "dynamic-wob-delay-140kn", *SHORT, "--realizations", "3",
         "--set", "weight_delay.gains=['0 kN*s/rad', '6 kN*s/rad']",

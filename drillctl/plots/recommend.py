@@ -1,0 +1,92 @@
+"""Settings of a drive side by side: J1, probability, where they work, loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from drillctl import units
+from drillctl.plots import style
+
+if TYPE_CHECKING:
+    from drillctl.studies.recommend.assess import Assessed
+    from drillctl.studies.recommend.compute import Recommendation
+    from drillctl.studies.recommend.window import Line
+
+ROW = 0.42  # height of a row (inches)
+
+
+@style.picture(ax="Five panels.")
+def recommended(
+    result: Recommendation, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
+    """J1, probability, speeds and weights without sticking, slope margin; a row a setting."""
+    some = result.candidates
+    figure, panels = style.grid_or_new(ax, 1, 5, 13.0, 2.2 + ROW * len(some), share_y=True)
+    spread, chance, speed, weight, margin = panels
+    for place, one in enumerate(some):
+        colour = style.VERMILLION if one is result.recommended else style.BLUE
+        _spread(spread, place, one, colour)
+        low, high = one.interval
+        chance.plot([low, high], [place, place], "-", color=colour, linewidth=2.2)
+        chance.plot(one.probability, place, "o", color=colour, markersize=5.5)
+        _free(speed, place, one.window.speed, colour, system)
+        _free(weight, place, one.window.weight, colour, system)
+        if one.loop.slope > 0.0 and np.isfinite(one.loop.slope_margin):
+            margin.plot(one.loop.slope_margin / one.loop.slope, place, "o", color=colour)
+    table, asked = result.design.tables.tune, result.design.tables.recommend
+    limits = ((spread, table.level), (chance, table.probability), (margin, asked.slope_reserve))
+    for panel, limit in limits:
+        panel.axvline(limit, color=style.BLACK, linewidth=1.0, linestyle="--")
+    for panel, line in ((speed, some[0].window.speed), (weight, some[0].window.weight)):
+        own = units.displayed(line.own, line.unit, system)[0]
+        panel.axvline(own, color=style.BLACK, linewidth=1.0, linestyle=":")
+        panel.set_xlim(left=0.0)
+    spread.set_yticks(range(len(some)), [one.name for one in some])
+    spread.set_ylim(len(some) - 0.5, -0.5)
+    spread.set_xlim(left=0.0)
+    chance.set_xlim(-0.03, 1.03)
+    margin.set_xlim(left=0.0)
+    names = (
+        "J1 (s)", f"P(J1 ≤ {table.level:g} s)",
+        f"speed ({units.unit_name('rad/s', system)})", f"WOB ({units.unit_name('N', system)})",
+        "slope margin over slope",
+    )  # fmt: skip
+    for panel, name in zip(panels, names, strict=True):
+        style.dress(panel, name, "")
+        panel.tick_params(labelleft=panel is spread)
+    style.dress(spread, names[0], "", style.heading(result, "What to set"))
+    text = (
+        f"{len(result.present.j1)} fresh draws (seed {result.seed}): 5 to 95 % (line), 25 to 75 % "
+        "(bar), median (dot) of J1; 95 % interval of the probability. Bars: speeds and weights "
+        "without sticking in the last 20 s at nominal rock. Dashed: limits; dotted: as designed. "
+        f"{result.recommended.name} is recommended: {result.verdict}."
+    )
+    figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
+    return figure
+
+
+def _spread(ax: Axes, place: int, one: Assessed, colour: str) -> None:
+    """Quantiles of J1 on a row."""
+    values = one.j1[np.isfinite(one.j1)]
+    if not len(values):
+        return
+    low, first, middle, third, high = np.quantile(values, [0.05, 0.25, 0.5, 0.75, 0.95])
+    ax.plot([low, high], [place, place], "-", color=colour, linewidth=1.6)
+    ax.plot([first, third], [place, place], "-", color=colour, linewidth=7.0, alpha=0.55,
+            solid_capstyle="butt")  # fmt: skip
+    ax.plot(middle, place, "o", color=colour, markeredgecolor="white", markersize=6.5)
+
+
+def _free(ax: Axes, place: int, line: Line, colour: str, system: units.System) -> None:
+    """Every stretch of values without sticking, on a row."""
+    shown = np.asarray(units.displayed(line.values, line.unit, system)[0])
+    free = np.concatenate([[False], line.free, [False]]).astype(int)
+    begins, ends = np.flatnonzero(np.diff(free) > 0), np.flatnonzero(np.diff(free) < 0)
+    for begin, end in zip(begins, ends, strict=True):
+        ax.plot([shown[begin], shown[end - 1]], [place, place], "-", color=colour,
+                linewidth=6.0, solid_capstyle="butt")  # fmt: skip

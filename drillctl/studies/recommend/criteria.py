@@ -1,0 +1,203 @@
+"""What a setting must keep to pass, one criterion each, and what makes it fragile."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.errors import InputError
+from drillctl.linear.ends import bit_side, ends_of
+from drillctl.linear.loop_analysis import tolerated_slope
+from drillctl.linear.loop_margins import Margins, margins
+from drillctl.linear.loop_model import loop_poles, model_poles
+from drillctl.linear.operating_point import operating_point
+from drillctl.rig.drillstring.frequencies import followed, natural_frequencies
+from drillctl.rig.top_drive.law import DriveTable
+from drillctl.store.codec import label
+from drillctl.store.json_files import picked, strict
+from drillctl.studies.recommend.settings import Settings
+
+NAMED_MODES = 12  # modes with the top held that a frequency is named after
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth")
+
+
+@dataclass(frozen=True, eq=False)
+class LoopFigures:
+    """The loop about steady drilling, as far as the mesh follows it."""
+
+    slope: float = label(unit="N*m*s/rad", means="falling slope of the rock, D")
+    slope_margin: float = label(
+        unit="N*m*s/rad", means="slope that the loop tolerates; NaN if none at all"
+    )
+    deciding_hz: float = label(unit="Hz", means="of the poles that decide it")
+    whole: Margins | None = label(means="margins at the top torque; None if it is not stable")
+    part: Margins | None = label(means="the same with a share of the slope")
+    problem: str = label(means="why there are no figures, if so")
+
+    @property
+    def stable(self) -> bool:
+        """Whether the slope is under its margin."""
+        return bool(self.slope < self.slope_margin)
+
+    def summary(self) -> dict[str, Any]:
+        """Strict JSON values, SI."""
+        one = self.whole
+        disk = None if one is None else {"gain_db": one.gain_db, "phase_deg": one.phase_deg}
+        return dict(strict({
+            "slope": self.slope, "slope_margin": self.slope_margin,
+            "deciding_frequency_hz": self.deciding_hz, "stable": self.stable,
+            "disk_margin": disk,
+            "delay_margin": None if one is None else one.delay,
+            "peak_sensitivity": None if one is None else one.peak_sensitivity,
+            "peak_sensitivity_part": None if self.part is None else self.part.peak_sensitivity,
+        }))  # fmt: skip
+
+
+def loop_figures(design: Design, share: float) -> LoopFigures:
+    """Figures of the loop of a design, with all of the bit's slope and with a share of it.
+
+    What crossings and peaks above the highest frequency that the elements follow would say is the
+    mesh's own, and does not count.
+    """
+    try:
+        point = operating_point(design)
+        margin, omega = tolerated_slope(design, point.speed)
+    except InputError as error:
+        return LoopFigures(math.nan, math.nan, math.nan, None, None, str(error))
+    whole, part = (
+        _margins(design, one * point.slope, point.speed) if one * point.slope < margin else None
+        for one in (1.0, share)
+    )
+    return LoopFigures(point.slope, margin, omega / (2.0 * math.pi), whole, part, "")
+
+
+def _margins(design: Design, slope: float, speed: float) -> Margins:
+    bit, ends = bit_side(design, slope, speed), ends_of(design.string)
+    drive = design.linear_drive
+    poles = (
+        loop_poles(design.string, *drive.gains(), slope)
+        if design.simple_loop
+        else model_poles(design, bit)
+    )
+    return margins(ends, drive, bit, poles, followed(design.string.parts))
+
+
+def own_delay(drive: DriveTable) -> float:
+    """Delay and lags (s) that a drive has: samples, motor, encoder, filter of the torque."""
+    late = drive.sampling_period * (1.5 if drive.one_sample_delay else 0.5)
+    return late + drive.motor_lag + drive.encoder_lag + drive.torque_lag
+
+
+def mode_at(design: Design, hertz: float) -> str:
+    """The mode of the string that a frequency is nearest to, in words."""
+    if not math.isfinite(hertz) or hertz <= 0.0:
+        return "a slow drift"
+    held = natural_frequencies(design.string.parts, "finite-elements", NAMED_MODES, top_held=True)
+    number = min(range(len(held)), key=lambda k: abs(math.log(held[k] / (2 * math.pi * hertz))))
+    said = ORDINALS[number] if number < len(ORDINALS) else "a high"
+    return f"{'' if said.startswith('a ') else 'the '}{said} mode ({hertz:.2g} Hz)"
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One thing that must be kept."""
+
+    name: str  # key of the settings, or what is asked
+    kept: bool
+    value: float | None  # None where undefined
+    limit: float
+    miss: float  # by how much it is missed, over the limit; 0 if kept, 1 if there is no value
+    said: str  # what is missed, with numbers in full; empty if kept
+
+    def summary(self) -> dict[str, Any]:
+        """Strict JSON values, SI."""
+        return dict(strict(picked(self, "name", "kept", "value", "limit", "miss", "said")))
+
+
+def _criterion(
+    name: str, value: float | None, limit: float, at_least: bool, said: str
+) -> Criterion:
+    """`value` against `limit`, kept at the limit itself."""
+    if value is None or math.isnan(value):
+        return Criterion(name, False, None, limit, 1.0, said)
+    kept = value >= limit if at_least else value <= limit
+    away = limit - value if at_least else value - limit
+    miss = 0.0 if kept else min(1.0, away / limit if limit > 0.0 else 1.0)
+    return Criterion(name, kept, value, limit, miss, "" if kept else said)
+
+
+def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Criterion]:
+    """What the linear loop must keep."""
+    mode = mode_at(design, one.deciding_hz)
+    needed = asked.slope_reserve * max(one.slope, 0.0)
+    no_slope = math.isnan(one.slope_margin)
+    ratio = math.inf if one.slope <= 0.0 < one.slope_margin else one.slope_margin / one.slope
+    without = one.problem or "unstable even without falling friction"
+    own = own_delay(design.tables.controller.drive) if asked.delay is None else asked.delay
+    delay = None if one.whole is None else one.whole.delay
+    peak = None if one.part is None else one.part.peak_sensitivity
+    peak_at = None if one.part is None else one.part.peak_sensitivity_hz
+    unstable = without if no_slope else (
+        f"unstable in {mode}: the rock falls by {units.full(one.slope, 'N*m*s/rad', 4)}, the loop "
+        f"bears {units.full(one.slope_margin, 'N*m*s/rad', 4)}"
+    )  # fmt: skip
+    small = (
+        f"slope margin {ratio:.2f} times the slope of the rock, {asked.slope_reserve:.2f} asked "
+        f"({mode} decides: {units.full(one.slope_margin, 'N*m*s/rad', 4)}, "
+        f"{units.full(needed, 'N*m*s/rad', 4)} needed)"
+    )
+    late = (
+        "no delay margin: the loop is not stable"
+        if delay is None
+        else f"bears {1e3 * delay:.3g} ms more delay, the drive has {1e3 * own:.3g} ms"
+    )
+    high = (
+        f"no sensitivity: not stable with {asked.slope_share:g} of the slope"
+        if peak is None
+        else f"peak sensitivity {peak:.3g} with {asked.slope_share:g} of the slope, "
+        f"{asked.peak_sensitivity:g} allowed, at {mode_at(design, peak_at or math.nan)}"
+    )
+    stable = Criterion("stable", one.stable, one.slope_margin, one.slope, 0.0, "")
+    if not one.stable:
+        miss = 1.0 if no_slope else min(1.0, 1.0 - one.slope_margin / one.slope)
+        stable = Criterion("stable", False, _none(one.slope_margin), one.slope, miss, unstable)
+    later = _criterion("delay", delay, own, True, late)
+    if own == 0.0 and delay == 0.0:
+        later = Criterion("delay", False, 0.0, 0.0, 1.0, late)
+    return [
+        stable,
+        _criterion("slope_reserve", ratio, asked.slope_reserve, True, small),
+        _criterion("peak_sensitivity", peak, asked.peak_sensitivity, False, high),
+        later,
+    ]
+
+
+def _none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def run_criteria(
+    j1: float, status: str, level: float, share: float, low: float, required: float
+) -> list[Criterion]:
+    """What the runs must keep: J1 without sticking at the end, and its probability."""
+    sticks = status in ("sticking", "stalled", "failed")
+    end = " and the bit sticks at the end" if sticks else ""
+    nominal = _criterion("j1", j1, level, False, f"J1 {j1:.3g} s, {level:g} s allowed{end}")
+    if sticks and nominal.kept:
+        said = f"the bit is {status} in the last 20 s, with J1 {j1:.3g} s"
+        nominal = Criterion("j1", False, j1, level, 0.1, said)
+    shown = "" if low >= required else (
+        f"P(J1 <= {level:g} s) is {share:.3f}, {required:g} required" if share < required else
+        f"P(J1 <= {level:g} s) is {share:.3f}, but {required:g} is not shown: it may be {low:.3f}"
+    )  # fmt: skip
+    probable = _criterion("probability", low, required, True, shown)
+    return [nominal, probable]
+
+
+def limit_criterion(share: float, allowed: float) -> Criterion:
+    """Share of the time at the drive's limits."""
+    said = f"at the limit of the drive for {100 * share:.2g} % of the time"
+    return _criterion("time_at_limit", share, allowed, False, said)

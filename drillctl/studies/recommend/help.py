@@ -1,0 +1,78 @@
+"""What would help next: more speed, less weight, found by trying."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.ensemble.cases import share_interval
+from drillctl.errors import InputError
+from drillctl.studies.recommend.assess import Assessed, drawn
+from drillctl.studies.recommend.criteria import loop_criteria, loop_figures
+from drillctl.studies.recommend.window import SPEED, WEIGHT
+
+STEPS = (0.03, 0.06, 0.10, 0.15, 0.20, 0.30, 0.40, 0.60)
+"""Changes of speed and weight that are tried, over the design's own."""
+DRAWS = 300  # at which the probability is looked at
+
+
+def what_helps(one: Assessed) -> tuple[str, ...]:
+    """Room that a setting has, or the change that would make it pass."""
+    if not one.missed:
+        return tuple(_room(one))
+    return tuple(_changes(one))
+
+
+def _room(one: Assessed) -> Iterator[str]:
+    window = one.window
+    low, high = window.lowest_speed, window.highest_weight
+    if low is not None:
+        least = "at least " if window.speed_open else ""
+        yield f"the bit does not stick down to {least}{units.full(low, 'rad/s', 7)}"
+    if high is not None:
+        least = "at least " if window.weight_open else ""
+        yield f"nor up to {least}{units.full(high, 'N', 4)} on bit"
+
+
+def _changes(one: Assessed) -> Iterator[str]:
+    design = one.design
+    speed, weight = design.speed, design.tables.operating_point.weight_on_bit
+    more = _first(design, [{SPEED: units.SI(speed * (1.0 + x))} for x in STEPS])
+    less = _first(design, [{WEIGHT: units.SI(weight * (1.0 - x))} for x in STEPS])
+    if more is not None:
+        yield f"speed up by {units.full(STEPS[more] * speed, 'rad/s', 7)} makes it pass"
+    if less is not None:
+        yield f"weight down by {units.full(STEPS[less] * weight, 'N', 5)} makes it pass"
+    if more is None and less is None:
+        yield (
+            f"neither {100 * STEPS[-1]:.0f} % more speed nor {100 * STEPS[-1]:.0f} % less weight "
+            "makes it pass"
+        )
+
+
+def _first(design: Design, changes: list[dict[str, Any]]) -> int | None:
+    """The first change with which everything is kept."""
+    for number, values in enumerate(changes):
+        try:
+            changed = design.replace(values)
+            if _passes(changed):
+                return number
+        except InputError:  # outside the friction table, or nothing that the drive can turn
+            continue
+    return None
+
+
+def _passes(design: Design) -> bool:
+    asked, table = design.tables.recommend, design.tables.tune
+    figures = loop_figures(design, asked.slope_share)
+    if not all(one.kept for one in loop_criteria(design, figures, asked)):
+        return False
+    j1, limited = drawn(design, min(DRAWS, table.certificate.realizations))
+    hits = int(np.count_nonzero(j1 <= table.level))
+    return share_interval(hits, len(j1))[1] >= table.probability and (
+        hits >= table.probability * len(j1) and limited <= asked.time_at_limit
+    )

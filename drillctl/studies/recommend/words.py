@@ -1,0 +1,163 @@
+"""The recommendation in words, and numbers as a drive has them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from drillctl import units
+from drillctl.design import Design, parameter
+from drillctl.store.tables import percent
+from drillctl.studies.recommend.assess import FAILS, FRAGILE, Assessed
+from drillctl.studies.recommend.candidates import NAMES, PRESENT
+from drillctl.studies.recommend.criteria import Criterion, mode_at
+
+if TYPE_CHECKING:
+    from drillctl.studies.recommend.compute import Recommendation
+
+SI_OF = {
+    "kp": "N*m*s/rad", "ki": "N*m/rad", "mobility": "rad/(N*m*s)", "sensed_inertia": "kg*m^2",
+    "corner": "1/s",
+}  # fmt: skip
+"""Units of the numbers that a drive has."""
+SPOKEN = {
+    "controller.kp": "Kp", "controller.ki": "Ki", "controller.absorption": "absorption",
+    "controller.high_pass": "high-pass", "controller.stiffness": "stiffness",
+    "controller.rate": "rate", "controller.spring": "spring", "controller.damper": "damper",
+    "controller.torque": "torque",
+}  # fmt: skip
+
+
+def numbers_of(one: Assessed) -> str:
+    """The numbers of a setting, in full."""
+    return ", ".join(
+        f"{SPOKEN.get(path, path)} {units.full(value, parameter(one.design, path).si_unit, 4)}"
+        for path, value in one.gains.items()
+    )
+
+
+def rated(design: Design) -> tuple[float | None, float | None]:
+    """Rated torque (N m) and speed (rad/s) that per-unit numbers are of; None where unknown."""
+    asked, drive = design.tables.recommend, design.tables.controller.drive
+    torque = asked.rated_torque or drive.continuous_torque or drive.torque_limit
+    speed = asked.rated_speed or drive.maximum_speed or design.speed
+    return torque, speed
+
+
+def in_drive_units(one: Assessed) -> dict[str, Any]:
+    """The controller's numbers in SI, in field units and per unit of rated torque and speed."""
+    torque, speed = rated(one.design)
+    results: dict[str, Any] = {"rated_torque": torque, "rated_speed": speed}
+    for name, value in one.controller.items():
+        shown, unit = units.displayed(value, SI_OF[name], "field")
+        results[name] = {SI_OF[name]: value, unit.replace(" ", "*"): float(shown)}
+        if torque and speed and name in ("kp", "ki"):
+            results[name]["per unit" if name == "kp" else "per unit, 1/s"] = value * speed / torque
+    kp, ki = one.controller["kp"], one.controller["ki"]
+    results["integral_time"] = kp / ki if ki > 0.0 else None
+    return results
+
+
+def tightest(one: Assessed) -> Criterion:
+    """The criterion that a passing setting comes nearest to missing."""
+
+    def room(criterion: Criterion) -> float:
+        value, limit = criterion.value, criterion.limit
+        if value is None or not math.isfinite(value):
+            return math.inf
+        if criterion.name == "probability":
+            return (value - limit) / max(1.0 - limit, 1e-9)
+        if criterion.name == "stable":  # the slope margin has its own
+            return math.inf
+        if criterion.name in ("slope_reserve", "delay"):
+            return value / limit - 1.0 if limit > 0.0 else math.inf
+        return 1.0 - value / limit if limit > 0.0 else math.inf
+
+    return min(one.criteria, key=room)
+
+
+def limits_of(one: Assessed) -> tuple[str, ...]:
+    """What limits a setting: what it misses, else what it comes nearest to."""
+    if one.missed:
+        return tuple(criterion.said for criterion in one.missed)
+    criterion = tightest(one)
+    figures, value, limit = one.loop, criterion.value or 0.0, criterion.limit
+    said = {
+        "slope_reserve": f"the slope margin, {value:.2f} times the slope of the rock, "
+        f"{limit:.2f} asked; {mode_at(one.design, figures.deciding_hz)} decides it",
+        "peak_sensitivity": f"the peak sensitivity, {value:.3g} of {limit:g}" + _peak_mode(one),
+        "delay": f"the delay that it bears, {1e3 * value:.3g} ms, with {1e3 * limit:.3g} ms in "
+        "the drive",
+        "j1": f"J1, {value:.3g} s of {limit:g} s",
+        "probability": f"the probability, shown to be {value:.3f} at least, {limit:g} required",
+        "time_at_limit": f"the limit of the drive, at which it is {100 * value:.2g} % of the time",
+    }
+    return (said.get(criterion.name, criterion.name),)
+
+
+def _peak_mode(one: Assessed) -> str:
+    part = one.loop.part
+    if part is None or part.peak_sensitivity_hz is None:
+        return ""
+    return f", at {mode_at(one.design, part.peak_sensitivity_hz)}"
+
+
+def sentence(result: Recommendation) -> str:
+    """What to set, what limits it, what would help next."""
+    best = result.recommended
+    numbers = numbers_of(best)
+    kept = best.name == PRESENT
+    chance = (
+        f"J1 <= {best.design.tables.tune.level:g} s with probability {percent(best.probability)}"
+    )
+    helps = "; ".join(result.helps)
+    if best.verdict == FAILS:
+        worst = max(best.missed, key=lambda one: one.miss)
+        missed = f"misses by {100 * worst.miss:.2g} %: {worst.said}"
+        others = [one.said for one in best.missed if one is not worst]
+        also = f"; also {'; '.join(others)}" if others else ""
+        return (
+            f"No setting passes; the least bad is {best.name} ({numbers}), which {missed}{also}. "
+            f"{helps[:1].upper()}{helps[1:]}."
+        )
+    what = f"Keep what is in the drive ({numbers})" if kept else f"Set {best.name}: {numbers}"
+    verdict = "passes"
+    if best.verdict == FRAGILE:
+        verdict = f"passes, but fragile: {'; '.join(best.fragile)}"
+    room = f" {helps[:1].upper()}{helps[1:]}." if helps else ""
+    limit = "; ".join(limits_of(best))
+    return f"{what}. It {verdict}. It has {chance}. What limits it is {limit}.{room}"
+
+
+def others(result: Recommendation) -> list[str]:
+    """Of every other setting what speaks against it, in a line."""
+    best, texts = result.recommended, []
+    for one in result.candidates:
+        if one is best:
+            continue
+        name = f"{one.name} ({NAMES.get(one.law, one.law)})" if one.name == PRESENT else one.name
+        if one.missed:
+            first = one.missed[0]
+            more = f", and {len(one.missed) - 1} more" if len(one.missed) > 1 else ""
+            stable = "stable, but " if first.name != "stable" and best.verdict == FAILS else ""
+            texts.append(f"{name}: {stable}{first.said}{more}")
+        else:
+            words = f", but fragile: {'; '.join(one.fragile)}" if one.fragile else ""
+            texts.append(f"{name}: passes too{words}; objective {one.objective:.4g} s")
+    return texts
+
+
+def question(one: Assessed, criterion: Criterion) -> str:
+    """What a criterion asks, for a report."""
+    asked, table = one.design.tables.recommend, one.design.tables.tune
+    return {
+        "stable": "Is steady drilling stable to small disturbances?",
+        "slope_reserve": f"Is the slope margin {asked.slope_reserve:g} times the rock's slope?",
+        "peak_sensitivity": f"Is the peak sensitivity at {asked.slope_share:g} of that slope at "
+        f"most {asked.peak_sensitivity:g}?",
+        "delay": "Does the loop bear as much delay again as the drive has?",
+        "j1": f"Is J1 ≤ {table.level:g} s at nominal rock, without sticking at the end?",
+        "probability": f"Is P(J1 ≤ {table.level:g} s) shown to be {percent(table.probability)}?",
+        "time_at_limit": f"Is the drive at its limit less than {percent(asked.time_at_limit)} of "
+        "the time?",
+    }[criterion.name]

@@ -1,0 +1,232 @@
+"""What to set: criteria, verdicts, windows and numbers against other rooms and by hand."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import drillctl
+from drillctl import units
+from drillctl.errors import InputError
+from drillctl.linear import loop
+from drillctl.linear.loop_margins import Margins
+from drillctl.simulation import simulate
+from drillctl.simulation.measures import STATUSES
+from drillctl.studies.recommend.assess import FAILS, FRAGILE, PASSES, best_of, drawn
+from drillctl.studies.recommend.candidates import (
+    ROBUST,
+    by_rules,
+    gains_of,
+    pi_problem,
+    present,
+)
+from drillctl.studies.recommend.compute import recommend
+from drillctl.studies.recommend.criteria import (
+    LoopFigures,
+    loop_criteria,
+    loop_figures,
+    mode_at,
+    own_delay,
+    run_criteria,
+)
+from drillctl.studies.recommend.window import Line
+from drillctl.studies.recommend.words import in_drive_units, others
+from drillctl.studies.tune.search import search
+
+HOLDS = (
+    (
+        "recommended settings",
+        "the search of `tune`, and probabilities by its certificate, to the last bit; windows by "
+        "single runs at both sides of their ends; criteria and ranks by hand",
+    ),
+)
+SMALL = {
+    "tune": {
+        "realizations": 24, "starts": 1, "probability": 0.7, "certificate": {"realizations": 120},
+        "parameters": {"controller.kp": {"min": 400, "max": 800},
+                       "controller.ki": {"min": 0, "max": 200}},
+    },
+    "simulation.accuracy": "fast",
+    "recommend.laws": ["pi", "soft-torque"],
+    "recommend.rated_torque": "50 kN*m",
+    "recommend.speed_step": "4 rpm",
+    "recommend.weight_step": "4 kN",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def design():
+    return drillctl.load("monteiro-trindade-140kn", **SMALL)
+
+
+@pytest.fixture(scope="module")
+def result(design):
+    return recommend(design)
+
+
+def test_the_robust_gains_are_those_of_tune(design, result):
+    robust = next(one for one in result.candidates if one.name == ROBUST)
+    assert robust.gains == search(design).gains
+    j1, _ = drawn(robust.design)
+    assert np.array_equal(j1, robust.j1)
+    assert robust.probability == np.mean(j1 <= design.tables.tune.level)
+
+
+def test_a_window_ends_where_single_runs_stick(result):
+    one = result.recommended
+    for line, end, outwards in (
+        (one.window.speed, one.window.lowest_speed, -1),
+        (one.window.weight, one.window.highest_weight, 1),
+    ):
+        at = int(np.flatnonzero(line.values == end)[0])
+        inside, outside = (line.values[k] for k in (at, at + outwards))
+        ends = [
+            simulate(one.design, "batch", **{line.path: units.SI(value)}).status
+            for value in (inside, outside)
+        ]
+        assert ends[0] in ("ok", "not_settled")
+        assert ends[1] in ("sticking", "stalled")
+
+
+def line(words, own=3.0):
+    status = np.array([STATUSES.index("ok" if w == "." else "sticking") for w in words], np.int8)
+    values = np.arange(len(words), dtype=float)
+    return Line("operating_point.speed", "rad/s", own, values, values, status)
+
+
+def test_ends_of_what_is_free():
+    assert line("x.....").ends() == (1.0, 5.0)
+    assert line(".x..x.").ends() == (2.0, 3.0)  # islands beyond do not count
+    assert line(".x..x.").islands()
+    assert not line("xx....").islands()
+    assert line("xxxx..").ends() == (None, None)
+    assert line("xxxx..").nearest(1) == 4.0
+    assert line("xxxx.x").nearest(1) is None
+    assert line("..xx..").nearest(-1) == 1.0
+    assert line(".x.x..").nearest(-1) == 0.0
+
+
+def figures(slope=100.0, margin=150.0, peak=2.0, delay=0.05):
+    one = Margins(5.0, 0.1, 0.1, 1.0, 6.0, 0.1, delay, 1.0)
+    part = Margins(peak, 0.1, 0.5, 3.0, 20.0, 0.1, 0.1, 1.0)
+    return LoopFigures(slope, margin, 0.12, one if slope < margin else None, part, "")
+
+
+@pytest.mark.parametrize(
+    ("changed", "missed"),
+    [
+        ({}, []),
+        ({"margin": 105.0}, ["slope_reserve"]),
+        ({"margin": 90.0}, ["stable", "slope_reserve", "delay"]),
+        ({"margin": math.nan}, ["stable", "slope_reserve", "delay"]),
+        ({"peak": 2.6}, ["peak_sensitivity"]),
+        ({"peak": 2.5}, []),
+        ({"delay": 0.01}, ["delay"]),
+        ({"slope": -10.0}, []),
+    ],
+)
+def test_each_criterion_of_the_loop_is_kept_or_missed_alone(changed, missed):
+    drive = {"controller.drive": {"sampling_period": "10 ms", "one_sample_delay": True}}
+    design = drillctl.load("monteiro-trindade-140kn", **drive)
+    assert own_delay(design.tables.controller.drive) == pytest.approx(0.015)
+    kept = loop_criteria(design, figures(**changed), design.tables.recommend)
+    assert [one.name for one in kept if not one.kept] == missed
+    assert all(bool(one.said) != one.kept for one in kept)
+    assert all((one.miss > 0.0) != one.kept for one in kept)
+
+
+@pytest.mark.parametrize(
+    ("j1", "status", "low", "missed"),
+    [
+        (20.0, "ok", 0.96, []),
+        (20.0, "not_settled", 0.95, []),
+        (34.0, "ok", 0.96, ["j1"]),
+        (20.0, "sticking", 0.96, ["j1"]),
+        (20.0, "ok", 0.94, ["probability"]),
+    ],
+)
+def test_criteria_of_the_runs(j1, status, low, missed):
+    kept = run_criteria(j1, status, 33.0, 0.96, low, 0.95)
+    assert [one.name for one in kept if not one.kept] == missed
+
+
+def test_what_passes_goes_before_what_is_fragile_and_that_before_the_least_bad():
+    def one(verdict, objective, miss=0.0):
+        return SimpleNamespace(verdict=verdict, objective=objective, badness=(miss, objective))
+
+    bad, worse = one(FAILS, 9.0, 0.2), one(FAILS, 1.0, 0.3)
+    fragile, good, better = one(FRAGILE, 2.0), one(PASSES, 8.0), one(PASSES, 7.0)
+    assert best_of([worse, bad]) is bad
+    assert best_of([bad, fragile]) is fragile
+    assert best_of([bad, fragile, good, better]) is better
+
+
+def test_figures_of_the_loop_are_those_of_loop(design):
+    one, whole = loop_figures(design, 0.5), loop(design)
+    assert one.slope == whole.operating_point.slope
+    assert one.slope_margin == whole.slope_margin
+    assert one.whole.peak_sensitivity == pytest.approx(whole.margins.peak_sensitivity, rel=1e-9)
+    # Its delay margin lies above what the elements follow: that one is not counted.
+    assert whole.mesh_limited == {"delay_margin": None}
+    assert one.whole.delay > 3.0 * whole.margins.delay
+    assert one.part.peak_sensitivity == pytest.approx(1.93, abs=0.01)
+
+
+def test_a_land_rig_is_told_which_mode_is_unstable():
+    land = drillctl.load("typical-land")
+    made = {one.name: one.design for one in by_rules(land)}
+    soft, matched = (loop_figures(made[name], 0.5) for name in ("soft torque", "Z-torque"))
+    assert not soft.stable
+    assert matched.stable
+    (unstable, *_) = loop_criteria(land, soft, land.tables.recommend)
+    assert "second mode" in unstable.said or "third mode" in unstable.said
+    assert mode_at(land, soft.deciding_hz) in unstable.said
+
+
+def test_gains_of_rules_are_those_of_the_string(design):
+    soft = next(one for one in by_rules(design) if one.name == "soft torque")
+    assert soft.law == "soft-torque"
+    string = design.string
+    assert gains_of(soft.design) == {
+        "controller.kp": 4.0 * string.pipe_impedance,
+        "controller.ki": pytest.approx(string.stick_slip_frequency**2 * string.top_inertia),
+    }
+
+
+def test_numbers_in_units_of_drives(result):
+    one = next(x for x in result.candidates if x.name == "in the drive now")
+    told = in_drive_units(one)
+    assert told["kp"]["N*m*s/rad"] == 625.0
+    assert told["kp"]["klbf*ft/rpm"] == pytest.approx(625.0 * math.pi / 30.0 / 1355.8179483)
+    assert told["ki"]["klbf*ft/rev"] == pytest.approx(125.0 * 2.0 * math.pi / 1355.8179483)
+    assert told["kp"]["per unit"] == pytest.approx(625.0 * one.design.speed / 50e3)
+    assert told["integral_time"] == 5.0
+
+
+def test_what_is_in_the_drive_now_may_be_named(design):
+    named = design.replace({"recommend.present": {"kp": 500.0}})
+    assert present(named).top_drive.kp == 500.0
+    assert present(design) is design
+    other = design.replace({"recommend.present": {"law": "soft-torque", "share": 0.5}})
+    assert present(other).tables.controller.share == 0.5
+    with pytest.raises(InputError, match=r"recommend\.present"):
+        present(design.replace({"recommend.present": {"kq": 1.0}}))
+
+
+def test_a_rig_without_a_pi_has_one_to_tune():
+    lumped = drillctl.load("navarro-lopez-2dof-bistable")
+    assert pi_problem(lumped).tables.controller.law == "pi"
+
+
+def test_the_sentence_names_setting_limit_and_room(result):
+    best = result.recommended
+    assert best.name in result.sentence
+    assert all(text in result.sentence for text in (*result.limits, "What limits it is"))
+    said = others(result)
+    assert len(said) == len(result.candidates) - 1
+    assert any(text.startswith("soft torque: unstable in the first mode") for text in said)
+    summary = result.summary()
+    assert summary["recommended"]["gains"] == best.gains
+    assert set(summary["candidates"]) == {one.name for one in result.candidates}
+    assert summary["candidates"]["soft torque"]["verdict"] == FAILS
