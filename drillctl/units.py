@@ -52,6 +52,8 @@ TORQUE = Kind("torque", "N*m", ("kN*m", "N*m", "klbf*ft"), (0.0, 150e3))
 LENGTH = Kind("length", "m", ("m", "ft"), (0.05, 15e3))
 DIAMETER = Kind("length", "m", ("mm", "in", "m"), (0.012, 1.0))
 TIME = Kind("time", "s", ("s", "ms", "min"))
+ANGLE = Kind("angle", "rad", ("rev", "rad", "deg"))
+PENETRATION = Kind("rate of penetration", "m/s", ("m/h", "ft/h", "m/s"), (0.0, 0.1))
 RATE = Kind("rate", "1/s", ("1/s",))
 INERTIA = Kind("inertia", "kg*m^2", ("kg*m^2",))
 DENSITY = Kind("density", "kg/m^3", ("kg/m^3",), (700.0, 20e3))
@@ -90,6 +92,8 @@ _KNOWN: dict[str, dict[str, float]] = {
         "m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1e3, "in": 0.0254, "ft": 0.30479999999999996,
     },
     "s": {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0},
+    "rad": {"rad": 1.0, "rev": 6.283185307179586, "deg": 0.017453292519943295},
+    "m/s": {"m/s": 1.0, "m/h": 1.0 / 3600.0, "ft/h": 8.466666666666666e-05},
     "1/s": {"1/s": 1.0},
     "kg*m^2": {"kg*m^2": 1.0, "lb*ft^2": 0.0421401100938048},
     "kg/m^3": {"kg/m^3": 1.0, "g/cm^3": 1e3, "lb/gal": 119.82642731689667},
@@ -358,7 +362,7 @@ DIAMETERS = "m across"  # for `displayed`: a length that is read in mm or in
 _SHOWN: dict[str, dict[str, str]] = {
     "si": {
         "rad/s": "rpm", "N": "kN", "N*m": "kN*m", "N*s/rad": "kN*s/rad", "J": "kJ",
-        "rad/(N*m*s)": "rpm/(kN*m)", DIAMETERS: "mm",
+        "rad/(N*m*s)": "rpm/(kN*m)", "m/s": "m/h", DIAMETERS: "mm",
     },
     "field": {
         "rad/s": "rpm", "rad": "rev", "s/rad": "1/rpm", "N": "klbf", "N/s": "klbf/s",
@@ -367,7 +371,7 @@ _SHOWN: dict[str, dict[str, str]] = {
         "rad/(N*m*s)": "rpm/(klbf*ft)", "rad/s/(N*m)": "rpm/(klbf*ft)",
         "rad/(N*m)": "rev/(klbf*ft)",
         "kg*m^2": "lb*ft^2", "kg/m": "lb/ft", "kg/m^3": "lb/gal", "Pa": "psi", "Pa*s": "cP",
-        "W": "hp", "m^4": "in^4", "m": "ft", DIAMETERS: "in",
+        "W": "hp", "m^4": "in^4", "m": "ft", "m/s": "ft/h", DIAMETERS: "in",
     },
 }  # fmt: skip
 _SPOKEN = {"N*m*s/rad": "N m s", "N*m/rad": "N m", "1": ""}  # else as `_plain` has it

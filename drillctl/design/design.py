@@ -17,6 +17,7 @@ from drillctl.design.validation import validated
 from drillctl.design.warnings import DesignWarning, warnings_of
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import BitRockLaw
+from drillctl.rig.bit_rock.variation import NoVariation, Variation
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.drillstring.mesh import MeshedSection
 from drillctl.rig.program import Program
@@ -137,6 +138,11 @@ class Design:
     def bit_rock_before(self) -> BitRockLaw:
         """Bit-rock law before the rock changes."""
         return parts.bit_rock_before(self.tables)
+
+    @cached_property
+    def variation(self) -> Variation | NoVariation:
+        """How the rock varies along the way."""
+        return parts.variation(self.tables)
 
     @cached_property
     def program(self) -> Program:

@@ -14,6 +14,7 @@ from drillctl.design.tables import DesignTables, SectionTable, SpeedProgramTable
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.law import changed_rock, form_of, friction_laws
+from drillctl.rig.bit_rock.variation import NoVariation, Variation, variation_of
 from drillctl.rig.drillstring import (
     GRADES,
     PIPES,
@@ -290,6 +291,12 @@ def bit_rock_before(tables: DesignTables) -> BitRockLaw:
         return changed_rock(law, *factors)
     except InputError as error:
         raise InputError(error.problem, f"scenario.bit_rock.{error.where}") from None
+
+
+def variation(tables: DesignTables) -> Variation | NoVariation:
+    """How the rock varies along the way."""
+    table = getattr(tables.bit_rock, "variation", None)
+    return variation_of(table, tables.operating_point.rate_of_penetration, tables.uncertainty.seed)
 
 
 def _refuse_impossible_friction(law: BitRockLaw, weight: float) -> None:

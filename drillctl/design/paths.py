@@ -136,7 +136,8 @@ def _collect(table: Table, prefix: str, result: list[Parameter]) -> None:
                 _collect(section, f"{path}.{section.name}.", result)
         elif _is_number(info.annotation) and not isinstance(value, tuple):
             whole = _is_number(info.annotation, int) and not _is_number(info.annotation, float)
-            result.append(Parameter(path, kind_of(info), value, whole, _check_of(info)))
+            kind = kind_of(info) or table.kind_by_key(key)
+            result.append(Parameter(path, kind, value, whole, _check_of(info)))
 
 
 def _is_number(annotation: Any, *types: type) -> bool:

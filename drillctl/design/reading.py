@@ -155,7 +155,7 @@ def to_tree(table: Table) -> Tree:
     """A table as plain TOML data, quantities as text with units; what is not set is left out."""
     tree: Tree = {}
     for key, name, kind, annotation, required in _fields(type(table)):
-        value = _plain(getattr(table, key), kind, annotation)
+        value = _plain(getattr(table, key), kind or table.kind_by_key(key), annotation)
         if value is not None and (required or value not in ("", {}, [])):
             tree[name] = value
     return tree

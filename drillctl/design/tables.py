@@ -24,6 +24,7 @@ from drillctl.design.uncertain_tables import (
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig import table as q
 from drillctl.rig.bit_rock.law import friction_laws
+from drillctl.rig.bit_rock.variation import RATE_OF_PENETRATION
 from drillctl.rig.drillstring import GRADES, PIPES, Joint
 from drillctl.rig.drillstring.catalogue import FOOT, find
 from drillctl.rig.table import Table, one_of
@@ -42,10 +43,14 @@ else:
 
 
 class OperatingPoint(Table):
-    """Where the rig drills: final set speed and nominal weight on bit."""
+    """Where the rig drills: final set speed and nominal weight on bit.
+
+    `rate_of_penetration`: at which a rock that varies over depth passes by.
+    """
 
     speed: q.PositiveSpeed = 100 * units.RPM
     weight_on_bit: q.Weight = 120e3
+    rate_of_penetration: q.Penetration = RATE_OF_PENETRATION
 
 
 RANGE_2 = 31.0 * FOOT  # length (m) of a joint of pipe where nothing else is given

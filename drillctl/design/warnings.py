@@ -73,6 +73,7 @@ def warnings_of(
     found = (
         *_implausible(tables),
         _assumed_rock(tables),
+        _varying_rock(tables),
         _weak_drive(tables, rock.static_torque(at_rest)),
         _growing(string, parts, -float(slope), drive, tables.simulation.duration),
         _light_bit(parts, fall),
@@ -88,6 +89,23 @@ def _assumed_rock(tables: DesignTables) -> DesignWarning | None:
     if not remark:
         return None
     return DesignWarning(remark, "bit_rock.aggressiveness", "3 T / (W D) of a measured torque T")
+
+
+def _varying_rock(tables: DesignTables) -> DesignWarning | None:
+    """A rock that varies over depth so slowly that a run meets one level of it."""
+    table = getattr(tables.bit_rock, "variation", None)
+    if table is None or table.cv == 0.0 or table.over != "depth":
+        return None
+    rate, duration = tables.operating_point.rate_of_penetration, tables.simulation.duration
+    drilled = rate * duration
+    if table.length < drilled:
+        return None
+    return DesignWarning(
+        f"at {units.write(rate, units.PENETRATION)} a run of {duration:g} s drills "
+        f"{drilled:.2g} m, less than the correlation length of {table.length:g} m: its rock is of "
+        "nearly one random level",
+        "bit_rock.variation.length", "centimetres to decimetres within a run",
+    )  # fmt: skip
 
 
 def _implausible(tables: DesignTables) -> Iterator[DesignWarning]:

@@ -70,7 +70,7 @@ def over_axes(axes: tuple[Axis, ...], system: units.System = "si") -> dict[str, 
     return {name: grid.ravel().tolist() for name, grid in zip(columns, grids, strict=True)}
 
 
-OF_THE_ROCK = ("friction.", "before.", "weight.", "weight_program.", "set_speed")
+OF_THE_ROCK = ("friction.", "before.", "variation.", "weight.", "weight_program.", "set_speed")
 """Names of numbers on which the steepest falling slope of the rock depends."""
 OF_THE_PROGRAM = ("speed_program.", "weight_program.", "rock_until")
 """Names of numbers that say when something jumps or turns."""
@@ -223,7 +223,10 @@ def _by_kind(design: Design, axes: tuple[Axis, ...], a: Axis) -> list[slice]:
     A delay of zero is no delay, an infinite limit no limit, a drive that absorbs nothing a plain
     PI: such laws take other kernels.
     """
-    changing = ("controller.drive.", "controller.absorption", "weight_on_bit.path.", "scenario.")
+    changing = (
+        "controller.drive.", "controller.absorption", "weight_on_bit.path.", "scenario.",
+        "bit_rock.variation.",
+    )  # fmt: skip
     if not a.path.startswith(changing):
         return [slice(0, len(a))]
     low = {other.path: other.values[0] for other in axes}

@@ -30,6 +30,7 @@ from drillctl.design.tables import DistributionTable
 from drillctl.design.uncertain_tables import UncertaintyTable
 from drillctl.errors import InputError, nearest
 from drillctl.rig.bit_rock.law import friction_laws
+from drillctl.rig.bit_rock.variation import NoVariation
 from drillctl.store.codec import documented, label
 
 _PER_COUNTER = 4  # numbers that Philox makes of one state of its counter
@@ -156,6 +157,8 @@ DEFAULT_COV = 0.05
 """Coefficient of variation of the rock where a design names nothing uncertain: lognormal draws of
 sliding and static torque about its own values."""
 
+REALIZATION = "bit_rock.variation.realization"
+"""Number of the path of a rock that varies along the way: each draw has its own."""
 FAR = 8.0  # standard deviations beyond which a limit cuts nothing off a normal distribution
 
 
@@ -288,7 +291,10 @@ def drawing(design: Design, seed: int) -> Callable[[int, int], Draws]:
         points = sampling.points(paths, count, first)
         if root is not None:
             points = correlated(points, root)
-        return Draws(seed, first, result, {p.path: p.values(points[p.path]) for p in result})
+        values = {p.path: p.values(points[p.path]) for p in result}
+        if not isinstance(design.variation, NoVariation):  # a path of its own for each
+            values[REALIZATION] = np.arange(first, first + count, dtype=float)
+        return Draws(seed, first, result, values)
 
     return drawn
 

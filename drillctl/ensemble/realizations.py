@@ -124,8 +124,9 @@ def _rig(design: Design) -> Design:
 
 TIMED = ("speed_program.begin", "speed_program.end", "weight_program.begin",
          "weight_program.end", "speed_program.first", "weight_program.first", "rock_until",
-         "drive.period")  # fmt: skip
-"""Numbers of a lane that the moments at which steps end follow from."""
+         "drive.period", "variation.spread", "variation.spacing",
+         "variation.advance")  # fmt: skip
+"""Numbers of a lane that the moments at which steps end follow from, and how long steps are."""
 
 
 @dataclass

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from drillctl.plots.uncertainty import cell_distributions as cell_distributions
     from drillctl.plots.uncertainty import probability_map as probability_map
     from drillctl.plots.uncertainty import region_error as region_error
+    from drillctl.plots.uncertainty import response_envelope as response_envelope
     from drillctl.plots.uncertainty import sensitivity_bars as sensitivity_bars
     from drillctl.plots.uncertainty import uncertain_regions as uncertain_regions
     from drillctl.plots.well import friction_sweep as friction_sweep
@@ -83,6 +84,7 @@ _MODULES = {
         "cell_distributions",
         "probability_map",
         "region_error",
+        "response_envelope",
         "sensitivity_bars",
         "uncertain_regions",
     ),

@@ -18,6 +18,7 @@ from matplotlib.patches import Patch
 
 from drillctl import units
 from drillctl.arrays import Array
+from drillctl.ensemble.envelopes import ENVELOPED
 from drillctl.ensemble.probability import INNER, MEDIAN, OUTER, needed
 from drillctl.errors import InputError
 from drillctl.plots import style
@@ -86,6 +87,32 @@ def cell_distributions(
     style.dress(ax, "J1 (s)", "share of the draws at or under it", title)
     ax.legend(fontsize=style.SMALL, frameon=False, loc="lower right")
     figure.supxlabel(f"{result.realizations} draws; levels dashed", fontsize=style.SMALL)
+    return figure
+
+
+@style.picture(raises="No draw gave a response.")
+def response_envelope(
+    result: Uncertainty, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
+    """Bit speed and pipe torque over time at the design's own setting: 5 to 95 % of the draws."""
+    band = result.envelope
+    if band is None:
+        raise InputError("no draw of the design gives a response")
+    figure, panels = style.grid_or_new(ax, 2, 1, 7.5, 5.6, share_x=True)
+    for panel, name in zip(panels, ("bit_speed", "pipe_torque"), strict=True):
+        (low, middle, high), unit = units.displayed(band.signals[name], ENVELOPED[name], system)
+        panel.fill_between(
+            band.time, low, high, color=style.SKY, alpha=0.5, linewidth=0.0,
+            label="5 to 95 % of the draws",
+        )  # fmt: skip
+        panel.plot(band.time, middle, color=style.BLUE, linewidth=1.2, label="median")
+        panel.set_xlim(0.0, float(band.time[-1]))
+        title = style.heading(result, "Responses over the draws") if name == "bit_speed" else ""
+        style.dress(panel, "time (s)", f"{name.replace('_', ' ')} ({unit})", title)
+        panel.label_outer()
+    panels[0].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
+    text = f"{band.count} draws, each moment by itself: the curves are no runs"
+    figure.supxlabel(text, fontsize=style.SMALL)
     return figure
 
 

@@ -158,6 +158,8 @@ DampingRatio = Annotated[float, _not_negative(50.0)]
 PoissonRatio = Annotated[float, BeforeValidator(Reader(None, Range(-1.0, 0.5)))]
 FrictionFactor = Annotated[float, _not_negative(10.0)]
 Share = Annotated[float, _not_negative(1.0)]
+Spread = Annotated[float, _not_negative(10.0)]  # coefficient of variation
+AlongWay = Annotated[float, _positive(1e-6, 1e8)]  # of depth, angle or time: m, rad or s
 Arm = Annotated[float, _not_negative(1e3)]  # torque over weight on bit (m)
 Decay = Annotated[float, _not_negative(1e4)]  # of a torque with speed (s/rad)
 Count = Annotated[int, _count(1)]
@@ -169,6 +171,7 @@ MOST_TORQUE = 1e9  # (N m)
 
 Speed = Annotated[float, units.SPEED, _any(1e5, units.SPEED)]
 PositiveSpeed = Annotated[float, units.SPEED, _positive(1e-9, 1e5, units.SPEED)]
+Penetration = Annotated[float, units.PENETRATION, _positive(1e-9, 1.0, units.PENETRATION)]
 SpeedOrZero = Annotated[float, units.SPEED, _not_negative(1e5, units.SPEED)]
 Weight = Annotated[float, units.FORCE, _not_negative(1e9, units.FORCE)]
 PositiveWeight = Annotated[float, units.FORCE, _positive(1e-3, 1e9, units.FORCE)]
@@ -233,6 +236,10 @@ class Table(BaseModel):
 
     # A table inside another is never validated alone: half of the validators need not be built.
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+    def kind_by_key(self, key: str) -> Kind | None:
+        """What a number measures whose unit follows from another key; None for all others."""
+        return None
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Table:
         """Itself, as it is frozen: a default is handed to each of thousands of draws."""

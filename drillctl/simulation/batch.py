@@ -29,6 +29,7 @@ from drillctl.simulation.step_laws import (
     observer_step,
     program_step,
     remembered,
+    variation_step,
     weight_step,
 )
 
@@ -67,8 +68,9 @@ def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
     inertia = bit_inertia(lanes.string)
     period = lanes.drive.period if isinstance(lanes.drive, SampledDrive) else None
     scheme = choose_scheme(
-        lanes.string, table, lanes.steepest_fall, inertia, _shared(period), _turns(lanes)
-    )
+        lanes.string, table, lanes.steepest_fall, inertia, _shared(period), _turns(lanes),
+        lanes.longest_step,
+    )  # fmt: skip
     stepper = string_step(lanes.string, scheme.step, scheme.modes)
     return Prepared(stepper, scheme, table.duration, table.j1_from)
 
@@ -167,10 +169,11 @@ def _run(
             _at_whole_steps(padded.drive, scheme), scheme.step, prepared.stepper.string
         ),
         weight_step(padded.weight, scheme.step), program_step(padded.program),
+        variation_step(padded.variation, duration, padded.set_speed),
         observer_step(observer, scheme.step, begin),
         numbers, np.ascontiguousarray(state), ticks,
     )  # fmt: skip
-    run = kernel(*arguments[1:7])
+    run = kernel(*arguments[1:8])
     rows = ROWS + 2 * len(state) + ticks.remembered + 2 * ticks.estimated
     rows += -(-MOST_READ * len(state) // WIDTH)
 

@@ -5,6 +5,7 @@ What a lane of the batch engine is: the numbers of one rig on a shared string.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from drillctl.design import Design
 from drillctl.rig.bit_rock import contact
+from drillctl.rig.bit_rock.variation import NoVariation, Variation
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.program import Program
 from drillctl.rig.weight_on_bit import AlarmWeight
@@ -80,6 +82,7 @@ class Lanes:
     table_low: Array
     table_high: Array
     before: Any  # bit-rock law before the rock changes, of the type of `friction`
+    variation: Variation | NoVariation  # of the rock along the way
     program: Program  # what changes by the clock, with an array for each number
     observer: Observer | None  # of the bit, shared by all lanes
     start: Kind  # {'rest', 'turning', 'wound_up'}: Kind of start
@@ -104,6 +107,7 @@ class Lanes:
             table_low=self.table_low[chosen],
             table_high=self.table_high[chosen],
             before=some(self.before),
+            variation=some(self.variation),
             program=Program(
                 some(self.program.speed), some(self.program.weight), self.program.rock_until[chosen]
             ),
@@ -114,7 +118,17 @@ class Lanes:
     @cached_property
     def steepest_fall(self) -> float:
         """Steepest falling slope of the rock in any lane (N m s/rad)."""
-        return max(self._steepest(rock) for rock in (self.friction, self.before))
+        steepest = max(self._steepest(rock) for rock in (self.friction, self.before))
+        if isinstance(self.variation, NoVariation):
+            return steepest
+        return steepest * float(np.max(self.variation.highest))
+
+    @property
+    def longest_step(self) -> float:
+        """Longest step (s) that follows the rock along the way."""
+        if isinstance(self.variation, NoVariation):
+            return math.inf
+        return float(np.min(self.variation.longest_step(self.set_speed)))
 
     def _steepest(self, rock: Any) -> float:
         if self.weight.moves:
@@ -150,7 +164,10 @@ class Lanes:
 
 def kinds(design: Design) -> tuple[Any, ...]:
     """What lanes that run together have in common: types of laws and programs, and sampling."""
-    laws = (design.bit_rock, design.top_drive, design.weight_on_bit, design.program.speed)
+    laws = (
+        design.bit_rock, design.top_drive, design.weight_on_bit, design.program.speed,
+        design.variation,
+    )  # fmt: skip
     return (*(type(law) for law in laws), getattr(design.weight_on_bit, "period", 0.0) > 0.0)
 
 
@@ -159,7 +176,8 @@ def lane_numbers(design: Design) -> dict[str, float]:
     program = design.program
     laws = {
         "friction": design.bit_rock, "drive": design.top_drive, "weight": design.weight_on_bit,
-        "before": design.bit_rock_before, "speed_program": program.speed,
+        "before": design.bit_rock_before, "variation": design.variation,
+        "speed_program": program.speed,
         "weight_program": program.weight,
     }  # fmt: skip
     numbers = {
@@ -194,6 +212,7 @@ def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
         table_low=numbers["table_low"],
         table_high=numbers["table_high"],
         before=law("before", design.bit_rock_before),
+        variation=law("variation", design.variation),
         program=Program(
             law("speed_program", design.program.speed),
             law("weight_program", design.program.weight),

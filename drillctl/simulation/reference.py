@@ -21,6 +21,7 @@ from drillctl.errors import SimulationError
 from drillctl.linear.observer import observer_of
 from drillctl.progress import SILENT, Progress, reporting_compilation
 from drillctl.rig.bit_rock import PrintedThreeBranch
+from drillctl.rig.bit_rock.variation import NoVariation, path
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight, ObservedWeight
@@ -304,6 +305,8 @@ def is_stiff(design: Design, rig: Any) -> bool:
     """Whether explicit steps would follow modes that have died out long before."""
     if rig["tolerance"][0] > 0.0 or rig["full"][0] or not rig["damped"][0]:
         return False
+    if rig["turns"][0] > 0.0:  # torques that follow the angle are in no Jacobian
+        return False
     swing, decay = _fastest(design.string, rig)
     needed = max(swing / EXPLICIT_SWING, decay / EXPLICIT_DECAY)
     return needed > FEW and decay > 2.0 * RATIO * swing
@@ -346,6 +349,8 @@ def numbers_of(design: Design, also_kept: NDArray[np.integer[Any]] | None = None
         [] if also_kept is None else also_kept,
     ]).astype(np.int64)  # fmt: skip
     arrays |= _string_arrays(design.string, design.speed)
+    numbers, arrays["path"] = _variation_of(design)
+    plain |= numbers
     arrays |= {"begin": np.zeros(size), "tape": np.empty((ROOM, f.FIRST + 8 * (len(kept) + 2)))}
     damping = design.string.damping.tocoo()
     rig = np.zeros(1, dtype=f.RIG)
@@ -437,6 +442,16 @@ def _laws_of(design: Design) -> tuple[dict[str, Any], dict[str, Array]]:
         "rock_until": float(program.rock_until),
     }
     return plain, {"laws": laws, "observer": np.ascontiguousarray(observer)}
+
+
+def _variation_of(design: Design) -> tuple[dict[str, Any], Array]:
+    """How the rock varies along the way, and its path."""
+    one = design.variation
+    if isinstance(one, NoVariation):
+        return {"spacing": 1.0}, np.zeros(2)
+    nodes = int(one.nodes(design.tables.simulation.duration, design.speed))
+    names = ("spread", "spacing", "advance", "turns")
+    return {name: getattr(one, name) for name in names} | {"path_nodes": nodes}, path(one, nodes)
 
 
 def _start(design: Design, size: int, drive_states: int, weight_states: int) -> Array:

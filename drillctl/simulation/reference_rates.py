@@ -75,13 +75,20 @@ WHOLE_NUMBERS = (
     "drive_kind", "drive_torque", "rock_torque", "static_torque", "set_valued",
     "weight_kind", "weight",  # addresses of `law_calls` among them
     "rates", "margin", "decision", "weighing",  # addresses of what is compiled by itself
-    "bands", "full_damping", "laws", "observer", "begin", "tape",  # addresses of arrays
+    "bands", "full_damping", "laws", "observer", "begin", "tape", "path",  # addresses of arrays
+    "path_nodes",
     "components", "steps",  # kept of each step; on the tape
 )  # fmt: skip
 NUMBERS = (
     "tolerance",  # of the printed law (rad/s); 0 of any other
     "rock_until",  # s
     "set_speed",  # rad/s
+    # of a rock that varies: standard deviation of its logarithm, 0 of one that does not; distance
+    # of the nodes; way per time and per angle of the bit
+    "spread",
+    "spacing",
+    "advance",
+    "turns",
     "drag",  # torque of all damping to ground at the set speed (N m)
 )
 RIG = np.dtype([(name, np.int64) for name in WHOLE_NUMBERS] + [(name, float) for name in NUMBERS])
@@ -540,20 +547,40 @@ def _rock(rig: Any, time: float) -> Any:
 
 
 @compiled
+def rock_factor(rig: Any, time: float, state: Any) -> float:
+    """What a rock that varies along the way multiplies its torques with."""
+    if rig.spread == 0.0:
+        return 1.0
+    way = rig.advance * time
+    if rig.turns > 0.0:
+        last = rig.nodes - 1
+        begin = numba.carray(_pointer(rig.begin), (rig.states,))[last]
+        way += rig.turns * (state[last] - begin + rig.set_speed * time)
+    count = rig.path_nodes
+    place = min(max(way / rig.spacing, 0.0), count - 2.0)
+    node = int(place)
+    path = numba.carray(_pointer(rig.path), (count,))
+    value = path[node] + (place - node) * (path[node + 1] - path[node])
+    return math.exp(rig.spread * (value - 0.5 * rig.spread))
+
+
+@compiled
 def friction(rig: Any, time: float, state: Any, speed: float) -> float:
     """Torque of the rock (N m) at a bit speed in its own direction (rad/s).
 
     Continued smoothly past zero speed, so that the event can be located that ends the phase.
     """
     load = weight(rig, time, speed, state)
-    return _rock_law(rig, _rock(rig, time), load, speed, 0.0, 0.0)
+    torque = _rock_law(rig, _rock(rig, time), load, speed, 0.0, 0.0)
+    return rock_factor(rig, time, state) * torque
 
 
 @compiled
 def static_torque(rig: Any, time: float, state: Any) -> float:
     """Largest torque on a bit at rest (N m)."""
     load = weight(rig, time, 0.0, state)
-    return _static_law(rig, _rock(rig, time), load, 0.0, 0.0, 0.0)
+    torque = _static_law(rig, _rock(rig, time), load, 0.0, 0.0, 0.0)
+    return rock_factor(rig, time, state) * torque
 
 
 @compiled

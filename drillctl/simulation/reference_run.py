@@ -180,6 +180,9 @@ def _next_stop(rig: Any, clock: Any, time: float) -> float:
             stop = min(stop, k * every + delay)
         elif delay > 0.0:  # the method of steps: what comes late is known before it is asked for
             stop = min(stop, time + delay)
+    if rig.spread > 0.0 and rig.advance > 0.0:  # where the path has a kink
+        every = rig.spacing / rig.advance
+        stop = min(stop, (math.floor(time / every * (1.0 + 1e-12)) + 1.0) * every)
     for moment in clock.breaks:
         if moment > time:
             return min(stop, moment)

@@ -108,15 +108,19 @@ def choose_scheme(
     bit_inertia: float,
     period: float | None = None,
     turns: Array = NO_TURNS,
+    seen: float = math.inf,
 ) -> Scheme:
-    """Step and modes from the accuracy asked for, unless they are given."""
+    """Step and modes from the accuracy asked for, unless they are given.
+
+    `seen`: longest step (s) that follows a rock along the way.
+    """
     accuracy = ACCURACIES[table.accuracy]
     frequency, _ = string.undamped_modes
     # Mobility over a step is about step / inertia: the bit has no time to move the string.
     longest = STEEPEST * bit_inertia / steepest_fall if steepest_fall > 0.0 else math.inf
     elastic = 2.0 * math.pi / frequency[1]
     if table.step is None:
-        step = min(accuracy.step, elastic / accuracy.steps_per_period, longest)
+        step = min(accuracy.step, elastic / accuracy.steps_per_period, longest, seen)
     elif table.step > longest:
         raise InputError(
             f"{table.step:g} s is too long for this friction law: its torque falls by "

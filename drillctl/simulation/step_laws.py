@@ -10,6 +10,7 @@ import scipy.linalg
 
 from drillctl.arrays import Array
 from drillctl.linear.observer import Observer
+from drillctl.rig.bit_rock.variation import NoVariation, paths
 from drillctl.rig.program import Path
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight
@@ -166,6 +167,21 @@ def observer_step(observer: Observer | None, step: float, start: Start) -> Any:
         np.outer(observer.state(start.twist, still), start.angle)
         + np.outer(observer.state(still, start.turn), start.speed),
     )
+
+
+def variation_step(variation: Any, duration: float, set_speed: Array) -> Any:
+    """The kernel's form of a rock that varies along the way, with its paths."""
+    from drillctl.simulation.kernels.variation_step import SameRock, VariationStep
+
+    if isinstance(variation, NoVariation):
+        return SameRock(np.zeros(1))
+    table, begin = paths(variation, duration, set_speed)
+    last = table.shape[1] - 2.0 + np.array([0.0])
+    per_spacing = 1.0 / variation.spacing
+    return VariationStep(
+        table.ravel(), last, begin, variation.advance, variation.turns, per_spacing,
+        variation.spread,
+    )  # fmt: skip
 
 
 def program_step(program: Any) -> Any:

@@ -14,10 +14,9 @@ from pydantic import model_validator
 from drillctl import units
 from drillctl.errors import InputError
 from drillctl.rig import table as q
-from drillctl.rig.bit_rock.law import Form, FrictionLaw
+from drillctl.rig.bit_rock.law import Form, FrictionLaw, RockTable
 from drillctl.rig.bit_rock.navarro_lopez_suarez import NavarroLopezSuarez
 from drillctl.rig.bit_rock.stribeck import Stribeck
-from drillctl.rig.table import Table
 
 SLIDING = {"pdc": 0.50, "hybrid": 0.375, "roller-cone": 0.25}
 """Typical coefficient of a turning bit: of PDC and roller-cone bits as usual in calculations of
@@ -83,7 +82,7 @@ def typical(bit_type: str, rock: str) -> DrillersNumbers:
     return DrillersNumbers(round(SLIDING[bit_type] * STRENGTH[rock] / fallen, 2), RATIO, SCALE)
 
 
-class BitAggressivenessTable(Table):
+class BitAggressivenessTable(RockTable):
     """Friction in drillers' numbers: a2 = mu D / 3, a1 = a2 ratio, beta = 1 / speed scale.
 
     `aggressiveness` mu = 3 T / (W D) at zero speed: 36 T / (D W) of Pessier & Fear (1992) with T in

@@ -7,8 +7,7 @@ from typing import Any, Literal, NamedTuple
 from pydantic import model_validator
 
 from drillctl.rig import table as q
-from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, refuse_rising
-from drillctl.rig.table import Table
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, RockTable, refuse_rising
 
 
 class JansenVanDenSteen(NamedTuple):
@@ -54,7 +53,7 @@ class JansenVanDenSteen(NamedTuple):
         return self.a1 * weight + none, none
 
 
-class JansenVanDenSteenTable(Table):
+class JansenVanDenSteenTable(RockTable):
     """A static peak over a constant sliding torque (after Jansen & van den Steen 1995)."""
 
     law: Literal["jansen-van-den-steen"]
@@ -67,7 +66,7 @@ class JansenVanDenSteenTable(Table):
         return self
 
 
-class CoulombTable(Table):
+class CoulombTable(RockTable):
     """The same torque at rest and at any speed: a x weight on bit."""
 
     law: Literal["coulomb"]

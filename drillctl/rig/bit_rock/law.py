@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from drillctl import registry
 from drillctl.errors import InputError
+from drillctl.rig.bit_rock.variation import VariationTable
 from drillctl.rig.table import Table, law_name
 
 Exp = Callable[[Any], Any]  # an exponential: `math.exp`, a compiled one, or `casadi.exp`
@@ -37,6 +38,12 @@ class BitRockLaw(Protocol):
     def torque_and_slope(self, weight: Any, speed: Any, exp: Exp) -> tuple[Any, Any]:
         """Torque (N m) at `speed` >= 0 (rad/s) under `weight` (N), and its slope (N m s/rad)."""
         ...
+
+
+class RockTable(Table):
+    """Keys that every friction law has."""
+
+    variation: VariationTable = VariationTable()
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from pydantic import field_validator, model_validator
 
 from drillctl.errors import InputError
 from drillctl.rig import table as q
-from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, refuse_rising
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, RockTable, refuse_rising
 from drillctl.rig.bit_rock.stribeck import COEFFICIENTS, Stribeck
 from drillctl.rig.table import Table
 
@@ -267,7 +267,7 @@ class FrictionRow(Table):
         return self
 
 
-class FrictionCoefficients(Table):
+class FrictionCoefficients(RockTable):
     """What laws have in common that decay exponentially: coefficients, or a table over WOB."""
 
     law: str
@@ -361,7 +361,7 @@ class NavarroLopezSuarezTable(FrictionCoefficients):
     regularised_over: q.PositiveSpeed | None = None
 
 
-class BitRadiusFrictionTable(Table):
+class BitRadiusFrictionTable(RockTable):
     """The same law with a bit radius and friction coefficients (Navarro-Lopez & Cortes 2007).
 
     T = W R_b [mu_c + (mu_s - mu_c) exp(-gamma |w| / v_f)].

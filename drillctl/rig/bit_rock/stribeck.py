@@ -7,8 +7,7 @@ from typing import Any, Literal, NamedTuple
 from pydantic import model_validator
 
 from drillctl.rig import table as q
-from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, refuse_rising
-from drillctl.rig.table import Table
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, RockTable, refuse_rising
 
 COEFFICIENTS = ("static_coefficient", "sliding_coefficient")
 
@@ -64,7 +63,7 @@ class Stribeck(NamedTuple):
         return level * tanh, level * rise - self.decay * falling * tanh
 
 
-class StribeckTable(Table):
+class StribeckTable(RockTable):
     """Stribeck friction regularised by tanh, smooth; defaults of a public simulator."""
 
     law: Literal["stribeck"]

@@ -10,7 +10,7 @@ from pydantic import model_validator
 
 from drillctl.errors import InputError
 from drillctl.rig import table as q
-from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, RockTable
 from drillctl.rig.table import Table
 
 KNOTS = 12  # most points after the first
@@ -118,7 +118,7 @@ class FrictionPoint(Table):
     a: q.Arm
 
 
-class TabulatedFrictionTable(Table):
+class TabulatedFrictionTable(RockTable):
     """Measured points of torque over weight, straight lines between them."""
 
     law: Literal["tabulated"]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal, NamedTuple
 
 from drillctl.rig import table as q
-from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw
-from drillctl.rig.table import Table
+from drillctl.rig.bit_rock.law import Exp, Form, FrictionLaw, RockTable
 
 
 class TuckerWang(NamedTuple):
@@ -64,7 +63,7 @@ class TuckerWang(NamedTuple):
         return torque, scale * (self.b1 * (1.0 - tanh * tanh) + hump)
 
 
-class TuckerWangTable(Table):
+class TuckerWangTable(RockTable):
     """Smooth friction with a hump (Tucker & Wang family); defaults of a public model."""
 
     law: Literal["tucker-wang"]

@@ -50,6 +50,12 @@ from drillctl.simulation.kernels.program_step import advance_program, begin_prog
 from drillctl.simulation.kernels.rock_step import foresee, hold_rock, meet_rock
 from drillctl.simulation.kernels.rows import CHUNK, PASS, WIDTH
 from drillctl.simulation.kernels.string_step import complete_and_propagate, load_string, look
+from drillctl.simulation.kernels.variation_step import (
+    advance_variation,
+    begin_variation,
+    turn_variation,
+    varied,
+)
 from drillctl.simulation.kernels.vectors import (
     Variable,
     at,
@@ -110,7 +116,7 @@ def _load(
     put(work, r.PIPE_OFFSET, string.pipe_offset * set_speed)
 
 
-def _begin_rock(friction: Any, weight: Any, program: Any, work: Any) -> None:
+def _begin_rock(friction: Any, weight: Any, program: Any, variation: Any, work: Any) -> None:
     """What bit and rock are to each other at time zero."""
     speed = at(work, r.BIT_SPEED)
     put(work, r.SPEED_BEFORE, speed)
@@ -120,7 +126,8 @@ def _begin_rock(friction: Any, weight: Any, program: Any, work: Any) -> None:
     put(work, r.REST_LOAD, at_rest)
     put(work, r.REST_END, at_rest)
     put(work, r.LOAD, load.weight(abs(speed)))
-    torque, slope = contact(law_at(friction, work, r.FRICTION), load, abs(speed), exp)
+    law = varied(law_at(friction, work, r.FRICTION), variation, work)
+    torque, slope = contact(law, load, abs(speed), exp)
     direction = pick(speed > 0.0, 1.0, pick(speed < 0.0, -1.0, 0.0))
     put(work, r.SLOPE, slope)
     put(work, r.DIRECTION, direction)
@@ -129,8 +136,9 @@ def _begin_rock(friction: Any, weight: Any, program: Any, work: Any) -> None:
 
 
 def _begin(
-    string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any, observer: Any,
-    speed: Any, start: Any, clock: Any, state: Any, work: Any, memory: Any, first: Any,
+    string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
+    variation: Any, observer: Any, speed: Any, start: Any, clock: Any, state: Any, work: Any,
+    memory: Any, first: Any,
 ) -> None:  # fmt: skip
     """A block at time zero; its memory holds zeros."""
     _load(string, friction, drive, weight, speed, work, first)
@@ -139,7 +147,8 @@ def _begin(
     begin_program(program, before, work, first)
     begin_drive(drive, string, work, 1.0 / clock.step)
     begin_weight(weight, observer, work, memory, first)
-    _begin_rock(friction, weight, program, work)
+    begin_variation(variation, work, first)
+    _begin_rock(friction, weight, program, variation, work)
     begin_measures(work, top_torque_now(drive, work, at(work, r.TOP_SPEED)))
 
 
@@ -207,15 +216,16 @@ class Now(NamedTuple):
 
 
 def _step(
-    string: Any, friction: Any, drive: Any, weight: Any, program: Any, observer: Any, clock: Any,
-    now: Now, room: Any, work: Any, state: Any, memory: Memory, traces: Any, first: Any,
+    string: Any, friction: Any, drive: Any, weight: Any, program: Any, variation: Any,
+    observer: Any, clock: Any, now: Now, room: Any, work: Any, state: Any, memory: Memory,
+    traces: Any, first: Any,
 ) -> None:  # fmt: skip
     """One step of some lanes of a block; of the one after the last only what it begins with."""
     n, step, rate = now.n, clock.step, 1.0 / clock.step
-    advance_program(program, friction, weight, work, first, n * step, step)
+    advance_program(program, friction, weight, variation, work, first, n * step, step)
     with when(now.traced):
         _look_around(string, state, work)
-    foreseen = foresee(friction, weight, program, work)
+    foreseen = foresee(friction, weight, program, variation, work)
     swing = complete_and_propagate(string, drive, observer, room, state, work)
     put(work, r.PIPE, swing.pipe)
     with when(now.traced):
@@ -224,10 +234,12 @@ def _step(
         sample_drive(drive, work, now.sampled)
         raise_weight(weight, program, work, memory, n, step)
         hold_rock(friction, weight, program, work)
+        advance_variation(variation, work, first, n * step, step)
         was = Before(at(work, r.BIT_SPEED), at(work, r.TOP_SPEED), at(work, r.LOAD))
         reduced = eliminate(drive, program, string, swing, work, rate)
-        outcome = meet_rock(friction, weight, program, reduced, foreseen, work, now.slot)
+        outcome = meet_rock(friction, weight, program, variation, reduced, foreseen, work, now.slot)
         _conclude(string, drive, observer, swing, reduced, outcome, work)
+        turn_variation(variation, work, was.bit_speed, step)
         move_load(weight, program, work)
         follow_drive(drive, work, was.top_speed, rate)
         follow_weight(weight, observer, work, memory, was, n, step)
@@ -237,9 +249,9 @@ def _step(
 
 @emitted
 def _advance_block(
-    string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any, observer: Any,
-    speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any, watch: Any,
-    first: Any,
+    string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
+    variation: Any, observer: Any, speed: Any, start: Any, clock: Any, kept: Any, measures: Any,
+    traces: Any, watch: Any, first: Any,
 ) -> None:  # fmt: skip
     """Advance the lanes from `first` on, one block, from time zero to the end."""
     aligned_stack()
@@ -253,7 +265,7 @@ def _advance_block(
     with loop(kept.shape[0] // WIDTH) as rows:
         put(kept, rows.index * WIDTH, 0.0)
     _begin(
-        string, friction, before, drive, weight, program, observer,
+        string, friction, before, drive, weight, program, variation, observer,
         speed, start, clock, state, work, memory, first,
     )  # fmt: skip
     load_string(string, room)
@@ -271,7 +283,7 @@ def _advance_block(
             with rows_of(PASS), loop(WIDTH // PASS) as parts:
                 at_lane = parts.index * PASS
                 _step(
-                    string, friction, drive, weight, program, observer, clock, now, room,
+                    string, friction, drive, weight, program, variation, observer, clock, now, room,
                     work[at_lane:], state[at_lane:], memory.part(at_lane), traces,
                     first + at_lane,
                 )  # fmt: skip
@@ -300,15 +312,15 @@ def _compile(on_disk: bool) -> Any:
     def run(
         begin: Any, end: Any,
         string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
-        observer: Any, speed: Any, start: Any, clock: Any, kept: Any, measures: Any, traces: Any,
-        watch: Any,
+        variation: Any, observer: Any, speed: Any, start: Any, clock: Any, kept: Any,
+        measures: Any, traces: Any, watch: Any,
     ) -> str:  # fmt: skip
         """Advance blocks of lanes from time zero to the end."""
         for block in range(begin, end):
             if watch[0] != 0:
                 break
             _advance_block(
-                string, friction, before, drive, weight, program, observer,
+                string, friction, before, drive, weight, program, variation, observer,
                 speed, start, clock, kept, measures, traces, watch, block * WIDTH,
             )  # fmt: skip
         return version
@@ -357,7 +369,8 @@ run_unkept = _compile(on_disk=False)  # `run`, compiled anew in every process
 
 run = _compile(on_disk=True)
 """Advance lanes from time zero to the end: `run(begin, end, string, friction, before,
-drive, weight, program, observer, speed, start, clock, kept, measures, traces, watch)`.
+drive, weight, program, variation, observer, speed, start, clock, kept, measures, traces,
+watch)`.
 
 - `begin`, `end`: blocks of `WIDTH` lanes to advance, of all those there are. Blocks do not see each
   other: threads may take some each, the interpreter's lock is not held.
@@ -365,6 +378,7 @@ drive, weight, program, observer, speed, start, clock, kept, measures, traces, w
 - `friction`, `before`, `drive`, `weight`, `program`: laws with an array, shape (lanes,), for each
   number, those with a memory as prepared by `simulation.step_laws`; `before` is the rock before
   the program changes it.
+- `variation`: `SameRock` or `VariationStep`.
 - `observer`: `NoObserver` or `ObserverStep`.
 - `speed`, shape (5, lanes): set speed and bit speed at time zero (rad/s), lowest and highest
   weight of the friction table (N), top speed at time zero in the frame (rad/s).

@@ -14,6 +14,7 @@ from drillctl.rig.bit_rock import contact
 from drillctl.rig.program import OF_A_PATH, Path, Ramp
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import any_of, exp, law_at, least, load_block, most
+from drillctl.simulation.kernels.variation_step import varied
 from drillctl.simulation.kernels.vectors import at, pick, put, when
 from drillctl.simulation.kernels.weight_step import acting
 
@@ -65,12 +66,13 @@ def _first_rows(program: Any, before: Any, work: Any, first: Any) -> None:
 
 
 def advance_program(
-    program: Any, friction: Any, weight: Any, work: Any, first: Any, begin: Any, step: Any
-) -> None:
+    program: Any, friction: Any, weight: Any, variation: Any, work: Any, first: Any, begin: Any,
+    step: Any,
+) -> None:  # fmt: skip
     """Rows of the step from `begin` on; what jumps at its beginning has jumped."""
     if isinstance(program, NoProgram):
         return None
-    return _move(program, friction, weight, work, first, begin, step)
+    return _move(program, friction, weight, variation, work, first, begin, step)
 
 
 def _speed(law: Any) -> Any:
@@ -129,8 +131,9 @@ def _late_integral(ramp: Any, lag: Any, time: Any) -> Any:
 
 
 def _move(
-    program: Any, friction: Any, weight: Any, work: Any, first: Any, begin: Any, step: Any
-) -> None:
+    program: Any, friction: Any, weight: Any, variation: Any, work: Any, first: Any, begin: Any,
+    step: Any,
+) -> None:  # fmt: skip
     # A moment that falls on the end of a step does so but for rounding.
     end, late = begin + step, ROUNDING * step
     law = law_at(program, work, r.PROGRAM)
@@ -142,18 +145,21 @@ def _move(
     for ramp in _weight(law).ramps:
         changes = changes | ((ramp.end > since) & (ramp.end <= now))
     with when(any_of(changes)):
-        _turn(program, friction, weight, work, first, now)
+        _turn(program, friction, weight, variation, work, first, now)
     _set_nominal(law, work, end - late)
 
 
-def _turn(program: Any, friction: Any, weight: Any, work: Any, first: Any, now: Any) -> None:
+def _turn(
+    program: Any, friction: Any, weight: Any, variation: Any, work: Any, first: Any, now: Any
+) -> None:
     """Put the new rock in where it is due, and let a turning bit feel what has jumped."""
     law = law_at(program, work, r.PROGRAM)
     load_block(friction, work, r.FRICTION, first, law.rock_until <= now)
     _set_nominal(law, work, now)
     direction, speed = at(work, r.DIRECTION), abs(at(work, r.BIT_SPEED))
     load = acting(weight, work)
-    torque, slope = contact(law_at(friction, work, r.FRICTION), load, speed, exp)
+    rock = varied(law_at(friction, work, r.FRICTION), variation, work)
+    torque, slope = contact(rock, load, speed, exp)
     turning = direction != 0.0
     put(work, r.KINETIC, pick(turning, torque, at(work, r.KINETIC)))
     put(work, r.SLOPE, pick(turning, slope, at(work, r.SLOPE)))

@@ -40,6 +40,7 @@ from drillctl.simulation.kernels.arithmetic import (
     signed,
 )
 from drillctl.simulation.kernels.rows import CHUNK, WIDTH
+from drillctl.simulation.kernels.variation_step import varied, varies
 from drillctl.simulation.kernels.vectors import Variable, at, each, loop, pick, put, when
 from drillctl.simulation.kernels.weight_step import acting, has_memory, stays
 
@@ -178,13 +179,13 @@ def _go_on(
     return root.get(), slope.get()
 
 
-def foresee(friction: Any, weight: Any, program: Any, work: Any) -> Any:
+def foresee(friction: Any, weight: Any, program: Any, variation: Any, work: Any) -> Any:
     """Bit speed to which the last three lead, and what the torque decays to there; or None.
 
     A law that is an exponential, with numbers that stay, is worked out there while the modes are
     still being added up; with its curvature known as well, that is near enough.
     """
-    if not (_is_held(friction, weight, program) and stays(weight, program)):
+    if varies(variation) or not (_is_held(friction, weight, program) and stays(weight, program)):
         return None
     law, last = rock(friction, weight, program, work), at(work, r.BIT_SPEED)
     speed = 3.0 * (last - at(work, r.SPEED_BEFORE)) + at(work, r.SPEED_BEFORE_THAT)
@@ -228,10 +229,12 @@ def one_over_one_plus(d: Any) -> Any:
 
 
 def meet_rock(
-    friction: Any, weight: Any, program: Any, reduced: Any, foreseen: Any, work: Any, slot: Any
-) -> Outcome:
+    friction: Any, weight: Any, program: Any, variation: Any, reduced: Any, foreseen: Any,
+    work: Any, slot: Any,
+) -> Outcome:  # fmt: skip
     """The `Outcome` of a step from what string and drive leave free."""
     law, load = rock(friction, weight, program, work), acting(weight, work)
+    law = varied(law, variation, work)
     if law.set_valued:
         return stick_or_slip(law, load, reduced, foreseen, work, slot)
     return _creep(law, load, reduced, work)

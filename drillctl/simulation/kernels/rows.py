@@ -81,6 +81,11 @@ REST_LOAD = _next()  # weight on it were it at rest, on the mean over the step, 
 REST_END = _next()  # the same at its end
 HELD = _next(4)  # `rock_step.HeldRock` at the weights of this step, or of all
 
+# A rock that varies along the way.
+FACTOR = _next()  # of its torques at the end of the step
+FACTOR_MEAN = _next()  # on the mean over it
+TURNED = _next()  # angle of the bit since time zero, rad
+
 # Torques of the step just taken, applied to the string by the next pass.
 TOP_TORQUE = _next()  # net of DRAG, N m
 BIT_TORQUE = _next()  # N m

@@ -168,7 +168,7 @@ def indices(result: Uncertainty) -> Table:
 
 
 def pictures(result: Uncertainty) -> Iterator[Picture]:
-    """Regions by probability, their sampling error, convergence, distributions, indices."""
+    """Regions by probability, their sampling error, convergence, distributions, responses."""
     flat = {"": result} if len(result.axes) == 2 else {}
     flat |= {f"-{k}": one for k, one in enumerate(result.slices().values(), start=1)}
     for ending, one in flat.items():
@@ -183,6 +183,12 @@ def pictures(result: Uncertainty) -> Iterator[Picture]:
         "Distribution functions of J1 at the cells that are best by mean and by quantile.",
         lambda system: plots.cell_distributions(result, system=system),
     )  # fmt: skip
+    if result.envelope is not None:
+        yield Picture(
+            "responses", "Responses at the design's own setting: 5 to 95 % of the draws.",
+            "Bands of bit speed and pipe torque over time, with the median.",
+            lambda system: plots.response_envelope(result, system=system),
+        )  # fmt: skip
     if result.sensitivity is not None:
         yield Picture(
             "sensitivity", "First and total Sobol indices with their intervals.",

@@ -17,6 +17,7 @@ from drillctl.design import Design, parameter
 from drillctl.design.uncertain_tables import SensitivityTable
 from drillctl.ensemble import audit as auditing
 from drillctl.ensemble.draws import Failures, beyond_the_table, by_reason
+from drillctl.ensemble.envelopes import envelope
 from drillctl.ensemble.grid import Axis, cell_design, over_axes, refuse_more_bytes, shape_of
 from drillctl.ensemble.parameters import drawing, sampling_of, uncertain_parameters
 from drillctl.ensemble.probability import Scatter
@@ -145,6 +146,7 @@ class _Study:
             failures=self._failures(made),
             looks=looks,
             sensitivity=sensitivity,
+            envelope=envelope(self.design, self.draw, made.realizations),
             seconds=seconds,
             total_seconds=time.perf_counter() - begin,
         )
@@ -165,6 +167,7 @@ class _Study:
             failures=(),
             looks=(),
             sensitivity=None,
+            envelope=None,
             seconds=0.0,
             total_seconds=0.0,
         )
@@ -319,7 +322,7 @@ def write_columns_of(result: Uncertainty, folder: Path, system: units.System) ->
     cells = over_axes(result.axes, system) | in_columns(figures, system)
     write_columns(folder / "cells.csv", cells)
     unit_of = {one.path: one.unit for one in uncertain_parameters(result.design)}
-    drawn = ((path, values, unit_of[path]) for path, values in result.drawn.items())
+    drawn = ((path, values, unit_of.get(path, "1")) for path, values in result.drawn.items())
     write_columns(folder / "draws.csv", in_columns(drawn, system))
     if result.design.tables.uncertainty.contours:
         heads = {"level": "s", "realization": "1", "polygon": "1", "ring": "1"}

@@ -22,6 +22,7 @@ from drillctl.design.uncertain_tables import UntilTable
 from drillctl.ensemble.audit import Audit, choose_cells, unaudited
 from drillctl.ensemble.cases import CONFIDENCE, Interval
 from drillctl.ensemble.draws import Failures
+from drillctl.ensemble.envelopes import Envelope
 from drillctl.ensemble.grid import Axis, axes_of, other_axes, place_of, span
 from drillctl.ensemble.parameters import sampling_of, uncertain_parameters
 from drillctl.ensemble.probability import (
@@ -151,6 +152,7 @@ class Uncertainty(Result, kind="uncertainty"):
         means="at which it was decided whether to go on; empty without such a rule"
     )
     sensitivity: Sensitivity | None = label(means="Sobol indices, if they were requested")
+    envelope: Envelope | None = label(flat=True, means="responses of the design over its draws")
     seconds: float = label(unit="s", means="in blocks, since the run was last resumed")
     total_seconds: float = label(unit="s", means="from call to return, since then")
     provenance: dict[str, str] = label(
@@ -348,6 +350,7 @@ class Uncertainty(Result, kind="uncertainty"):
                 audit=unaudited("lane"),
                 looks=(),
                 sensitivity=None,
+                envelope=None,
             )
         return results
 
