@@ -52,8 +52,6 @@ TORQUE = Kind("torque", "N*m", ("kN*m", "N*m", "klbf*ft"), (0.0, 150e3))
 LENGTH = Kind("length", "m", ("m", "ft"), (0.05, 15e3))
 DIAMETER = Kind("length", "m", ("mm", "in", "m"), (0.012, 1.0))
 TIME = Kind("time", "s", ("s", "ms", "min"))
-ANGLE = Kind("angle", "rad", ("rev", "rad", "deg"))
-PENETRATION = Kind("rate of penetration", "m/s", ("m/h", "ft/h", "m/s"), (0.0, 0.1))
 RATE = Kind("rate", "1/s", ("1/s",))
 INERTIA = Kind("inertia", "kg*m^2", ("kg*m^2",))
 DENSITY = Kind("density", "kg/m^3", ("kg/m^3",), (700.0, 20e3))
@@ -92,8 +90,6 @@ _KNOWN: dict[str, dict[str, float]] = {
         "m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1e3, "in": 0.0254, "ft": 0.30479999999999996,
     },
     "s": {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0},
-    "rad": {"rad": 1.0, "rev": 6.283185307179586, "deg": 0.017453292519943295},
-    "m/s": {"m/s": 1.0, "m/h": 1.0 / 3600.0, "ft/h": 8.466666666666666e-05},
     "1/s": {"1/s": 1.0},
     "kg*m^2": {"kg*m^2": 1.0, "lb*ft^2": 0.0421401100938048},
     "kg/m^3": {"kg/m^3": 1.0, "g/cm^3": 1e3, "lb/gal": 119.82642731689667},

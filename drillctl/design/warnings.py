@@ -101,7 +101,7 @@ def _varying_rock(tables: DesignTables) -> DesignWarning | None:
     if table.length < drilled:
         return None
     return DesignWarning(
-        f"at {units.write(rate, units.PENETRATION)} a run of {duration:g} s drills "
+        f"at {units.write(rate, units.VELOCITY)} a run of {duration:g} s drills "
         f"{drilled:.2g} m, less than the correlation length of {table.length:g} m: its rock is of "
         "nearly one random level",
         "bit_rock.variation.length", "centimetres to decimetres within a run",

@@ -171,7 +171,7 @@ MOST_TORQUE = 1e9  # (N m)
 
 Speed = Annotated[float, units.SPEED, _any(1e5, units.SPEED)]
 PositiveSpeed = Annotated[float, units.SPEED, _positive(1e-9, 1e5, units.SPEED)]
-Penetration = Annotated[float, units.PENETRATION, _positive(1e-9, 1.0, units.PENETRATION)]
+Penetration = Annotated[float, units.VELOCITY, _positive(1e-9, 1.0, units.VELOCITY)]
 SpeedOrZero = Annotated[float, units.SPEED, _not_negative(1e5, units.SPEED)]
 Weight = Annotated[float, units.FORCE, _not_negative(1e9, units.FORCE)]
 PositiveWeight = Annotated[float, units.FORCE, _positive(1e-3, 1e9, units.FORCE)]
