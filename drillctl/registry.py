@@ -52,6 +52,7 @@ STUDIES: tuple[str, ...] = (
     "drillctl.studies.advantage",
     "drillctl.studies.tune",
     "drillctl.studies.recommend",
+    "drillctl.studies.export",
 )
 """Each package holds `STUDY`; its keys in a design file, if any, are in its `settings.py`."""
 

@@ -140,6 +140,7 @@ KINDS = {
 SLOW_KINDS = {
     "modes": ["monteiro-trindade-140kn"],
     "torque-drag": ["well-a-off-bottom"],
+    "export": ["monteiro-trindade-140kn"],
     "loop": ["monteiro-trindade-140kn"],
     "loop-map": ["monteiro-trindade-140kn"],  # no command of its own
     "cycle": ["navarro-lopez-2dof-bistable"],
