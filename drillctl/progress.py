@@ -22,6 +22,9 @@ class Progress(Protocol):
 class Silent:
     """Reports nothing."""
 
+    def __repr__(self) -> str:
+        return "SILENT"
+
     def begin(self, task: str, total: int) -> None:
         """A task begins; nothing is shown."""
 

@@ -309,27 +309,63 @@ def kept_measures(asked: Sequence[str] | None, where: str = "measures") -> tuple
     return tuple(name for name in BATCH_MEASURES if name == "j1" or name in asked)
 
 
-def stability_map(design: Design, **options: Any) -> Sweep:
-    """The J1 map of a design over the two parameters of its `[map]` table.
+def stability_map(
+    design: Design,
+    axes: tuple[Axis, ...] | None = None,
+    audit_cells: int | None = None,
+    progress: Progress = SILENT,
+    store: Store | None = None,
+    measures: Sequence[str] | None = None,
+    workers: Workers | None = None,
+) -> Sweep:
+    """Map J1 of a design over two of its parameters, with the batch engine.
+
+    J1 is the integral of the deviation of the bit speed from its set speed, over that speed (s):
+    small where the bit turns steadily, large where it sticks and slips. The result knows the
+    regions under the levels of `[map]`, is audited by the reference solver, and draws itself:
+    `stability_map(design).plot()`.
 
     Parameters
     ----------
     design : Design
         Without `[map]` axes the map runs over what its drive law is tuned by, in the ranges that
         fit the rig.
-    **options
-        As for `sweep`.
+    axes : tuple of Axis, optional
+        Two parameters with their values (SI), instead of the design's own.
+    audit_cells : int, optional
+        Cells that the reference solver runs again, instead of `map.audit_cells`; 0 for no audit.
+    progress : Progress
+        Receives finished blocks and audited cells.
+    store : Store, optional
+        Where finished blocks are stored, for a run that resumes; in memory by default.
+    measures : sequence of str, optional
+        Measures to keep of each cell, by the names of `simulation.measures.MEASURES`; J1 and
+        the status always are. All by default.
+    workers : Workers, optional
+        Who computes blocks; the threads of this process by default.
+
+    Returns
+    -------
+    Sweep
+        `j1`, shape (first axis, second axis) in s, `regions`, `minimum`, `audit`. Failed cells
+        carry the status `failed`, not an exception.
 
     Raises
     ------
     InputError
-        The map does not run over exactly two parameters.
+        The map does not run over exactly two parameters; else as for `sweep`.
+
+    Examples
+    --------
+    >>> found = drillctl.stability_map(drillctl.load("monteiro-trindade-140kn"))
+    >>> found.minimum
+    >>> found.plot().savefig("map.png")
     """
-    kept = len(kept_measures(options.get("measures")))
-    axes = options.pop("axes", None) or axes_of(design, kept=kept)
+    if axes is None:
+        axes = axes_of(design, kept=len(kept_measures(measures)))
     if len(axes) != 2:
         raise InputError(f"a map runs over 2 parameters, got {len(axes)}; use sweep", "map.axes")
-    return sweep(design, axes, **options)
+    return sweep(design, axes, audit_cells, progress, store, measures, workers)
 
 
 @dataclass(frozen=True, eq=False)

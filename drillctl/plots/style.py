@@ -8,6 +8,7 @@ The plane of two parameters that maps are drawn on, and what all pictures of a d
 from __future__ import annotations
 
 import inspect
+import io
 import re
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
@@ -126,9 +127,18 @@ def default_look(more: Any) -> Iterator[None]:
         yield
 
 
+class _Shown(Figure):
+    """A figure that a notebook shows: it knows those of pyplot alone."""
+
+    def _repr_png_(self) -> bytes:
+        drawn = io.BytesIO()
+        self.savefig(drawn, format="png")
+        return drawn.getvalue()
+
+
 def figure(width: float = 7.0, height: float = 4.5) -> Figure:
     """An empty figure with constrained layout, unknown to pyplot."""
-    return Figure(figsize=(width, height), layout="constrained")
+    return _Shown(figsize=(width, height), layout="constrained")
 
 
 def lay_out(figure: Figure, dpi: float) -> None:

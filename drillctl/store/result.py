@@ -6,12 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from drillctl import units
 from drillctl.design import Design
+from drillctl.store import showing
 from drillctl.store.codec import dataset, documented, read, write
 from drillctl.store.folder import Growing, claim, finished_run, resolved
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
+    from matplotlib.figure import Figure
 
 
 class Result:
@@ -25,6 +29,57 @@ class Result:
         if kind:
             cls.kind = kind
         documented(cls)
+        cls.__repr__ = Result.__repr__  # type: ignore[method-assign]  # in place of a dataclass's
+
+    def __repr__(self) -> str:
+        """The first table of its study, in at most ten lines."""
+        return showing.in_lines(self)
+
+    def _repr_html_(self) -> str:
+        """The same with a small picture, for a notebook."""
+        return showing.in_html(self)
+
+    def plot(self, name: str | None = None, system: units.System | None = None) -> Figure:
+        """A figure of its study, as the command writes it.
+
+        Parameters
+        ----------
+        name : str, optional
+            Of the file that the command writes, without `.png`; the first by default.
+        system : {'si', 'field'}, optional
+            Units, by default those of the design.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Made without pyplot; a notebook shows it at the end of a cell.
+
+        Raises
+        ------
+        InputError
+            No picture of that name, or none at all.
+        """
+        return showing.figure_of(self, name, system)
+
+    def to_dataframe(self, *dims: str) -> pandas.DataFrame:
+        """Arrays that share their dimensions, as the columns of a table.
+
+        Parameters
+        ----------
+        *dims : str
+            Dimensions in their order; by default those that most arrays have.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the coordinates as index, SI; `attrs["units"]` has the units by column.
+
+        Raises
+        ------
+        InputError
+            No array over these dimensions, or none at all.
+        """
+        return showing.frame_of(self, dims)
 
     if TYPE_CHECKING:
 

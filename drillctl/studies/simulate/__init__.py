@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from drillctl import plots, units
 from drillctl.simulation.measures import MEASURES
-from drillctl.store.tables import Column, Quantity, Table, Unit, number
+from drillctl.store.tables import (
+    Column,
+    Quantity,
+    Table,
+    Unit,
+    in_columns,
+    number,
+    write_columns,
+)
 from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Study, in_batch
 
 if TYPE_CHECKING:
@@ -81,6 +90,15 @@ def pictures(result: Simulation) -> Iterator[Picture]:
         f"Time response: {result.status.replace('_', ' ')}, J1 {j1}.",
         lambda system: plots.time_response(result, system=system),
     )  # fmt: skip
+
+
+def files(result: Simulation, folder: Path, system: units.System) -> None:
+    """Every signal over time."""
+    from drillctl.simulation.run import SIGNALS
+
+    figures = [("time", result.time, "s")]
+    figures += [(name, values, SIGNALS[name][0]) for name, values in result.signals.items()]
+    write_columns(folder / "signals.csv", in_columns(figures, system))
 
 
 def summary(result: Simulation) -> dict[str, Any]:
