@@ -69,9 +69,9 @@ def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
     period = lanes.drive.period if isinstance(lanes.drive, SampledDrive) else None
     scheme = choose_scheme(
         lanes.string, table, lanes.steepest_fall, inertia, _shared(period), _turns(lanes),
-        lanes.longest_step,
+        lanes.longest_step, lanes.wall is not None,
     )  # fmt: skip
-    stepper = string_step(lanes.string, scheme.step, scheme.modes)
+    stepper = string_step(lanes.string, scheme.step, scheme.modes, lanes.wall)
     return Prepared(stepper, scheme, table.duration, table.j1_from)
 
 
@@ -123,7 +123,12 @@ def trace(lanes: Lanes, prepared: Prepared, interval: float) -> tuple[Array, dic
     parts = [_run(part, prepared, every)[1] for part in _chunks(lanes)]
     traces = np.concatenate(parts, axis=2)
     time = np.arange(len(traces), dtype=float) * every * prepared.scheme.step
-    return time, {name: traces[:, i] for i, name in enumerate(TRACED)}
+    signals = {name: traces[:, i] for i, name in enumerate(TRACED)}
+    if lanes.wall is not None:  # which nodes stick, the bit last
+        signals["wall_stuck"] = np.concatenate(
+            [traces[:, len(TRACED) :], signals["stuck"][:, None]], axis=1
+        )
+    return time, signals
 
 
 def _chunks(lanes: Lanes) -> Iterator[Lanes]:
@@ -139,6 +144,7 @@ def _run(
     from drillctl.simulation.kernels.advance import TRACED, Clock, kernel
     from drillctl.simulation.kernels.rows import MEASURES, ROWS, WIDTH
     from drillctl.simulation.kernels.string_step import MOST_READ
+    from drillctl.simulation.kernels.wall_step import room_rows
 
     count = len(lanes)
     # Every block is full: the last one is filled up with copies of the last lane.
@@ -151,7 +157,8 @@ def _run(
     scheme, duration = prepared.scheme, prepared.duration
     samples = scheme.steps // every + 1 if every else 0
     measures = np.empty((MEASURES, len(padded)))
-    traces = np.empty((samples, len(TRACED), len(padded)))
+    wall = () if padded.wall is None else padded.wall.torque
+    traces = np.empty((samples, len(TRACED) + max(len(wall) - 1, 0), len(padded)))
     window = min(m.WINDOW, duration)
     observer = padded.observer
     ticks = Clock(
@@ -161,7 +168,7 @@ def _run(
     )  # fmt: skip
     numbers = np.stack([
         padded.set_speed, bit_speed + padded.set_speed, padded.table_low, padded.table_high,
-        top_speed,
+        top_speed, *wall,
     ])  # fmt: skip
     arguments = (
         prepared.stepper.string, padded.friction, padded.before,
@@ -175,7 +182,7 @@ def _run(
     )  # fmt: skip
     run = kernel(*arguments[1:8])
     rows = ROWS + 2 * len(state) + ticks.remembered + 2 * ticks.estimated
-    rows += -(-MOST_READ * len(state) // WIDTH)
+    rows += -(-MOST_READ * len(state) // WIDTH) + room_rows(len(wall))
 
     watch = new_watch() if watch is None else watch
 
@@ -274,6 +281,7 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
             "mean_weight_on_bit": row(r.WEIGHT_SUM) / duration,
             "rop_proxy": row(r.ROP_SUM) / nominal,
             "work_at_bit": row(r.WORK),
+            "work_at_wall": row(r.WALL_WORK),
             "work_per_turn": _where(turned > 1e-3, row(r.WORK) / turned),
             "time_outside_table": row(r.OUTSIDE_TABLE),
             "time_at_torque_limit": row(r.AT_TORQUE_LIMIT),

@@ -19,6 +19,7 @@ from drillctl.rig.bit_rock.variation import NoVariation, Variation
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.program import Program
 from drillctl.rig.weight_on_bit import AlarmWeight
+from drillctl.rig.well.wall import Wall
 
 if TYPE_CHECKING:
     from drillctl.linear.observer import Observer
@@ -86,6 +87,7 @@ class Lanes:
     program: Program  # what changes by the clock, with an array for each number
     observer: Observer | None  # of the bit, shared by all lanes
     start: Kind  # {'rest', 'turning', 'wound_up'}: Kind of start
+    wall: Wall | None = None  # friction of the wall, its torque of shape (nodes, lanes)
 
     def __len__(self) -> int:
         return len(self.set_speed)
@@ -113,7 +115,10 @@ class Lanes:
             ),
             observer=self.observer,
             start=self.start,
-        )
+            wall=None if self.wall is None else self.wall._replace(
+                torque=np.ascontiguousarray(self.wall.torque[:, chosen])
+            ),
+        )  # fmt: skip
 
     @cached_property
     def steepest_fall(self) -> float:
@@ -185,6 +190,9 @@ def lane_numbers(design: Design) -> dict[str, float]:
         for part, law in laws.items()
         for field, value in law._asdict().items()  # type: ignore[attr-defined]
     }
+    if design.wall is not None:
+        torques = design.wall.torque.tolist()
+        numbers |= {f"wall.{node}": torque for node, torque in enumerate(torques)}
     turning = design.tables.start.speed
     numbers["rock_until"] = program.rock_until
     numbers["set_speed"] = design.speed
@@ -220,7 +228,10 @@ def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
         ),
         observer=observer_of(design),
         start=design.tables.start.kind,
-    )
+        wall=None if design.wall is None else design.wall._replace(
+            torque=np.stack([numbers[f"wall.{k}"] for k in range(len(design.wall.nodes))])
+        ),
+    )  # fmt: skip
 
 
 def single_lane(design: Design) -> Lanes:

@@ -84,6 +84,10 @@ class Measures:
         "ROP proxy", "1", "mean of weight x |bit speed| over nominal weight x set speed"
     )
     work_at_bit: float = _row("work at bit", "J", "work done on the rock")
+    work_at_wall: float = _row(
+        "work at wall", "J", "work taken by the friction of the wall, but for that at the bit",
+        2e-2,
+    )  # fmt: skip
     work_per_turn: float | None = _row(
         "work per turn", "J", "the same per revolution of the bit; none if it hardly turned"
     )

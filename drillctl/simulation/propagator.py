@@ -29,8 +29,15 @@ import scipy.linalg
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from drillctl.errors import InputError
 from drillctl.rig.drillstring import Drillstring
-from drillctl.simulation.kernels.string_step import BlockString, DenseString, UndampedString
+from drillctl.rig.well.wall import Wall
+from drillctl.simulation.kernels.string_step import (
+    BlockString,
+    DenseString,
+    UndampedString,
+    WallString,
+)
 from drillctl.simulation.lanes import Start
 
 Array = NDArray[np.float64]
@@ -87,7 +94,8 @@ WEAKEST_SIGNAL = 1e-9
 class StringStep:
     """A string ready to be stepped."""
 
-    string: UndampedString | BlockString | DenseString  # what the kernels take
+    # what the kernels take
+    string: UndampedString | BlockString | DenseString | WallString
     # shape (states, nodes): State per nodal angle (1/rad) and per nodal speed (s/rad), both in
     # the frame
     angle_to_state: Array
@@ -128,8 +136,10 @@ class _Modal:
     free_rigid_body: bool
 
 
-def string_step(string: Drillstring, step: float, modes: int) -> StringStep:
-    """Prepare a string for steps of a given length."""
+def string_step(
+    string: Drillstring, step: float, modes: int, wall: Wall | None = None
+) -> StringStep:
+    """Prepare a string for steps of a given length; with nodes at which the wall rubs."""
     modes = min(modes, string.nodes)
     with threadpool_limits(limits=1, user_api="blas"):
         frequency, shapes = string.undamped_modes
@@ -137,7 +147,11 @@ def string_step(string: Drillstring, step: float, modes: int) -> StringStep:
         frequency, shapes = frequency[:modes], shapes[:, :modes]
         rest = _rest(string)
         to_modal = shapes.T @ string.mass.toarray()
-        kind, fields, basis = _stepped(string, frequency, shapes, step)
+        if wall is None:
+            kind, fields, basis = _stepped(string, frequency, shapes, step)
+        else:
+            kind, fields, basis = WallString, *_rubbed(string, frequency, shapes, step, wall)
+            fields["pipe_by_wall"] = -left_out[list(wall.nodes[:-1])]
     constants = {
         "drag": float(string.ground_damping.sum()),
         "pipe_offset": float(string.element_stiffness[0] * (rest[0] - rest[1])),
@@ -180,6 +194,57 @@ def _stepped(
     if result is not None:
         return BlockString, *result
     return DenseString, *_dense(modal, step)
+
+
+def _rubbed(
+    string: Drillstring, frequency: Array, shapes: Array, step: float, wall: Wall
+) -> tuple[dict[str, Any], Array]:
+    """Fields of a `WallString` and the matrix from modal to block states."""
+    modal = _modal(string, frequency, shapes)
+    result = _block_basis(modal)
+    if result is None:
+        raise InputError(
+            "its modes cannot be told apart, as where one is damped critically: the friction of "
+            "the wall needs another damping", "drillstring",
+        )  # fmt: skip
+    basis, inverse = result
+    nodes, n = list(wall.nodes[:-1]), len(frequency)
+    count, rubs = len(basis) // 2, len(nodes)
+    at_nodes = np.zeros((2 * n, rubs))
+    at_nodes[n:] = -shapes[nodes].T
+    pairs = range(count)
+    a = inverse @ modal.a @ basis
+    a = np.array([a[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] for i in pairs])
+    inputs = np.hstack([modal.b, at_nodes])
+    free, push = _held(a, (inverse @ inputs).reshape(count, 2, 2 + rubs), step)
+    signals = np.vstack([modal.signals, -at_nodes.T])
+    rows = (signals @ basis).reshape(5 + rubs, count, 2)
+    # After a step: signals (top angle, bit speed, pipe, top speed, bit angle, nodes) per torque.
+    by = np.einsum("sbi,bit->st", rows, push)
+    compliance = np.concatenate([[0.0], np.cumsum(1.0 / string.element_stiffness)])
+    fields = {
+        "free": free.reshape(count, 4),
+        "push": push[:, :, :2].reshape(count, 4),
+        "wall_push": push[:, :, 2:].transpose(0, 2, 1).reshape(count, 2 * rubs),
+        "read": rows[:5].transpose(1, 0, 2).reshape(count, 10),
+        "wall_read": rows[5:].transpose(1, 0, 2).reshape(count, 2 * rubs),
+        "angle_by_wall": -by[0, 2:],
+        "bit_by_wall": -by[1, 2:],
+        "top_by_wall": -by[3, 2:],
+        "by_top": by[5:, 0],
+        "by_bit": -by[5:, 1],
+        "by_wall": -by[5:, 2:],
+        "place": compliance[nodes] / compliance[-1],
+        "ratio": wall.ratio,
+        "critical": wall.critical,
+        "angle_by_top": float(by[0, 0]),
+        "angle_by_bit": float(-by[0, 1]),
+        "speed_by_top": float(by[1, 0]),
+        "speed_by_bit": float(-by[1, 1]),
+        "top_speed_by_top": float(by[3, 0]),
+        "top_speed_by_bit": float(-by[3, 1]),
+    }
+    return fields, inverse
 
 
 def _modal(string: Drillstring, frequency: Array, shapes: Array) -> _Modal:

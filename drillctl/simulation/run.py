@@ -197,6 +197,7 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
         mean_weight_on_bit=weight,
         rop_proxy=_rop_proxy(design, time, signals),
         work_at_bit=motion.energy.bit,
+        work_at_wall=0.0,
         work_per_turn=m.per_turn(motion.energy.bit, mean, duration),
         time_outside_table=_outside_table(design, time, signals["weight_on_bit"]),
         **_strain(design, time, signals),

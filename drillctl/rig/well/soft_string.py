@@ -119,6 +119,10 @@ def tension(line: Line, at_bit: float, drag: Array, coupled: bool = True) -> Arr
 
     Without drag it is the weight that hangs below; with it each cell is a step of Runge & Kutta.
     """
+    if not drag.any():
+        mean = (line.fall[0] + 4.0 * line.fall[1] + line.fall[2]) / 6.0
+        hanging = np.cumsum((line.weight * mean * line.length)[::-1])[::-1]
+        return np.asarray(at_bit + np.concatenate([hanging, [0.0]]))
     result = np.empty(len(line.depth))
     result[-1] = force = at_bit
     counts = 1.0 if coupled else 0.0

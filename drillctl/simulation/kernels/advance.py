@@ -47,7 +47,7 @@ from drillctl.simulation.kernels.measure_step import (
     note,
 )
 from drillctl.simulation.kernels.program_step import advance_program, begin_program
-from drillctl.simulation.kernels.rock_step import foresee, hold_rock, meet_rock
+from drillctl.simulation.kernels.rock_step import foresee, hold_rock, meet_rock, rock
 from drillctl.simulation.kernels.rows import CHUNK, PASS, WIDTH
 from drillctl.simulation.kernels.string_step import complete_and_propagate, load_string, look
 from drillctl.simulation.kernels.variation_step import (
@@ -65,6 +65,18 @@ from drillctl.simulation.kernels.vectors import (
     put,
     rows_of,
     when,
+)
+from drillctl.simulation.kernels.wall_step import (
+    begin_wall,
+    conclude_wall,
+    follow_wall,
+    has_wall,
+    load_wall,
+    pass_with_wall,
+    rub,
+    sample_wall,
+    see_with_wall,
+    walled,
 )
 from drillctl.simulation.kernels.weight_step import (
     Memory,
@@ -138,10 +150,11 @@ def _begin_rock(friction: Any, weight: Any, program: Any, variation: Any, work: 
 def _begin(
     string: Any, friction: Any, before: Any, drive: Any, weight: Any, program: Any,
     variation: Any, observer: Any, speed: Any, start: Any, clock: Any, state: Any, work: Any,
-    memory: Any, first: Any,
+    memory: Any, room: Any, first: Any,
 ) -> None:  # fmt: skip
     """A block at time zero; its memory holds zeros."""
     _load(string, friction, drive, weight, speed, work, first)
+    load_wall(string, speed, room, work, first)
     with loop(start.shape[0]) as states:
         put(state, states.index * WIDTH, at(start[states.index], first))
     begin_program(program, before, work, first)
@@ -149,17 +162,21 @@ def _begin(
     begin_weight(weight, observer, work, memory, first)
     begin_variation(variation, work, first)
     _begin_rock(friction, weight, program, variation, work)
+    begin_wall(string, room, work)
     begin_measures(work, top_torque_now(drive, work, at(work, r.TOP_SPEED)))
 
 
-def _look_around(string: Any, state: Any, work: Any) -> None:
-    speed, angle = look(string, state, work)
+def _look_around(string: Any, room: Any, state: Any, work: Any) -> None:
+    if has_wall(string):
+        speed, angle = see_with_wall(string, room, state, work)
+    else:
+        speed, angle = look(string, state, work)
     put(work, r.SEEN_TOP, speed)
     put(work, r.SEEN_TWIST, angle)
 
 
 def _sample(
-    string: Any, drive: Any, work: Any, pipe: Any, traces: Any, sample: int, first: Any
+    string: Any, drive: Any, work: Any, room: Any, pipe: Any, traces: Any, sample: int, first: Any
 ) -> None:
     """Store one sample of every lane; speeds and angles were seen before the pass."""
     set_speed, top_speed = at(work, r.SET_SPEED), at(work, r.SEEN_TOP)
@@ -175,6 +192,7 @@ def _sample(
     put(signals[6], first, pick(stuck, 1.0, 0.0))
     put(signals[7], first, top_torque_now(drive, work, top_speed))
     put(signals[8], first, at(work, r.LOAD))
+    sample_wall(string, room, signals, len(TRACED), first)
 
 
 def _conclude(string: Any, drive: Any, observer: Any, swing: Any, reduced: Any, outcome: Any,
@@ -224,21 +242,29 @@ def _step(
     n, step, rate = now.n, clock.step, 1.0 / clock.step
     advance_program(program, friction, weight, variation, work, first, n * step, step)
     with when(now.traced):
-        _look_around(string, state, work)
-    foreseen = foresee(friction, weight, program, variation, work)
-    swing = complete_and_propagate(string, drive, observer, room, state, work)
+        _look_around(string, room, state, work)
+    if has_wall(string):
+        foreseen = None
+        swing = pass_with_wall(string, drive, observer, room, state, work)
+    else:
+        foreseen = foresee(friction, weight, program, variation, work)
+        swing = complete_and_propagate(string, drive, observer, room, state, work)
     put(work, r.PIPE, swing.pipe)
     with when(now.traced):
-        _sample(string, drive, work, swing.pipe, traces, now.sample, first)
+        _sample(string, drive, work, room, swing.pipe, traces, now.sample, first)
     with when(n < clock.steps):
         sample_drive(drive, work, now.sampled)
         raise_weight(weight, program, work, memory, n, step)
         hold_rock(friction, weight, program, work)
         advance_variation(variation, work, first, n * step, step)
         was = Before(at(work, r.BIT_SPEED), at(work, r.TOP_SPEED), at(work, r.LOAD))
+        law = varied(rock(friction, weight, program, work), variation, work)
+        swing, guess = rub(string, drive, program, weight, law, swing, room, work, rate)
         reduced = eliminate(drive, program, string, swing, work, rate)
-        outcome = meet_rock(friction, weight, program, variation, reduced, foreseen, work, now.slot)
+        law = walled(string, law, room)
+        outcome = meet_rock(law, weight, reduced, foreseen, work, now.slot)
         _conclude(string, drive, observer, swing, reduced, outcome, work)
+        follow_wall(string, room, work, guess, step)
         turn_variation(variation, work, was.bit_speed, step)
         move_load(weight, program, work)
         follow_drive(drive, work, was.top_speed, rate)
@@ -266,7 +292,7 @@ def _advance_block(
         put(kept, rows.index * WIDTH, 0.0)
     _begin(
         string, friction, before, drive, weight, program, variation, observer,
-        speed, start, clock, state, work, memory, first,
+        speed, start, clock, state, work, memory, room, first,
     )  # fmt: skip
     load_string(string, room)
     of_j1, late = Window(clock.step, clock.j1_from), Window(clock.step, clock.window_from)
@@ -283,7 +309,8 @@ def _advance_block(
             with rows_of(PASS), loop(WIDTH // PASS) as parts:
                 at_lane = parts.index * PASS
                 _step(
-                    string, friction, drive, weight, program, variation, observer, clock, now, room,
+                    string, friction, drive, weight, program, variation, observer, clock, now,
+                    room[at_lane:] if has_wall(string) else room,
                     work[at_lane:], state[at_lane:], memory.part(at_lane), traces,
                     first + at_lane,
                 )  # fmt: skip
@@ -302,6 +329,7 @@ def _advance_block(
     conclude(work, clock.step)
     conclude_bands(work, clock.steps * clock.step)
     conclude_load(weight, program, work, clock.steps * clock.step)
+    conclude_wall(string, room, work)
     for measured in range(r.MEASURES):
         put(measures[measured], first, at(work, r.FIRST_MEASURE + measured * WIDTH))
 

@@ -228,13 +228,9 @@ def one_over_one_plus(d: Any) -> Any:
     return product + product * (square * square)
 
 
-def meet_rock(
-    friction: Any, weight: Any, program: Any, variation: Any, reduced: Any, foreseen: Any,
-    work: Any, slot: Any,
-) -> Outcome:  # fmt: skip
-    """The `Outcome` of a step from what string and drive leave free."""
-    law, load = rock(friction, weight, program, work), acting(weight, work)
-    law = varied(law, variation, work)
+def meet_rock(law: Any, weight: Any, reduced: Any, foreseen: Any, work: Any, slot: Any) -> Outcome:
+    """The `Outcome` of a step under a law from what string and drive leave free."""
+    load = acting(weight, work)
     if law.set_valued:
         return stick_or_slip(law, load, reduced, foreseen, work, slot)
     return _creep(law, load, reduced, work)

@@ -173,6 +173,7 @@ AT_TORQUE_LIMIT = _next()  # of a real drive, s
 AT_POWER_LIMIT = _next()
 OVER_CONTINUOUS = _next()
 PEAK_POWER = _next()  # W
+WALL_WORK = _next()  # taken by the wall, J
 BOUND = _next()  # J1 of a lane that was found over the level at which lanes are given up; else 0
 
 ROWS = _taken

@@ -105,6 +105,44 @@ class DenseString(NamedTuple):
     pipe_by_bit: Any
 
 
+class WallString(NamedTuple):
+    """A string in 2 x 2 blocks, with nodes at which the wall rubs; stepped in `wall_step.py`.
+
+    The other fields mean what they mean in `BlockString`; torques of the wall brake when positive.
+    """
+
+    free: Any
+    push: Any
+    wall_push: Any  # shape (blocks, 2 nodes): change of both states per torque on each node
+    # shape (blocks, 10): top angle, bit speed, pipe torque, top speed and bit angle, per state
+    read: Any
+    wall_read: Any  # shape (blocks, 2 nodes): speed of each node per state
+    # shape (nodes,): fall of top angle, bit speed and top speed after a step per torque on each
+    angle_by_wall: Any
+    bit_by_wall: Any
+    top_by_wall: Any
+    pipe_by_wall: Any  # shape (nodes,)
+    # shape (nodes,): rise of the speed of each node per torque on the top, its fall per that on
+    # the bit; shape (nodes, nodes): its fall per that on each node
+    by_top: Any
+    by_bit: Any
+    by_wall: Any
+    place: Any  # shape (nodes,): compliance of the string above each over that of all of it
+    ratio: Any  # of the friction that is left beyond the critical speed
+    critical: Any  # rad/s
+    angle_by_top: Any
+    angle_by_bit: Any
+    speed_by_top: Any
+    speed_by_bit: Any
+    top_speed_by_top: Any
+    top_speed_by_bit: Any
+    drag: Any
+    pipe_offset: Any
+    twist_offset: Any
+    pipe_by_top: Any
+    pipe_by_bit: Any
+
+
 class Swing(NamedTuple):
     """What a pass over the string tells."""
 
@@ -128,7 +166,7 @@ MOST_READ = 12  # numbers of a mode or a block, at most
 
 def load_string(string: Any, room: Any) -> None:
     """Put what a pass reads into a flat array, side by side: one address leads to all of it."""
-    if isinstance(string, DenseString):
+    if type(string) not in _READ:
         return
     with loop(string.push.shape[0]) as parts:
         i, place = parts.index, parts.index * MOST_READ

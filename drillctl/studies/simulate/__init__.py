@@ -24,7 +24,12 @@ if TYPE_CHECKING:
     from drillctl.design import Design
     from drillctl.simulation.run import Simulation
 
-HIDDEN = ("j1_rate", "work_at_bit", "time_outside_table")  # measures that are in the summary alone
+HIDDEN = (
+    "j1_rate",
+    "work_at_bit",
+    "work_at_wall",
+    "time_outside_table",
+)  # measures that are in the summary alone
 OF_LIMITS = ("time_at_torque_limit", "time_at_power_limit", "time_over_continuous")
 BALANCED = 1e-6  # largest relative residual of a balanced run
 FREE = 20.0  # interval (s) between the samples of a run that is kept for its measures alone
