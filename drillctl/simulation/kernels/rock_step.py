@@ -40,7 +40,7 @@ from drillctl.simulation.kernels.arithmetic import (
     signed,
 )
 from drillctl.simulation.kernels.rows import CHUNK, WIDTH
-from drillctl.simulation.kernels.variation_step import varied, varies
+from drillctl.simulation.kernels.variation_step import varies
 from drillctl.simulation.kernels.vectors import Variable, at, each, loop, pick, put, when
 from drillctl.simulation.kernels.weight_step import acting, has_memory, stays
 
