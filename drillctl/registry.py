@@ -53,6 +53,7 @@ STUDIES: tuple[str, ...] = (
     "drillctl.studies.tune",
     "drillctl.studies.recommend",
     "drillctl.studies.export",
+    "drillctl.studies.schedule",
 )
 """Each package holds `STUDY`; its keys in a design file, if any, are in its `settings.py`."""
 

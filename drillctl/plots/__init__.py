@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from drillctl.plots.plant import mobility as mobility
     from drillctl.plots.plant import mode_shapes as mode_shapes
     from drillctl.plots.recommend import recommended as recommended
+    from drillctl.plots.schedule import schedule as schedule
     from drillctl.plots.tune import tune_baselines as tune_baselines
     from drillctl.plots.tune import tune_neighbourhood as tune_neighbourhood
     from drillctl.plots.uncertainty import area_convergence as area_convergence
@@ -78,6 +79,7 @@ _MODULES = {
     "over_time": ("limit_cycle", "time_response"),
     "plant": ("bode", "friction_curves", "mobility", "mode_shapes"),
     "recommend": ("recommended",),
+    "schedule": ("schedule",),
     "tune": ("tune_baselines", "tune_neighbourhood"),
     "uncertainty": (
         "area_convergence",

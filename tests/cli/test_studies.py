@@ -56,6 +56,11 @@ QUICK = {
         "--set", "recommend.laws=['pi', 'soft-torque']",
         "--set", "recommend.speed_step=20 rpm", "--set", "recommend.weight_step=20 kN",
     ),
+    "schedule": (
+        DESIGN, *SHORT, "--depth", "2500 m:3000 m:2", "--law", "soft-torque",
+        "--set", "schedule.realizations=8", "--set", "simulation.accuracy=fast",
+        "--set", "recommend.speed_step=25 rpm", "--set", "recommend.weight_step=35 kN",
+    ),
     "delay": (
         "dynamic-wob-delay-140kn", *SHORT, "--realizations", "3",
         "--set", "weight_delay.gains=['0 kN*s/rad', '6 kN*s/rad']",

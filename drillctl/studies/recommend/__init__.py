@@ -170,7 +170,8 @@ def checks(result: Recommendation) -> Iterator[Check]:
     from drillctl.studies.recommend.words import question
 
     for one in result.recommended.criteria:
-        yield Check(question(result.recommended, one), one.kept, Told(one.said))
+        said = units.told(one.said, result.design.tables.units or "si")
+        yield Check(question(result.recommended, one), one.kept, said)
 
 
 def notes(result: Recommendation) -> Iterator[str]:
