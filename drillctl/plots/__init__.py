@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from drillctl.plots.map import stability_map as stability_map
     from drillctl.plots.map import sweep_line as sweep_line
     from drillctl.plots.map import three_regions as three_regions
+    from drillctl.plots.over_depth import schedule as schedule
     from drillctl.plots.over_time import limit_cycle as limit_cycle
     from drillctl.plots.over_time import time_response as time_response
     from drillctl.plots.plant import bode as bode
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from drillctl.plots.plant import mobility as mobility
     from drillctl.plots.plant import mode_shapes as mode_shapes
     from drillctl.plots.recommend import recommended as recommended
-    from drillctl.plots.schedule import schedule as schedule
     from drillctl.plots.tune import tune_baselines as tune_baselines
     from drillctl.plots.tune import tune_neighbourhood as tune_neighbourhood
     from drillctl.plots.uncertainty import area_convergence as area_convergence
@@ -76,10 +76,10 @@ _MODULES = {
     "loop_maps": ("loop_map",),
     "loop_shape": ("nichols", "nyquist", "sensitivity"),
     "map": ("error_estimate", "regularisation", "stability_map", "sweep_line", "three_regions"),
+    "over_depth": ("schedule",),
     "over_time": ("limit_cycle", "time_response"),
     "plant": ("bode", "friction_curves", "mobility", "mode_shapes"),
     "recommend": ("recommended",),
-    "schedule": ("schedule",),
     "tune": ("tune_baselines", "tune_neighbourhood"),
     "uncertainty": (
         "area_convergence",

@@ -9,10 +9,10 @@ from scipy.optimize import brentq
 import drillctl
 from drillctl.errors import InputError
 from drillctl.studies.recommend.candidates import gains_of
-from drillctl.studies.schedule.compute import reflection, schedule
+from drillctl.studies.schedule.compute import reflection, schedule, searched
 from drillctl.studies.schedule.strings import Along
-from drillctl.studies.tune.search import NEAR, optimum, search_problem
-from drillctl.studies.tune.tuned import put, tuned_parameters
+from drillctl.studies.tune.search import search_problem
+from drillctl.studies.tune.tuned import tuned_parameters
 
 HOLDS = (
     (
@@ -115,11 +115,13 @@ def test_searched_gains_begin_with_those_of_the_depth_before():
     values = {"schedule.law": "tuned", "schedule.realizations": 12, "schedule.kept_from": 0.9}
     result = schedule(line(**SMALL | values | {"schedule.values": "2800 m:3000 m:2"}))
     first, last = result.rows
-    here = Along(result.design).by_rule(3000.0).replace({"tune.realizations": 12})
-    tuned = tuned_parameters(here)
-    problem = search_problem(here, tuned)
-    best = optimum(problem, [np.array(list(first.gains.values()))], NEAR, ends=1)
-    assert last.gains == gains_of(put(here, tuned, best.values))
+    along = Along(result.design)
+    assert last.gains == searched(along.by_rule(3000.0), first.gains)
+    tuned = tuned_parameters(along.by_rule(3000.0).replace({"tune.realizations": 12}))
+    problem = search_problem(along.by_rule(3000.0).replace({"tune.realizations": 12}), tuned)
+    both = np.array([list(one.gains.values()) for one in (first, last)])
+    before, found = problem.points(both, 12)
+    assert found.merit <= before.merit
     # Between two depths gains go with powers of the depth.
     assert last.stale_gains["controller.kp"] == pytest.approx(first.gains["controller.kp"])
     middle = float(np.interp(2900.0, result.stands, result.stand_gains["controller.kp"]))
