@@ -36,6 +36,7 @@ WEIGHT_LAWS = (
 
 STUDIES: tuple[str, ...] = (
     "drillctl.studies.log",
+    "drillctl.studies.identify",
     "drillctl.studies.torque_drag",
     "drillctl.studies.modes",
     "drillctl.studies.loop",

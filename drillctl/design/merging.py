@@ -156,7 +156,21 @@ def branch(path: str, value: object, tree: Tree) -> Tree:
         if entry.get("name", name) != name:
             raise InputError("a section cannot be renamed: its name is its address", path)
         return {"drillstring": {"sections": [{**entry, "name": name}]}}
+    if keys[:2] == ["bit_rock", "points"] and len(keys) == 4:
+        return {"bit_rock": {"points": _with_point(keys[2], keys[3], value, tree, path)}}
     return _nest(keys, value)
+
+
+def _with_point(number: str, key: str, value: object, tree: Tree, path: str) -> list[Any]:
+    """Tabulated points, a number of one of them changed; they count from 1."""
+    rock = tree.get("bit_rock")
+    points = rock.get("points") if isinstance(rock, Mapping) else None
+    if not (isinstance(points, list) and all(isinstance(one, Mapping) for one in points)):
+        raise InputError("this rock has no points", path)
+    if not (number.isdecimal() and 1 <= int(number) <= len(points)):
+        raise InputError(f"there is no point {number}; there are {len(points)}", path)
+    changed = {**points[int(number) - 1], key: value}
+    return [changed if k == int(number) else one for k, one in enumerate(points, start=1)]
 
 
 def _section_names(tree: Tree) -> list[str]:

@@ -134,6 +134,9 @@ def _collect(table: Table, prefix: str, result: list[Parameter]) -> None:
         elif path == "drillstring.sections":
             for section in value:
                 _collect(section, f"{path}.{section.name}.", result)
+        elif path == "bit_rock.points":
+            for number, point in enumerate(value, start=1):
+                _collect(point, f"{path}.{number}.", result)
         elif _is_number(info.annotation) and not isinstance(value, tuple):
             whole = _is_number(info.annotation, int) and not _is_number(info.annotation, float)
             kind = kind_of(info) or table.kind_by_key(key)

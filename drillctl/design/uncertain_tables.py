@@ -27,7 +27,7 @@ _KEYS = {
     "uniform": ("mean", "cov", "min", "max"),
     "beta": ("mean", "cov", "min", "max"),
     "triangular": ("mean", "cov", "min", "max", "mode"),
-    "samples": ("samples", "file", "column", "unit"),
+    "samples": ("samples", "file", "column", "unit", "joint"),
 }
 """Keys that go with each distribution."""
 _NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
@@ -73,7 +73,8 @@ class DistributionTable(Table):
     `uniform` and `triangular`: `min` and `max`, with `mode` of the latter, by default halfway; or
     `cov` and `mean`, symmetric about it. `beta`: `cov` and `mean` between `min` and `max`.
     `samples`: values as they were measured, each as likely; a list, or a `file` of text with one
-    a line, or with columns and their names in the first line (`column`), in a `unit`.
+    a line, or with columns and their names in the first line (`column`), in a `unit`. Samples of
+    several parameters that are `joint` are drawn together, row by row: so correlations are kept.
     """
 
     distribution: Literal["lognormal", "normal", "uniform", "beta", "triangular", "samples"]
@@ -86,6 +87,7 @@ class DistributionTable(Table):
     file: str | None = None
     column: str | None = None
     unit: str | None = None
+    joint: bool | None = None
 
     @field_validator("mean", "min", "max", "mode", mode="before")
     @classmethod
@@ -298,7 +300,8 @@ def _numbers(path: Path, column: str | None, where: str) -> list[float]:
     for number, row in enumerate(rows, start=1):
         text = row[index].strip() if index < len(row) else ""
         if not _is_number(text):
-            raise InputError(f"{path}: {shown(text)} in row {number} is not a number", where)
+            named = f" of column {column!r}" if column else ""
+            raise InputError(f"{path}: {shown(text)} in row {number}{named} is not a number", where)
         result.append(float(text))
     return result
 

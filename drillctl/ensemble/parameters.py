@@ -177,7 +177,9 @@ class Uncertain:
     high: float | None
     mode: float | None
     own_mean: bool  # whether the mean is the design's own value, not one that was written
-    samples: tuple[float, ...] = ()  # increasing (SI), of a distribution that is these
+    # of a distribution that is these (SI); increasing, or as they came where rows belong together
+    samples: tuple[float, ...] = ()
+    joint: bool = False  # whether they are drawn by the same rows as those of others
 
     def law(self) -> Any:
         """The distribution as SciPy has it, frozen; samples have none."""
@@ -286,11 +288,14 @@ def drawing(design: Design, seed: int) -> Callable[[int, int], Draws]:
     paths = tuple(p.path for p in result)
     root = correlation_root(table, paths)
     sampling = sampling_of(table, seed)
+    together = [p.path for p in result if p.joint]
 
     def drawn(count: int, first: int) -> Draws:
         points = sampling.points(paths, count, first)
         if root is not None:
             points = correlated(points, root)
+        if together:  # one row for all of them
+            points |= dict.fromkeys(together, points[together[0]])
         values = {p.path: p.values(points[p.path]) for p in result}
         if not isinstance(design.variation, NoVariation):  # a path of its own for each
             values[REALIZATION] = np.arange(first, first + count, dtype=float)
@@ -321,7 +326,24 @@ def uncertain_parameters(design: Design) -> tuple[Uncertain, ...]:
         except InputError as error:
             key = f".{error.where}" if error.where not in ("", path) else ""
             raise InputError(error.problem, design.where(f"uncertain.{path}{key}")) from None
+    _refuse_uneven(design, [one for one in results if one.joint])
     return tuple(results)
+
+
+def _refuse_uneven(design: Design, joint: list[Uncertain]) -> None:
+    """Refuse joint samples that are not rows of one table, or that are correlated once more."""
+    for one in joint:
+        where = f"uncertain.{one.path}"
+        if len(one.samples) != len(joint[0].samples):
+            raise InputError(
+                f"{len(one.samples)} samples, but {len(joint[0].samples)} of {joint[0].path}: "
+                "joint samples are rows of one table",
+                design.where(f"{where}.samples"),
+            )
+        if any(one.path in entry.between for entry in design.tables.uncertainty.correlations):
+            raise InputError(
+                "is joint: its samples hold their correlations already", design.where(where)
+            )
 
 
 def _defaults(design: Design) -> dict[str, DistributionTable]:
@@ -349,7 +371,8 @@ def _read(design: Design, path: str, table: DistributionTable) -> Uncertain:
         raise InputError("takes whole numbers only and cannot be drawn")
     numbers = {key: _number(target, key, getattr(table, key)) for key in _NUMBERS}
     mean, low, high, mode = numbers.values()
-    samples = tuple(sorted(_sample(target, value) for value in table.samples or ()))
+    samples = tuple(_sample(target, value) for value in table.samples or ())
+    samples = samples if table.joint else tuple(sorted(samples))
     own = table.cov is not None and mean is None
     if own:
         if target.value is None:
@@ -365,8 +388,9 @@ def _read(design: Design, path: str, table: DistributionTable) -> Uncertain:
         low, high = _limits(target, mean or 0.0, low, high)
     _refuse_ends(target, table, low, high, mean, samples)
     return Uncertain(
-        path, target.si_unit, table.distribution, mean, table.cov, low, high, mode, own, samples
-    )
+        path, target.si_unit, table.distribution, mean, table.cov, low, high, mode, own, samples,
+        bool(table.joint),
+    )  # fmt: skip
 
 
 _NUMBERS = ("mean", "min", "max", "mode")

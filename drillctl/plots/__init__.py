@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from drillctl.plots.following_weight import advantage_front as advantage_front
     from drillctl.plots.following_weight import advantage_map as advantage_map
     from drillctl.plots.following_weight import weight_delay as weight_delay
+    from drillctl.plots.logs import identified_curve as identified_curve
+    from drillctl.plots.logs import identified_profile as identified_profile
+    from drillctl.plots.logs import identified_window as identified_window
     from drillctl.plots.logs import log_overview as log_overview
     from drillctl.plots.logs import log_spectrum as log_spectrum
     from drillctl.plots.loop_gains import drive_impedance as drive_impedance
@@ -71,7 +74,13 @@ _MODULES = {
         "advantage_map",
         "weight_delay",
     ),
-    "logs": ("log_overview", "log_spectrum"),
+    "logs": (
+        "identified_curve",
+        "identified_profile",
+        "identified_window",
+        "log_overview",
+        "log_spectrum",
+    ),
     "loop_gains": ("drive_impedance", "gain_boundary", "root_locus"),
     "loop_maps": ("loop_map",),
     "loop_shape": ("nichols", "nyquist", "sensitivity"),

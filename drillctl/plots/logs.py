@@ -1,4 +1,4 @@
-"""Logs over time with their oscillations, and their spectra."""
+"""Logs over time with their oscillations, their spectra, and what was fitted to them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from drillctl import units
 from drillctl.plots import style
 
 if TYPE_CHECKING:
+    from drillctl.studies.identify.compute import Identification
     from drillctl.studies.log.compute import LogOverview
 
 MARKED = 5  # oscillations that are shaded
@@ -84,4 +85,78 @@ def log_spectrum(result: LogOverview, ax: Axes | None = None) -> Figure:
     axes.set_ylim(0.0, None)
     style.dress(axes, "frequency (Hz)", "share of variance", "Spectrum of the surface torque")
     axes.legend(fontsize=style.SMALL, frameon=False)
+    return figure
+
+
+@style.picture()
+def identified_curve(
+    result: Identification, ax: Axes | None = None, system: units.System = "si"
+) -> Figure:
+    """The friction curve with its band over the speeds that were seen."""
+    figure, axes = style.axes_or_new(ax, 7.0, 4.6)
+    factor, unit = units.displayed(1.0, "N*m", system)
+    one = result.fitted
+    axes.plot(
+        result.portrait_speed / units.RPM, factor * result.portrait_torque, linestyle="none",
+        marker=".", markersize=2.0, color="#BBBBBB", label="from the waves, no law",
+    )  # fmt: skip
+    axes.fill_between(
+        one.speed / units.RPM, factor * one.low, factor * one.high, color=style.BLUE, alpha=0.3,
+        linewidth=0.0, label="band of 90 %",
+    )  # fmt: skip
+    for number, law in enumerate((one, *(f for f in result.fits if f is not one))):
+        axes.plot(
+            law.speed / units.RPM, factor * law.torque, label=law.name,
+            **style.look(number, 1.6 if law is one else 1.0),
+        )  # fmt: skip
+    if result.identifiable["static_friction"]:
+        axes.plot([0.0], [factor * one.static], color=style.BLUE, marker="o", linestyle="none")
+    top = 1.25 * factor * float(max(one.static, one.torque.max()))
+    axes.set_ylim(0.0, top)
+    axes.set_xlim(-0.02 * one.speed[-1] / units.RPM, 1.02 * one.speed[-1] / units.RPM)
+    at, force = units.displayed(result.weight, "N", system)
+    style.dress(
+        axes, "bit speed (rpm)", f"torque ({unit})", f"Friction of the log at {at:.4g} {force}"
+    )
+    axes.legend(fontsize=style.SMALL, frameon=False)
+    return figure
+
+
+@style.picture()
+def identified_window(
+    result: Identification, ax: Axes | Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
+    """A window of the log beside the fit: the wave that comes up, its residual, the bit speed."""
+    figure, panels = style.grid_or_new(
+        [ax] if isinstance(ax, Axes) else ax, 3, 1, 8.0, 6.4, share_x=True
+    )
+    factor, unit = units.displayed(1.0, "N*m", system)
+    one = result.trace
+    panels[0].plot(one.time, factor * one.measured, label="log", **style.look(0, 1.4))
+    panels[0].plot(one.time, factor * one.predicted, label="fit", **style.look(1, 1.0))
+    panels[1].plot(one.time, factor * (one.measured - one.predicted), **style.look(2, 0.8))
+    panels[2].plot(one.time, one.bit_speed / units.RPM, label="fit", **style.look(1, 1.2))
+    if one.downhole is not None:
+        panels[2].plot(one.time, one.downhole / units.RPM, label="log", **style.look(0, 1.0))
+    for panel, text in zip(
+        panels, (f"upward wave ({unit})", f"log - fit ({unit})", "bit speed (rpm)"), strict=True
+    ):
+        style.dress(panel, "", text)
+    panels[0].set_title("A window of the log beside the fit", fontsize=style.TITLE, loc="left")
+    panels[0].legend(fontsize=style.SMALL, frameon=False)
+    panels[-1].set_xlabel("time (s)", fontsize=style.LABEL)
+    return figure
+
+
+@style.picture()
+def identified_profile(result: Identification, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+    """Rise of the misfit over each coefficient, the others fitted anew."""
+    count = len(result.profile)
+    figure, panels = style.grid_or_new(
+        [ax] if isinstance(ax, Axes) else ax, 1, count, 3.0 * count + 0.8, 3.0, share_y=True
+    )
+    for panel, (name, (values, rises)) in zip(panels, result.profile.items(), strict=True):
+        panel.plot(values, np.maximum(rises, 0.0), marker="o", markersize=3.5, **style.look(0, 1.2))
+        unit = "s/rad" if name == "beta" else "m"
+        style.dress(panel, f"{name} ({unit})", "rise of the misfit" if panel is panels[0] else "")
     return figure

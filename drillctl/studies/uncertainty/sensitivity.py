@@ -68,9 +68,11 @@ COLUMNS = ("first", "first_error", "total", "total_error")
 
 def refuse_correlated(design: Design) -> None:
     """Refuse (`InputError`) correlated parameters, of which Sobol indices say nothing."""
-    if design.tables.uncertainty.correlations:
+    joint = any(table.joint for table in design.tables.uncertain.values())
+    if joint or design.tables.uncertainty.correlations:
         raise InputError(
-            "Sobol indices are of independent parameters: leave correlations or sensitivity out",
+            "Sobol indices are of independent parameters: leave correlations, joint samples or "
+            "sensitivity out",
             "uncertainty.sensitivity",
         )
 

@@ -1,0 +1,325 @@
+"""From windows of a log to laws of friction with bands, and to what the log does not say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from drillctl.arrays import Array
+from drillctl.errors import InputError
+from drillctl.logs.fit import Fit, Problem, Window, driven, fit, residual
+from drillctl.logs.laws import (
+    EXPONENTIAL_LAW,
+    LEAST_DECAY,
+    MOST_DECAY,
+    Family,
+)
+from drillctl.logs.record import Log
+from drillctl.logs.waves import below, split, track
+from drillctl.logs.windows import tonal_share
+from drillctl.rig.drillstring import Parts
+
+CYCLES = 3  # of a window at least
+LEAST_SAMPLES = 30  # a period of the string
+SHORTEST = 20.0  # of a window (s)
+LONGEST = 90.0
+LEAST_SPEED = 0.5  # mean speed (rad/s) of a window: turning
+STILL, MOMENT = 0.05, 3.0  # speed (rad/s) and time (s) of a top that stands still
+POORLY = 0.7  # share of the returning wave that a model explains, below which it is none
+OFF = 0.1  # relative difference of a number of the rig that is told
+FLAT = 0.03  # fall of the torque over the speeds seen, of itself, that is none
+TELLING = 30.0  # variance over that of noise from which the string can be checked
+UNSEEN = 0.5  # spread of the logarithm of the decay, where no stick shows the torque at rest
+LOOSE = 0.25  # relative standard deviation of a coefficient that is not identified
+SLOW_FALL = 0.2  # decay times the range of speeds below which a fall is straight
+POINTS_OF_CURVE = 41
+
+
+def tracks_of(
+    log: Log,
+    parts: Parts,
+    period: float,
+    length: float | None,
+    most: int,
+    lags: tuple[float, float] = (0.0, 0.0),
+) -> tuple[list[Window], float]:
+    """Windows to fit, and the length of them (s).
+
+    Even tracks of the stretches that rotate under torque, cut into windows of three cycles; of
+    more than `most` those that swing most at one frequency.
+    """
+    lag = below(parts).memory + 4.0 * log.spacing
+    places = _runs(log)
+    cycle = _cycle(log, places, period)
+    own = length or min(max(CYCLES * cycle, CYCLES * period, SHORTEST), max(LONGEST, 3.2 * period))
+    found: list[tuple[float, float, float]] = []  # tonal share, begin, end
+    for part in places:
+        time = log.time[part]
+        first, last = float(time[0]) + lag, float(time[-1]) - 3.0 * log.spacing
+        count = int((last - first) // own)
+        if count == 0 and last - first >= 0.6 * own and length is None:
+            count, begin, end = 1, first, last
+            found.append((0.0, begin, end))
+            continue
+        for k in range(count):
+            # The whole stretch is used: what is left over is divided among its windows.
+            wide = (last - first) / count
+            begin, end = first + k * wide, first + (k + 1) * wide
+            rows = part.start + np.searchsorted(time, (begin, end))
+            inside = slice(int(rows[0]), int(rows[1]))
+            share, _ = tonal_share(
+                log.time[inside], _float(log, "top_torque", inside), (0.25 / period, 2.0 / period)
+            )
+            found.append((share, begin, end))
+    chosen = sorted(sorted(found, reverse=True)[:most], key=lambda one: one[1])
+    return [_window(log, begin, end, lag, lags) for _, begin, end in chosen], own
+
+
+def _float(log: Log, name: str, rows: slice) -> Array:
+    return np.asarray(log.signals[name][rows], float)
+
+
+def _runs(log: Log) -> list[slice]:
+    """Runs of rows without gaps and faults where the string turns on the mean under torque."""
+    torque, speed = log.signals["top_torque"], log.signals["top_speed"]
+    good = log.usable & np.isfinite(torque) & np.isfinite(speed)
+    # A soft drive is stopped by the bit for a moment; what lasts is no drilling.
+    still = np.abs(speed) < STILL
+    moments = np.flatnonzero(np.diff(np.concatenate(([0], still.view(np.int8), [0])))).reshape(
+        -1, 2
+    )
+    for first, last in moments[(moments[:, 1] - moments[:, 0]) * log.spacing > MOMENT]:
+        good[first:last] = False
+    results = []
+    for stretch in log.stretches:
+        inside = good[stretch]
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], inside.view(np.int8), [0]))))
+        for a, b in edges.reshape(-1, 2):
+            rows = slice(stretch.start + int(a), stretch.start + int(b))
+            if (b - a) * log.spacing > 0.5 * SHORTEST and (
+                np.mean(log.signals["top_speed"][rows]) > LEAST_SPEED
+            ):
+                results.append(rows)
+    return results
+
+
+def _cycle(log: Log, places: Sequence[slice], period: float) -> float:
+    """Period (s) of the torque in the longest run: stick-slip is slower than the string."""
+    if not places:
+        return period
+    longest = max(places, key=lambda part: part.stop - part.start)
+    rows = slice(longest.start, min(longest.stop, longest.start + int(600.0 / log.spacing)))
+    time = log.time[rows]
+    low = max(0.2 / period, 3.0 / float(time[-1] - time[0]))
+    _, cycle = tonal_share(time, _float(log, "top_torque", rows), (low, 1.5 / period))
+    return float(cycle) if np.isfinite(cycle) else period
+
+
+def _window(log: Log, begin: float, end: float, lag: float, lags: tuple[float, float]) -> Window:
+    """The track of a window with what goes before it."""
+    first, last = np.searchsorted(log.time, (begin - lag, end + 3.0 * log.spacing))
+    rows = slice(max(int(first) - 1, 0), int(last) + 1)
+    for stretch in log.stretches:
+        if stretch.start <= first < stretch.stop:
+            rows = slice(max(rows.start, stretch.start), min(rows.stop, stretch.stop))
+    names = ("weight_on_bit", "bit_speed")
+    held = [_float(log, n, rows) if n in log.signals else None for n in names]
+    held = [None if one is None or not np.isfinite(one).all() else one for one in held]
+    # A signal that is late by a lag was true so much earlier.
+    torque, speed = (
+        np.interp(log.time[rows] + late, log.time[rows], _float(log, name, rows))
+        if late
+        else _float(log, name, rows)
+        for name, late in zip(("top_torque", "top_speed"), lags, strict=True)
+    )
+    made = track(log.time[rows], torque, speed, *held)
+    place = np.searchsorted(made.time, (begin, end))
+    last_sample = min(int(place[1]), len(made.time) - 3)
+    return Window(made, int(place[0]), last_sample, 1.0)
+
+
+def refuse_slow(rate: float, period: float) -> None:
+    """Refuse (`InputError`) a log with too few samples a period."""
+    needed = LEAST_SAMPLES / period
+    if rate < needed * 0.999:
+        raise InputError(
+            f"{rate:.3g} Hz is too slow for a period of {period:.3g} s: friction is seen at the "
+            f"edges of stick and slip, and {LEAST_SAMPLES} samples a period, {needed:.3g} Hz, are "
+            "the least; it is not identifiable from this log",
+            "--log",
+        )
+
+
+def weighted(windows: Sequence[Window]) -> tuple[tuple[Window, ...], float | None]:
+    """Windows with their weight over the mean one, and that mean (N); None if it is not logged."""
+    held = [one.track.weight for one in windows]
+    if any(one is None for one in held):
+        return tuple(windows), None
+    means = [float(w.track.weight[w.first : w.last].mean()) for w in windows]  # type: ignore[index]
+    mean = float(np.mean(means))
+    if not mean > 0.0 or min(means) < 0.2 * mean:
+        return tuple(windows), None
+    return tuple(replace(w, weight=m / mean) for w, m in zip(windows, means, strict=True)), mean
+
+
+class Portrait(NamedTuple):
+    """Speed and torque at the bit from the waves alone, no law assumed."""
+
+    speed: Array  # (rad/s)
+    torque: Array  # (N m)
+
+
+def portrait(problem: Problem) -> Portrait:
+    """Bit speed and torque without a law, of a uniform string; of others as the fit has them."""
+    speeds, torques = [], []
+    for window in problem.windows:
+        made = driven(problem, window, problem.held)
+        z = 2.0 * made.string.impedance
+        if not made.string.delay:
+            continue
+        one = window.track
+        down, up = split(one, problem.parts.top_inertia, problem.parts.top_damping, 0.5 * z)
+        delay = 2.0 * made.string.delay
+        times = one.time[window.first : window.last]
+        going = np.interp(times - delay, one.time, down)
+        speed = (going - up[window.first : window.last]) / z
+        body = 1.0 / float(made.string.torque[0].real)
+        rise = np.gradient(speed, one.spacing)
+        speeds.append(speed)
+        torques.append(going - 0.5 * z * speed - body * rise)
+    return Portrait(*(np.concatenate(x) if x else np.zeros(0) for x in (speeds, torques)))
+
+
+def rough(problem: Problem) -> tuple[float, float]:
+    """Torque at rest and sliding torque (N m) to begin a fit with."""
+    mean = float(np.mean([np.mean(w.track.torque[w.first : w.last]) for w in problem.windows]))
+    return 1.3 * mean, 0.8 * mean
+
+
+def best_fit(problem: Problem, family: Family, like: Fit | None = None) -> Fit:
+    """The best of fits from several beginnings, on a few windows first; or from another law."""
+    extra = np.ones(len(problem.free))
+    if like is not None:
+        low, high = like.curve.torque(np.array([0.0, like.fastest]))[::-1]
+        begin = family.start(float(high), float(low), 3.0 / max(like.fastest, 1.0))
+        if family.knots:
+            torque = like.curve.torque(np.array(family.knots))
+            begin = np.array([0.001 * high, *np.maximum(-np.diff(torque), 0.0), torque[-1]])
+        return fit(problem, family, np.concatenate((begin, like.x[like.numbers :])), like.begins)
+    static, sliding = rough(problem)
+    few = replace(problem, windows=problem.windows[:: max(1, len(problem.windows) // 3)][:3])
+    trials = [
+        fit(few, family, np.concatenate((family.start(s * static, sliding, d), extra)), rounds=8)
+        for d in ((0.05, 0.2) if family is EXPONENTIAL_LAW else (0.1,))
+        for s in (1.0, 1.6)
+    ]
+    return fit(problem, family, min(trials, key=lambda one: one.objective).x)
+
+
+def interval(values: Array, leave: Array, level: float) -> tuple[Array, int]:
+    """Half widths of a band from values with each window left out, and windows that bear on it."""
+    from scipy import stats
+
+    n = len(leave)
+    if n < 2:
+        return np.full(np.shape(values), np.nan), n
+    variance = (n - 1) / n * ((leave - leave.mean(axis=0)) ** 2).sum(axis=0)
+    return float(stats.t.ppf(0.5 + 0.5 * level, n - 1)) * np.sqrt(variance), n
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """A curve with its band."""
+
+    speed: Array  # (rad/s)
+    torque: Array  # (N m)
+    low: Array
+    high: Array
+
+
+def band_of(one: Fit, level: float, floor: float) -> Band:
+    """Torque over the speeds that were seen, from scatter between windows and a floor."""
+    low = max(one.slowest, 0.0) if not any(one.sticks) else 0.0
+    speed = np.linspace(low, max(one.fastest, low + 0.1), POINTS_OF_CURVE)
+    torque = one.curve.torque(speed)
+    n = one.numbers
+    leave = np.array([one.family.curve(x[:n]).torque(speed) for x in one.leave])
+    half, windows = interval(torque, leave, level)
+    # What usual numbers leave open where the log says nothing.
+    steps = 1e-5 * one.family.scale(one.x[:n])
+    slopes = np.array([
+        (one.family.curve(one.x[:n] + step * np.eye(n)[j]).torque(speed) - torque) / step
+        for j, step in enumerate(steps)
+    ])  # fmt: skip
+    left = np.einsum("jw,jk,kw->w", slopes, one.unsaid[:n, :n], slopes)
+    half = np.hypot(half, 1.645 * np.sqrt(np.maximum(left, 0.0)))
+    # One window has no scatter: ten floors, and it is said.
+    half = 10.0 * floor * torque if windows < 2 else half
+    half = np.hypot(half, floor * torque)
+    return Band(speed, torque, torque - half, torque + half)
+
+
+def draws_of(one: Fit, count: int, seed: int, floor: float) -> Array:
+    """Joint draws of the numbers of a law: Student's t of the scatter between windows."""
+    n, numbers = len(one.leave), one.numbers
+    random = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, numbers])))
+    centred = (one.leave - one.leave.mean(axis=0))[:, :numbers]
+    covariance = (n - 1) / n * centred.T @ centred
+    x = one.x[:numbers]
+    root, loose = _root(covariance), _root(one.unsaid[:numbers, :numbers])
+    degrees = max(n - 1, 1)
+    # Without a stick the value and the slope at the mean speed are seen, and no torque at rest.
+    exponential = one.family.name == "navarro-lopez-suarez"
+    spread = 0.0 if any(one.sticks) or not exponential else UNSEEN
+    speed = 0.5 * (max(one.slowest, 0.0) + one.fastest)
+    least, most = one.family.least, one.family.most
+    result: list[Array] = []
+    while len(result) < count:
+        # Of few windows the tails are cut where the band ends by far.
+        stretch = min(np.sqrt(degrees / random.chisquare(degrees)), 3.0)
+        trial = x + stretch * root @ random.standard_normal(numbers)
+        trial += loose @ random.standard_normal(numbers)
+        common = 1.0 + floor / 1.645 * random.standard_normal()
+        torques = slice(0, 2) if one.family.name == "navarro-lopez-suarez" else slice(0, numbers)
+        trial[torques] *= common
+        if spread:
+            trial = _bent(trial, speed, spread * random.standard_normal())
+        result.append(np.clip(trial, least, most))
+    return np.array(result)
+
+
+def _bent(x: Array, speed: float, change: float) -> Array:
+    """The exponential law with another decay, and the same value and slope at a speed."""
+    low, drop, decay = x[0], x[1], np.exp(x[2])
+    fall = drop * np.exp(-decay * speed)
+    other = np.clip(decay * np.exp(change), LEAST_DECAY, MOST_DECAY)
+    left = fall * decay / other
+    base = low + fall - left
+    if base < 0.0:
+        return x
+    return np.array([base, left * np.exp(other * speed), np.log(other)])
+
+
+def _root(covariance: Array) -> Array:
+    values, shapes = np.linalg.eigh(covariance)
+    return np.asarray(shapes * np.sqrt(np.maximum(values, 0.0)))
+
+
+def held_out(problem: Problem, family: Family, x: Array, begins: Array, last: int = 3) -> float:
+    """Root mean square of what fits to the windows before miss of the next ones, over its swing."""
+    n = len(problem.windows)
+    errors, swings = [], []
+    for k in range(max(1, n - last), n):
+        before = fit(replace(problem, windows=problem.windows[:k]), family, x, begins[:k], rounds=4)
+        one = replace(problem, windows=problem.windows[k : k + 1])
+        # Its own beginning is no part of the law: the torque is held, the beginning fitted.
+        only = fit(one, family, before.x, begins[k : k + 1], rounds=0)
+        made = driven(one, one.windows[0], before.factors)
+        curve = family.curve(before.x[: before.numbers])
+        misses = residual(one, one.windows[0], made, curve, float(only.begins[0]))
+        errors.append(np.mean(misses**2))
+        swings.append(np.var(made.up))
+    return float(np.sqrt(np.mean(errors) / np.mean(swings))) if errors else float("nan")

@@ -1,0 +1,513 @@
+"""From a log to a friction curve with a band, to what the log does not say, and to draws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drillctl import units
+from drillctl.arrays import Array
+from drillctl.design import Design, parts
+from drillctl.errors import InputError
+from drillctl.linear import modes
+from drillctl.logs import identification as ident
+from drillctl.logs.fit import FACTORS, Fit, Problem, driven, fit, run
+from drillctl.logs.laws import EXPONENTIAL_LAW, PEAK_LAW, points_law
+from drillctl.logs.waves import below, impedance, is_uniform, travel_time
+from drillctl.progress import SILENT, Progress
+from drillctl.store.codec import label
+from drillctl.store.result import Result
+from drillctl.studies.log.compute import read_logs
+
+NEARLY = 1.1  # error of a prediction over the least one that counts as equal
+LEAST_TORQUE = 100.0  # (N m) of a string that drills
+DRAWN_POINTS = 4000  # of a portrait
+NUMBERS = {
+    "travel_time": ("travel time", "s"), "impedance": ("pipe impedance", "N*m*s/rad"),
+    "bit_inertia": ("inertia at the bit", "kg*m^2"),
+    "drive_inertia": ("drive inertia at the pipe", "kg*m^2"),
+}  # fmt: skip
+WRONG_UNITS = (
+    (units._KNOWN["N*m"]["lbf*ft"], "N m read as ft lbf"),
+    (1.0 / units._KNOWN["N*m"]["lbf*ft"], "ft lbf read as N m"),
+    (1e3, "N m read as kN m"), (1e-3, "kN m read as N m"), (10.0, "daN m mistaken"),
+    (1e3 * units._KNOWN["N*m"]["lbf*ft"], "N m read as klbf ft"),
+    (1e-3 / units._KNOWN["N*m"]["lbf*ft"], "klbf ft read as N m"),
+    (9.80665, "N m read as kgf m"), (1.0 / 9.80665, "kgf m read as N m"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class FittedLaw:
+    """A law fitted to all windows."""
+
+    name: str
+    names: tuple[str, ...]  # of its coefficients
+    values: Array = label("coefficient", means="coefficients of a design: m, and s/rad")
+    half: Array = label("coefficient", means="half width of the interval of each")
+    hold_out: float = label(means="error of predicting the next window, over its swing")
+    explained: float = label(means="share of the variance of the returning wave")
+    size: float = label(unit="N*m", means="usual residual")
+    speed: Array = label("speed", unit="rad/s", means="speeds that were seen")
+    torque: Array = label("speed", unit="N*m", means="torque at the mean weight")
+    low: Array = label("speed", unit="N*m", means="lower end of its band")
+    high: Array = label("speed", unit="N*m", means="upper end")
+    static: float = label(unit="N*m", means="static torque")
+
+
+@dataclass(frozen=True)
+class StringNumber:
+    """A number of the rig, as the design has it and as the log does."""
+
+    name: str
+    label: str
+    unit: str
+    design: float
+    log: float  # NaN where it was not fitted
+    half: float  # half width of its interval
+    fitted: bool  # whether the friction was fitted with it free
+    off: bool  # whether they differ by more than the interval and a tenth
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A window of the log beside the simulation."""
+
+    time: Array = label("time", unit="s", means="time")
+    measured: Array = label("time", unit="N*m", means="wave that comes up, measured")
+    predicted: Array = label("time", unit="N*m", means="the same from the fit")
+    bit_speed: Array = label("time", unit="rad/s", means="of the fit")
+    bit_torque: Array = label("time", unit="N*m", means="of the fit")
+    downhole: Array | None = label("time", unit="rad/s", means="measured bit speed, if any")
+
+
+@dataclass(frozen=True, eq=False)
+class Identification(Result, kind="identify"):
+    """Friction with a band from a log, and what the log does not say."""
+
+    design: Design = label(means="the rig as it was given")
+    files: tuple[str, ...] = label(means="names of the logs")
+    law: str = label(means="the law that is written")
+    fits: tuple[FittedLaw, ...] = label(means="every law")
+    weight: float = label(unit="N", means="mean weight on bit that the curve is at")
+    weight_known: bool = label(means="whether the log holds it")
+    rate: float = label(unit="Hz", means="samples a second of the log")
+    used_rate: float = label(unit="Hz", means="of what was fitted")
+    period: float = label(unit="s", means="lowest of the string, top held")
+    begin: Array = label("window", unit="s", means="beginning of each window")
+    end: Array = label("window", unit="s", means="its end")
+    sticks: Array = label("window", means="whether the bit stands still in it")
+    numbers: tuple[StringNumber, ...] = label(means="of the rig, checked against the log")
+    identifiable: dict[str, bool] = label(means="whether the log says each")
+    findings: tuple[str, ...] = label(means="what the log says and does not say, in words")
+    draws: Array = label("draw", "coefficient", means="joint samples of the coefficients")
+    trace: Trace = label(means="a window")
+    profile: dict[str, Array] = label(
+        "point", means="objective over its least, by coefficient: values, then increases"
+    )
+    portrait_speed: Array = label("sample", unit="rad/s", means="bit speed without a law")
+    portrait_torque: Array = label("sample", unit="N*m", means="bit torque without a law")
+    downhole_difference: float | None = label(
+        means="largest difference of the curve by downhole speed from that by the surface, relative"
+    )
+
+    @property
+    def fitted(self) -> FittedLaw:
+        """The law that is written."""
+        return next(one for one in self.fits if one.name == self.law)
+
+    def summary(self) -> dict[str, Any]:
+        """Strict JSON values, SI."""
+        one = self.fitted
+        return {
+            "law": self.law,
+            "values": dict(zip(one.names, one.values.tolist(), strict=True)),
+            "half_widths": dict(zip(one.names, map(_json, one.half), strict=True)),
+            "weight": self.weight,
+            "weight_known": self.weight_known,
+            "curve": {
+                "speed": one.speed.tolist(), "torque": one.torque.tolist(),
+                "low": one.low.tolist(), "high": one.high.tolist(),
+            },
+            "static_torque": one.static if self.identifiable["static_friction"] else None,
+            "string": {
+                n.name: n.log if n.fitted else n.design for n in self.numbers
+            },
+            "checked": {
+                n.name: {"design": n.design, "log": _json(n.log), "half_width": _json(n.half)}
+                for n in self.numbers
+            },
+            "identifiable": dict(self.identifiable),
+            "hold_out": {fit.name: _json(fit.hold_out) for fit in self.fits},
+            "findings": list(self.findings),
+            "windows": [
+                {"begin": float(a), "end": float(b), "sticks": bool(s)}
+                for a, b, s in zip(self.begin, self.end, self.sticks, strict=True)
+            ],
+        }  # fmt: skip
+
+
+def _json(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def identify(
+    design: Design, log: Sequence[str | Path], progress: Progress = SILENT
+) -> Identification:
+    """Fit the friction of a rig to its logs.
+
+    Parameters
+    ----------
+    design : Design
+        String, drive inertia and the columns of the log; its controller and rock are not used.
+    log : sequence of str or Path
+        One or more logs of this rig.
+    progress : Progress
+        Receives files and fits.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    InputError
+        A log that cannot be read, that is too slow, that never turns, or that has nothing to do
+        with this string.
+    """
+    settings = design.tables.identify
+    logs = read_logs(design, log, progress)
+    line = parts.parts_of(design.tables)
+    period = 1.0 / modes(design, 1).fixed_top[0].frequency_hz
+    windows = []
+    for held_log in logs:
+        ident.refuse_slow(held_log.rate, period)
+        lags = settings.torque_lag, settings.speed_lag
+        found, _ = ident.tracks_of(held_log, line, period, settings.window, settings.windows, lags)
+        windows += found
+    if not windows:
+        raise InputError(
+            f"no stretch of the log turns under torque for as long as a window: {ident.CYCLES} "
+            f"cycles of {period:.3g} s",
+            "--log",
+        )
+    _refuse_implausible(windows)
+    held, weight = ident.weighted(windows)
+    problem = Problem(line, held, settings.free)
+    progress.begin("fitting laws", 7)
+    fits = [ident.best_fit(problem, EXPONENTIAL_LAW)]
+    progress.advance(1)
+    fits.append(ident.best_fit(problem, PEAK_LAW))
+    progress.advance(1)
+    main = _leading(fits)
+    _refuse_foreign(problem, main)
+    fits.append(ident.best_fit(problem, points_law(main.fastest), main))
+    progress.advance(1)
+    main = _leading(fits)
+    checked = _checked(problem, main)
+    progress.advance(1)
+    numbers = _numbers(problem, main, checked, settings.confidence)
+    known = weight is not None
+    at = weight if weight is not None else design.tables.operating_point.weight_on_bit
+    if not at > 0.0:
+        raise InputError(
+            "must be > 0: the coefficients are torque over weight", "operating_point.weight_on_bit"
+        )
+    described = []
+    for one in fits:
+        score = ident.held_out(one.problem, one.family, one.x, one.begins)
+        described.append(_described(one, at, score, settings.confidence, settings.floor))
+        progress.advance(1)
+    if any(n.off for n in numbers) and checked is not None:
+        described = [_widened(d, f, checked) for d, f in zip(described, fits, strict=True)]
+    law = settings.law or _best(described)
+    own = next(f for f in described if f.name == (law if settings.law else main.family.name))
+    findings, identifiable = _findings(main, own, numbers, known, at)
+    chosen = next(f for f in fits if f.family.name == law)
+    below_surface = _downhole(problem, main)
+    if below_surface is not None:
+        findings.append(
+            f"driven by the downhole speed the curve differs from that by the surface alone by at "
+            f"most {below_surface:.1%}"
+        )
+    x = ident.draws_of(chosen, settings.draws, settings.seed, settings.floor)
+    draws = np.array([chosen.family.coefficients(row, at) for row in x])
+    seen = ident.portrait(problem)
+    every = slice(None, None, max(1, len(seen.speed) // DRAWN_POINTS))
+    track = windows[0].track
+    return Identification(
+        design=design, files=tuple(one.file for one in logs), law=law, fits=tuple(described),
+        weight=at, weight_known=known, rate=logs[0].rate, used_rate=1.0 / track.spacing,
+        period=period,
+        begin=np.array([w.track.time[w.first] for w in windows]),
+        end=np.array([w.track.time[w.last - 1] for w in windows]),
+        sticks=np.array(main.sticks), numbers=tuple(numbers), identifiable=identifiable,
+        findings=tuple(findings), draws=draws, trace=_trace(chosen), profile=_profile(chosen, at),
+        portrait_speed=seen.speed[every], portrait_torque=seen.torque[every],
+        downhole_difference=below_surface,
+    )  # fmt: skip
+
+
+def _refuse_implausible(windows: Sequence[Any]) -> None:
+    """Refuse a speed or a torque that no rig has: another column, or another unit."""
+    speed = float(np.median([np.median(w.track.speed) for w in windows]))
+    torque = float(np.median([np.median(w.track.torque) for w in windows]))
+    for value, (low, high), text in (
+        (
+            speed,
+            (0.0, units.SPEED.usual[1]),
+            f"top speed of this log is {speed / units.RPM:.4g} rpm",
+        ),
+        (
+            torque,
+            (LEAST_TORQUE, units.TORQUE.usual[1]),
+            f"top torque of this log is {torque:.4g} N m",
+        ),
+    ):
+        if not low <= value <= high:
+            raise InputError(
+                f"the {text} on the median, which no rig drills with: another column, or its unit "
+                "is not the one it was read in (drillctl log prints both)",
+                "--log",
+            )
+
+
+def _refuse_foreign(problem: Problem, main: Fit) -> None:
+    """Refuse a log that the string cannot have made; name a unit that would explain it."""
+    few = replace(problem, windows=problem.windows[:2], free=())
+    own = fit(few, main.family, main.x[: main.numbers], main.begins[:2], rounds=4)
+    if own.quiet:
+        return
+    noise = 1.0 - own.explained
+    best, words = noise, ""
+    if noise > 0.005:
+        for factor, said in WRONG_UNITS:
+            tracks = [replace(w.track, torque=w.track.torque / factor) for w in few.windows]
+            scaled = replace(few, windows=tuple(
+                replace(w, track=one) for w, one in zip(few.windows, tracks, strict=True)
+            ))  # fmt: skip
+            trial = ident.best_fit(scaled, main.family)
+            if 1.0 - trial.explained < best:
+                best, words = 1.0 - trial.explained, f"{said} would make it {1 / factor:.4g} times"
+        if words and best < min(0.25 * noise, 0.1):
+            raise InputError(
+                f"the torque of this log is not that of this string: {noise:.1%} of the returning "
+                f"wave is unexplained, and {best:.1%} if the torque were in another unit ({words} "
+                "as large)",
+                "--log",
+            )
+    if own.explained < ident.POORLY:
+        raise InputError(
+            f"the string of this design explains {max(own.explained, 0.0):.0%} of what returns to "
+            "the top in this log: wrong columns, another rig, or a torque without the drive's "
+            "inertia; friction is not identifiable",
+            "--log",
+        )
+
+
+def _checked(problem: Problem, main: Fit) -> Fit | None:
+    """The fit with all numbers of the rig free; None where too few windows tell their scatter."""
+    if len(problem.windows) < 2 or main.signal < ident.TELLING:
+        return None
+    free = replace(problem, free=FACTORS)
+    extra = [getattr(main.factors, name) for name in FACTORS]
+    return fit(
+        free, main.family, np.concatenate((main.x[: main.numbers], extra)), main.begins, rounds=8
+    )
+
+
+def _numbers(problem: Problem, main: Fit, checked: Fit | None, level: float) -> list[StringNumber]:
+    line = problem.parts
+    body = line.bit_inertia + (line.sections[0].end_inertia if is_uniform(line) else 0.0)
+    design = {
+        "travel_time": travel_time(line), "impedance": impedance(line), "bit_inertia": body,
+        "drive_inertia": line.top_inertia,
+    }  # fmt: skip
+    results = []
+    for name in FACTORS:
+        fitted = name in problem.free
+        source = main if fitted else checked
+        factor = half = np.nan
+        if source is not None:
+            k = source.numbers + source.problem.free.index(name)
+            factor = float(source.x[k])
+            half = float(ident.interval(source.x[k], source.leave[:, k], level)[0])
+        apart = abs(factor - 1.0)
+        off = bool(apart > max(ident.OFF, 2.0 * half)) and not fitted
+        value = design[name]
+        results.append(
+            StringNumber(name, *NUMBERS[name], value, factor * value, half * value, fitted, off)
+        )
+    return results
+
+
+def _described(one: Fit, weight: float, score: float, level: float, floor: float) -> FittedLaw:
+    band = ident.band_of(one, level, floor)
+    n = one.numbers
+    values = one.family.coefficients(one.x[:n], weight)
+    leave = np.array([one.family.coefficients(x[:n], weight) for x in one.leave])
+    half, _ = ident.interval(values, leave, level)
+    loose = np.sqrt(np.maximum(np.diag(_carried(one, weight)), 0.0))
+    half = np.hypot(np.nan_to_num(np.asarray(half), nan=0.0), 1.645 * loose)
+    half = np.hypot(half, floor * np.abs(values))
+    return FittedLaw(
+        one.family.name, one.family.names, values, half, score, one.explained, one.size,
+        band.speed, band.torque, band.low, band.high, one.curve.static,
+    )  # fmt: skip
+
+
+def _carried(one: Fit, weight: float) -> Array:
+    """What usual numbers leave open, as covariance of the coefficients."""
+    n = one.numbers
+    base = one.family.coefficients(one.x[:n], weight)
+    steps = 1e-6 * one.family.scale(one.x[:n])
+    slopes = np.array([
+        (one.family.coefficients(one.x[:n] + step * np.eye(n)[j], weight) - base) / step
+        for j, step in enumerate(steps)
+    ])  # fmt: skip
+    return np.asarray(slopes.T @ one.unsaid[:n, :n] @ slopes)
+
+
+def _widened(law: FittedLaw, one: Fit, checked: Fit) -> FittedLaw:
+    """A band that holds the curve with the rig's numbers free as well: they are in doubt."""
+    other = checked.family.curve(checked.x[: checked.numbers]).torque(law.speed)
+    margin = law.torque - law.low
+    return replace(
+        law, low=np.minimum(law.low, other - margin), high=np.maximum(law.high, other + margin)
+    )
+
+
+def _leading(fits: list[Fit]) -> Fit:
+    """The fit that explains most; the first if it is as good."""
+    missed = [1.0 - one.explained for one in fits]
+    best = int(np.argmin(missed))
+    return fits[0 if missed[0] <= 1.2 * missed[best] + 0.002 else best]
+
+
+def _best(described: list[FittedLaw]) -> str:
+    """The first law that predicts the next window nearly as well as the best."""
+    scores = np.array([one.hold_out for one in described])
+    if not np.isfinite(scores).all():
+        scores = np.array([one.size for one in described])
+    return next(
+        one.name
+        for one, score in zip(described, scores, strict=True)
+        if score <= NEARLY * scores.min()
+    )
+
+
+def _findings(
+    main: Fit, law: FittedLaw, numbers: list[StringNumber], known: bool, at: float
+) -> tuple[list[str], dict[str, bool]]:
+    """What the log says and does not say."""
+    findings: list[str] = []
+    sticks = any(main.sticks)
+    said = dict.fromkeys((*law.names, "static_friction"), True)
+    if main.quiet:
+        said |= dict.fromkeys(law.names, False)
+        findings.append(
+            "the log holds hardly more than its noise: what is seen is the mean torque at the mean "
+            "speed, and no string, slope or decay"
+        )
+    rpm = units.RPM
+    slow, fast = max(main.slowest, 0.0), main.fastest
+    if not sticks:
+        said["static_friction"] = said["a2"] = said["beta"] = False
+        findings.append(
+            f"no break-away in this log: the bit never stands still, so static friction is not "
+            f"seen; the curve is known from {slow / rpm:.0f} to {fast / rpm:.0f} rpm alone"
+        )
+    ends = main.curve.torque(np.array([slow if not sticks else 0.0, fast]))
+    fall = float(ends[0] - ends[1]) / float(ends[0])
+    if main.quiet:
+        pass  # it says nothing of a slope
+    elif fall < ident.FLAT:
+        said["beta"] = said["a2"] = False
+        findings.append(
+            f"the torque falls by {fall:.1%} from {slow / rpm:.0f} to {fast / rpm:.0f} rpm: it is "
+            "flat, and how it decays (beta) is not identified; Coulomb's law or tabulated points "
+            "say all there is"
+        )
+    elif main.family is EXPONENTIAL_LAW and (
+        main.curve.numbers[2] * (fast - slow) < ident.SLOW_FALL or main.x[0] <= 0.0
+    ):
+        said["beta"] = said["a1"] = False
+        findings.append(
+            "the torque falls straight over the speeds seen "
+            "N m s/rad): beta is not identified, use the tabulated law"
+        )
+    for name, value, half in zip(law.names, law.values, law.half, strict=True):
+        if said[name] and half > ident.LOOSE * abs(value) * 1.645:
+            said[name] = False
+            findings.append(
+                f"{name} is not identified: {value:.3g} within {half:.2g}; the curve is what the "
+                "log says"
+            )
+    if len(main.sticks) < 2:
+        findings.append("one window alone: its scatter is not known, the band is a guess of 5 %")
+    if not known:
+        findings.append(
+            f"the weight on bit is not in the log: the curve is torque at its mean weight, and the "
+            f"coefficients take it for the design's {at / 1e3:.4g} kN"
+        )
+    for one in numbers:
+        said[one.name] = bool(np.isfinite(one.half) and one.half < ident.LOOSE * one.design)
+        if one.off:
+            findings.append(
+                f"{one.label}: the design has {one.design:.4g} {one.unit}, the log {one.log:.4g} "
+                f"within {one.half:.2g} ({one.log / one.design - 1.0:+.0%}); correct it, or fit it "
+                f'with [identify] free = ["{one.name}"]. The band was widened to hold both'
+            )
+    return findings, said
+
+
+def _downhole(problem: Problem, main: Fit) -> float | None:
+    """Largest relative difference of the curve by the downhole speed from that by the surface."""
+    if any(w.track.bit is None for w in problem.windows):
+        return None
+    other = fit(replace(problem, downhole=True), main.family, main.x, main.begins, rounds=8)
+    speed = np.linspace(max(main.slowest, 0.0), main.fastest, 20)
+    one, two = main.curve.torque(speed), other.curve.torque(speed)
+    return float(np.max(np.abs(two / one - 1.0)))
+
+
+def _trace(one: Fit) -> Trace:
+    """The first window with sticks, or the first."""
+    k = next((k for k, sticks in enumerate(one.sticks) if sticks), 0)
+    window = one.problem.windows[k]
+    made = driven(one.problem, window, one.factors)
+    motion = run(made, one.curve, window.weight, float(one.begins[k]))
+    time = window.track.time[window.first : window.last]
+    lag = below(one.problem.parts, one.factors).delay
+    hole = (
+        None
+        if window.track.bit is None
+        else np.interp(time - lag, window.track.time, window.track.bit)
+    )
+    return Trace(time, made.up, motion.up, motion.bit, motion.torque, hole)
+
+
+def _profile(one: Fit, weight: float) -> dict[str, Array]:
+    """Objective with a number held at values around the best, in units of a standard deviation."""
+    if one.family.name == "tabulated" or len(one.leave) < 2:
+        return {}
+    n, results = one.numbers, {}
+    spread = np.sqrt(
+        (len(one.leave) - 1) * one.leave.var(axis=0) + np.diag(one.unsaid)[: len(one.x)]
+    )
+    for j, name in enumerate(one.family.names):
+        values, rises = [], []
+        for step in (-3.0, -1.5, 1.5, 3.0):
+            x = one.x.copy()
+            x[j] = np.clip(x[j] + step * spread[j], one.family.least[j], one.family.most[j])
+            other = fit(one.problem, one.family, x, one.begins, rounds=2, hold=j)
+            values.append(float(one.family.coefficients(other.x[:n], weight)[j]))
+            rises.append(2.0 * (other.objective - one.objective) / one.size**2)
+        values.insert(2, float(one.family.coefficients(one.x[:n], weight)[j]))
+        rises.insert(2, 0.0)
+        results[name] = np.array([values, rises])
+    return results

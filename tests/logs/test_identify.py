@@ -1,0 +1,184 @@
+"""What a log says of the rock, and what it does not; logs are made by characteristics."""
+
+import json
+
+import numpy as np
+import pytest
+
+import drillctl
+from drillctl.cli import run
+from drillctl.ensemble.parameters import draw
+from drillctl.errors import InputError
+from drillctl.studies.identify.compute import identify
+from drillctl.studies.identify.written import write as write_design
+from tests.logs.synthetic import WEIGHT, Rig, sampled, write
+
+NOISE = (200.0, 0.02)
+PI = {"controller.kp": 200, "controller.ki": 100}
+
+
+def design(**values):
+    return drillctl.load(
+        "monteiro-trindade-140kn", **{k.replace("__", "."): v for k, v in values.items()}
+    )
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return Rig().run(300.0)
+
+
+@pytest.fixture(scope="module")
+def clean(motion, tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "clean.csv"
+    return write(path, sampled(motion, 100.0, 60.0, 240.0), weight=WEIGHT)
+
+
+@pytest.fixture(scope="module")
+def noisy(motion, tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "noisy.csv"
+    return write(path, sampled(motion, 20.0, 30.0, 290.0, NOISE, seed=4), columns=4)
+
+
+def test_a_log_without_noise_gives_the_curve_and_the_string(clean):
+    result = identify(design(identify__free=["travel_time", "impedance", "bit_inertia"]), [clean])
+    one = result.fitted
+    assert one.name == "navarro-lopez-suarez"
+    assert one.torque == pytest.approx(Rig().curve(one.speed), rel=1e-4)
+    for number in result.numbers[:3]:
+        assert number.log == pytest.approx(number.design, rel=1e-4)
+    assert result.weight == pytest.approx(WEIGHT)
+    assert result.weight_known
+    assert not result.findings
+
+
+@pytest.fixture(scope="module")
+def identified(noisy):
+    return identify(design(), [noisy])
+
+
+def test_a_noisy_log_gives_a_band_that_holds_the_curve(identified):
+    one = identified.fitted
+    truth = Rig().curve(one.speed)
+    assert np.mean((one.low <= truth) & (truth <= one.high)) > 0.8
+    assert one.high - one.low == pytest.approx(0.01 * truth, rel=2.0)
+    assert identified.identifiable["static_friction"]
+    assert identified.downhole_difference < 0.01
+    assert not any(number.off for number in identified.numbers)
+    said = " ".join(identified.findings)
+    assert "the weight on bit is not in the log" in said
+
+
+def test_joint_draws_keep_their_correlations(identified, tmp_path):
+    write_design(identified, tmp_path)
+    made = drillctl.load(tmp_path / "identified.toml")
+    assert made.tables.bit_rock.a2 == pytest.approx(0.085, rel=0.01)
+    values = np.array(list(draw(made, 2000, seed=1).values.values()))
+    assert np.corrcoef(values) == pytest.approx(np.corrcoef(identified.draws.T), abs=0.08)
+    assert np.corrcoef(values)[0, 1] > 0.5
+    rows = {tuple(row) for row in identified.draws.tolist()}
+    assert all(tuple(row) in rows for row in values.T.tolist())
+    table = tmp_path / "draws.csv"
+    text = table.read_text().splitlines()
+    table.write_text("\n".join([*text[:3], "0.02,none,0.1", *text[3:]]))
+    with pytest.raises(
+        InputError, match=r"a2\.file.*draws.csv: 'none' in row 3 of column 'bit_rock.a2'"
+    ):
+        drillctl.load(tmp_path / "identified.toml")
+    held = {"distribution": "samples", "joint": True}
+    uneven = {
+        "bit_rock.a1_factor": {**held, "samples": [1.0] * 9},
+        "bit_rock.a2_factor": {**held, "samples": [1.0] * 12},
+    }
+    with pytest.raises(InputError, match=r"12 samples, but 9 of bit_rock.a1_factor: joint samples"):
+        draw(design().replace({"uncertain": uneven}), 3, 1)
+
+
+def test_a_wrong_drive_inertia_is_named(noisy):
+    result = identify(design(top_drive__inertia="650 kg*m^2"), [noisy])
+    (off,) = [number for number in result.numbers if number.off]
+    assert off.name == "drive_inertia"
+    assert off.log == pytest.approx(500.0, rel=0.08)
+    assert any("drive inertia at the pipe: the design has 650" in text for text in result.findings)
+    truth = Rig().curve(result.fitted.speed)
+    assert np.mean((result.fits[0].low <= truth) & (truth <= result.fits[0].high)) > 0.6
+
+
+def test_a_torque_in_the_wrong_unit_is_named(noisy, tmp_path):
+    text = noisy.read_text().replace("top_torque_Nm", "top_torque_ftlb")
+    path = tmp_path / "wrong.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"N m read as ft lbf would make it 0.7376 times"):
+        identify(design(), [path])
+
+
+def test_wrong_columns_are_named(noisy, tmp_path):
+    path = tmp_path / "wrong.csv"
+    path.write_text(
+        noisy.read_text().replace("_torque_Nm", "_x_rpm").replace("_speed_rpm", "_torque_Nm")
+    )
+    rows = {"log.top_speed.column": "top_x_rpm", "log.top_torque.column": "top_torque_Nm"}
+    with pytest.raises(InputError, match="which no rig drills with"):
+        identify(drillctl.load("monteiro-trindade-140kn", **rows), [path])
+
+
+def test_one_sample_a_second_is_refused(motion, tmp_path):
+    path = write(tmp_path / "slow.csv", sampled(motion, 1.0, 30.0, 290.0))
+    with pytest.raises(InputError, match=r"1 Hz is too slow for a period of 7\.84 s"):
+        identify(design(), [path])
+
+
+def test_without_sticks_static_friction_is_not_seen(tmp_path):
+    rig = Rig(kp=450.0, ki=150.0, a1=0.034 * WEIGHT, a2=0.07 * WEIGHT, beta=0.1)
+    path = write(tmp_path / "a.csv", sampled(rig.run(200.0), 100.0, 15.0, 100.0, (20.0, 0.002)))
+    result = identify(design(), [path])
+    assert not result.sticks.any()
+    assert not result.identifiable["static_friction"]
+    assert not result.identifiable["a2"]
+    assert any("no break-away in this log" in text for text in result.findings)
+    one = result.fitted
+    truth = rig.curve(one.speed)
+    assert np.mean((one.low <= truth) & (truth <= one.high)) > 0.5
+    assert result.draws.std(axis=0)[1] > 0.05 * result.draws.mean(axis=0)[1]
+
+
+def test_a_constant_torque_is_flat(tmp_path):
+    rig = Rig(a1=5000.0, a2=5000.0, peak=14000.0, beta=0.0, ki=50.0)
+    path = write(tmp_path / "a.csv", sampled(rig.run(260.0), 100.0, 15.0, 250.0, NOISE))
+    result = identify(design(), [path])
+    assert result.law == "jansen-van-den-steen"
+    assert result.fitted.values * WEIGHT == pytest.approx([5000.0, 14000.0], rel=0.03)
+
+
+def test_several_damped_sections(tmp_path):
+    """The log is made by the reference solver: two sections, damping, another bit."""
+    pipe = {"pipe": "5 in 19.5 lb/ft", "length": "2500 m", "stiffness_damping": "0.001 s"}
+    collar = {"outer_diameter": "165 mm", "inner_diameter": "71 mm", "length": "200 m"}
+    sections = [{"name": "pipe", **pipe}, {"name": "collar", **collar}]
+    values = {**PI, "simulation.duration": "110 s", "drillstring.sections": sections}
+    rig = drillctl.load("monteiro-trindade-140kn", **values)
+    run_ = drillctl.simulate(rig, "reference", interval=0.02)
+    keep = run_.time > 20.0
+    signals = (run_.signals[name][keep] for name in ("top_torque", "top_speed", "bit_speed"))
+    samples = run_.time[keep] - 20.0, *signals
+    path = write(tmp_path / "a.csv", samples)
+    one = identify(rig, [path]).fits[0]
+    law = rig.bit_rock
+    truth = WEIGHT * (law.a1 + (law.a2 - law.a1) * np.exp(-law.beta * one.speed))
+    assert one.torque == pytest.approx(truth, rel=0.005)
+
+
+def test_the_command_writes_what_others_run(noisy, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    command = ["identify", "monteiro-trindade-140kn", "--log", str(noisy), "--out", "o", "--json"]
+    assert run(command) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["law"] == "navarro-lopez-suarez"
+    assert set(found["string"]) == {"travel_time", "impedance", "bit_inertia", "drive_inertia"}
+    assert len(found["curve"]["low"]) == len(found["curve"]["speed"])
+    for name in ("curve", "window", "profile"):
+        assert (tmp_path / "o" / f"identified-{name}.png").stat().st_size > 5000
+    assert run(["validate", "o/identified.toml"]) == 0
+    assert run(command) == 0  # shown again
+    assert "already done" in capsys.readouterr().err
+    assert drillctl.open("o").summary() == {k: v for k, v in found.items() if k != "warnings"}
