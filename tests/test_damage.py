@@ -28,6 +28,7 @@ from drillctl.store import claim, growing_realizations
 from drillctl.store.journal import Journal
 from drillctl.studies import sweep
 from drillctl.studies.base import studies
+from tests.logs.synthetic import Rig, sampled, write
 
 GAINS = [
     {"path": "controller.kp", "min": 0.0, "max": 900.0, "points": 3},
@@ -115,6 +116,11 @@ def survives(folder, older):
 def run_twice(verb, options, tmp_path):
     """A finished folder, and one of the same command that was asked for something else."""
     folders = []
+    more_given = {}
+    if verb in ("log", "identify"):
+        path = write(tmp_path / "log.csv", sampled(Rig(parts=200).run(130.0), 10.0, 15.0, 130.0))
+        options = [str(path) if one == "log.csv" else one for one in options]
+        more_given = {"files": [str(path)]} if verb == "log" else {}
     for place, more in (("run", []), ("older", ["--set", "bha.inertia=400 kg*m^2"])):
         if studies()[verb].command:
             arguments = [*options, *more, "--out", str(tmp_path / place)]
@@ -122,7 +128,7 @@ def run_twice(verb, options, tmp_path):
         else:
             given = {"bha.inertia": "400 kg*m^2"} if more else {}
             design = drillctl.load(options[0], **(SHORT | given))
-            studies()[verb].run(design).save(tmp_path / place)
+            studies()[verb].run(design, **more_given).save(tmp_path / place)
         folders.append(tmp_path / place)
     return folders
 
@@ -134,10 +140,12 @@ def settings(*texts):
 SMALL = ["--set", "simulation.duration=10 s"]
 MAP = [*SMALL, "--axis", "controller.kp=0:900:3", "--axis", "controller.ki=0:500:2"]
 KINDS = {
+    "log": ["monteiro-trindade-140kn"],  # its command takes files
     "simulate": ["monteiro-trindade-140kn", *SMALL],
     "map": ["monteiro-trindade-140kn", *MAP, "--audit", "0", "--measure", "sticks"],
 }
 SLOW_KINDS = {
+    "identify": ["monteiro-trindade-140kn", "--log", "log.csv"],
     "modes": ["monteiro-trindade-140kn"],
     "torque-drag": ["well-a-off-bottom"],
     "export": ["monteiro-trindade-140kn"],

@@ -21,6 +21,7 @@ import drillctl
 from drillctl import units
 from drillctl.cli import run
 from drillctl.studies.base import Study, studies
+from tests.logs.synthetic import Rig, sampled, write
 
 DESIGN = "monteiro-trindade-140kn"
 BISTABLE = "navarro-lopez-2dof-bistable"
@@ -32,6 +33,7 @@ GAINS = ("--axis", "controller.kp=0:1000:5", "--axis", "controller.ki=0:500:4")
 QUICK = {
     "modes": (DESIGN,),
     "loop": (DESIGN, *GAINS),
+    "identify": (DESIGN, "--log", "log.csv", "--set", "identify.draws=50"),
     "cycle": (BISTABLE,),
     "map": (DESIGN, *GAINS, *SHORT, "--audit", "1"),
     "doctor": (DESIGN, *GAINS, *SHORT, "--audit", "1"),
@@ -121,6 +123,8 @@ def ran(request, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(verb, "draw", small)
         patch.chdir(above)
+        if "log.csv" in arguments:
+            write("log.csv", sampled(Rig(parts=200).run(130.0), 10.0, 15.0, 130.0))
         said = called(study.name, *arguments, "--out", "once", "--json", "--units", "field")
     return Ran(study, arguments, above / "once", *said, drawn)
 

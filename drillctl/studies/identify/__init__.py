@@ -38,9 +38,7 @@ def tables(result: Identification) -> Iterator[Table]:
         Column("coefficient"), Column("value", digits=5), Column("half_width", "within", digits=2),
         Column("identified"),
     )  # fmt: skip
-    at = f"{result.weight / 1e3:.4g} kN"
-    known = "of the log" if result.weight_known else "of the design, as the log has none"
-    yield Table("coefficients", Told(f"{one.name} at {at} ({known})"), columns, rows)
+    yield Table("coefficients", f"{one.name}, over the mean weight", columns, rows)
     heads = (
         Column("law"), Column("hold_out", "error of the next window", percent=True, digits=3),
         Column("explained", percent=True, digits=4), Column("residual", "usual residual", "N*m", 3),
@@ -89,6 +87,8 @@ def tables(result: Identification) -> Iterator[Table]:
 
 def remarks(result: Identification, system: units.System) -> Iterator[str]:
     """What the log says and what it does not."""
+    whose = "of the log" if result.weight_known else "of the design"
+    yield units.told(Told(f"Mean weight {units.full(result.weight, 'N', 4)}, {whose}."), system)
     for text in result.findings:
         yield units.told(Told(f"{text[0].upper()}{text[1:]}."), system)
     yield (
@@ -121,7 +121,8 @@ def pictures(result: Identification) -> Iterator[Picture]:
     yield Picture(
         "identified-curve", "Torque at the bit over its speed: the law fitted with its band, the "
         "other laws, and the bit's motion computed from the waves alone.",
-        f"Curve of {one.name} from {one.torque[0]:.0f} to {one.torque[-1]:.0f} N m.",
+        f"Curve of {one.name} from {units.full(one.torque[0], 'N*m', 4)} to "
+        f"{units.full(one.torque[-1], 'N*m', 4)}.",
         lambda system: plots.identified_curve(result, system=system),
     )  # fmt: skip
     yield Picture(

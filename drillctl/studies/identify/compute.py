@@ -47,15 +47,15 @@ class FittedLaw:
 
     name: str
     names: tuple[str, ...]  # of its coefficients
-    values: Array = label("coefficient", means="coefficients of a design: m, and s/rad")
-    half: Array = label("coefficient", means="half width of the interval of each")
+    values: Array = label("{name}_coefficient", means="coefficients of a design: m, and s/rad")
+    half: Array = label("{name}_coefficient", means="half width of the interval of each")
     hold_out: float = label(means="error of predicting the next window, over its swing")
     explained: float = label(means="share of the variance of the returning wave")
     size: float = label(unit="N*m", means="usual residual")
-    speed: Array = label("speed", unit="rad/s", means="speeds that were seen")
-    torque: Array = label("speed", unit="N*m", means="torque at the mean weight")
-    low: Array = label("speed", unit="N*m", means="lower end of its band")
-    high: Array = label("speed", unit="N*m", means="upper end")
+    speed: Array = label("{name}_speed", unit="rad/s", means="speeds that were seen")
+    torque: Array = label("{name}_speed", unit="N*m", means="torque at the mean weight")
+    low: Array = label("{name}_speed", unit="N*m", means="lower end of its band")
+    high: Array = label("{name}_speed", unit="N*m", means="upper end")
     static: float = label(unit="N*m", means="static torque")
 
 
@@ -104,7 +104,7 @@ class Identification(Result, kind="identify"):
     numbers: tuple[StringNumber, ...] = label(means="of the rig, checked against the log")
     identifiable: dict[str, bool] = label(means="whether the log says each")
     findings: tuple[str, ...] = label(means="what the log says and does not say, in words")
-    draws: Array = label("draw", "coefficient", means="joint samples of the coefficients")
+    draws: Array = label("draw", "drawn", means="joint samples of the coefficients")
     trace: Trace = label(means="a window")
     profile: dict[str, Array] = label(
         "point", means="objective over its least, by coefficient: values, then increases"
@@ -452,14 +452,18 @@ def _findings(
     if not known:
         findings.append(
             f"the weight on bit is not in the log: the curve is torque at its mean weight, and the "
-            f"coefficients take it for the design's {at / 1e3:.4g} kN"
+            f"coefficients take it for the design's {units.full(at, 'N', 4)}"
         )
     for one in numbers:
         said[one.name] = bool(np.isfinite(one.half) and one.half < ident.LOOSE * one.design)
         if one.off:
+            own, log, half = (
+                units.full(value, one.unit, digits)
+                for value, digits in ((one.design, 4), (one.log, 4), (one.half, 2))
+            )
             findings.append(
-                f"{one.label}: the design has {one.design:.4g} {one.unit}, the log {one.log:.4g} "
-                f"within {one.half:.2g} ({one.log / one.design - 1.0:+.0%}); correct it, or fit it "
+                f"{one.label}: the design has {own}, the log {log} within {half} "
+                f"({one.log / one.design - 1.0:+.0%}); correct it, or fit it "
                 f'with [identify] free = ["{one.name}"]. The band was widened to hold both'
             )
     return findings, said

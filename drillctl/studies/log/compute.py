@@ -40,8 +40,8 @@ class Spectrum:
     """Spectrum of the torque in one window."""
 
     name: str  # of the window
-    frequency: Array = label("line", unit="Hz", means="frequency")
-    power: Array = label("line", means="power over that of all lines")
+    frequency: Array = label("{name}_line", unit="Hz", means="frequency")
+    power: Array = label("{name}_line", means="power over that of all lines")
 
 
 @dataclass(frozen=True, eq=False)
