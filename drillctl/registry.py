@@ -18,6 +18,7 @@ FRICTION_LAWS = (
     "drillctl.rig.bit_rock.tucker_wang",
     "drillctl.rig.bit_rock.stribeck",
     "drillctl.rig.bit_rock.aggressiveness",
+    "drillctl.rig.bit_rock.richard_detournay",
 )
 """Each module holds `LAWS`, a tuple of `drillctl.rig.bit_rock.law.FrictionLaw`."""
 

@@ -55,6 +55,8 @@ TIME = Kind("time", "s", ("s", "ms", "min"))
 RATE = Kind("rate", "1/s", ("1/s",))
 INERTIA = Kind("inertia", "kg*m^2", ("kg*m^2",))
 DENSITY = Kind("density", "kg/m^3", ("kg/m^3",), (700.0, 20e3))
+MASS = Kind("mass", "kg", ("kg",), (1.0, 1e6))
+AXIAL_DAMPING = Kind("axial damping", "N*s/m", ("N*s/m", "kN*s/m"))
 LINEAR_MASS = Kind("mass per length", "kg/m", ("kg/m", "lb/ft"))
 VISCOSITY = Kind("viscosity", "Pa*s", ("cP", "Pa*s"), (1e-4, 1.0))
 MODULUS = Kind("modulus", "Pa", ("GPa", "Pa", "psi"))
@@ -93,6 +95,8 @@ _KNOWN: dict[str, dict[str, float]] = {
     "1/s": {"1/s": 1.0},
     "kg*m^2": {"kg*m^2": 1.0, "lb*ft^2": 0.0421401100938048},
     "kg/m^3": {"kg/m^3": 1.0, "g/cm^3": 1e3, "lb/gal": 119.82642731689667},
+    "kg": {"kg": 1.0},
+    "N*s/m": {"N*s/m": 1.0, "kN*s/m": 1e3},
     "kg/m": {"kg/m": 1.0, "lb/ft": 1.488163943569554},
     "Pa*s": {"Pa*s": 1.0, "mPa*s": 1e-3, "cP": 1e-3},
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": 6894.7572931683635},

@@ -16,6 +16,7 @@ from drillctl.design.tables import DesignTables
 from drillctl.design.validation import validated
 from drillctl.design.warnings import DesignWarning, warnings_of
 from drillctl.errors import InputError
+from drillctl.rig.axial import AxialString
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.variation import NoVariation, Variation
 from drillctl.rig.drillstring import Drillstring
@@ -138,6 +139,11 @@ class Design:
     def bit_rock_before(self) -> BitRockLaw:
         """Bit-rock law before the rock changes."""
         return parts.bit_rock_before(self.tables)
+
+    @cached_property
+    def axial(self) -> AxialString | None:
+        """The axial string of a bit that cuts its own wake; None under any other law."""
+        return parts.axial(self.tables)
 
     @cached_property
     def variation(self) -> Variation | NoVariation:

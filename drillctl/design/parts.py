@@ -9,9 +9,12 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from drillctl import units
 from drillctl.design.tables import DesignTables, SectionTable, SpeedProgramTable, WeightProgramTable
 from drillctl.errors import InputError
+from drillctl.rig.axial import AxialString, axial_string
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.law import changed_rock, form_of, friction_laws
 from drillctl.rig.bit_rock.variation import NoVariation, Variation, variation_of
@@ -37,6 +40,7 @@ from drillctl.rig.weight_on_bit.law import HEAVIEST, WeightLaw, weight_laws
 STEEL_SHEAR_MODULUS = 79.3e9  # shear modulus (Pa) where a design gives none: drill-pipe steel
 STEEL_DENSITY = 7850.0  # density (kg/m3) where a design gives none
 STEEL_POISSON_RATIO = 0.3  # poisson's ratio where a design gives Young's modulus alone
+REGENERATIVE = "richard-detournay"  # the law that cuts its own wake, with axial motion
 MOST_ELEMENTS = 10_000
 """Elements of a whole string: some metres each; beyond, matrices outgrow the memory."""
 
@@ -293,10 +297,53 @@ def bit_rock_before(tables: DesignTables) -> BitRockLaw:
         raise InputError(error.problem, f"scenario.bit_rock.{error.where}") from None
 
 
+def axial(tables: DesignTables) -> AxialString | None:
+    """The axial string; None under a law that needs none."""
+    if tables.bit_rock.law != REGENERATIVE:
+        return None
+    table = tables.axial
+    sections = parts_of(tables).sections
+    if table.model == "lumped" and table.mass is not None:
+        springs = np.array([1.0])
+        if table.top == "velocity":
+            springs = np.array([1.0 / sum(1.0 / k for k, _ in _axial_pieces(tables))])
+        return axial_string(table, springs, np.array([table.mass]), consistent=False)
+    each_spring: list[float] = []
+    each_mass: list[float] = []
+    for (spring, mass), one in zip(_axial_pieces(tables), sections, strict=True):
+        each_spring += [spring * one.elements] * one.elements
+        each_mass += [mass / one.elements] * one.elements
+    k, m = np.array(each_spring), np.array(each_mass)
+    if table.model == "lumped":
+        k, m = np.array([1.0 / np.sum(1.0 / k)]), np.array([m.sum()])
+    return axial_string(table, k, m, tables.drillstring.mass == "consistent")
+
+
+def _axial_pieces(tables: DesignTables) -> list[tuple[float, float]]:
+    """Axial stiffness (N/m) and mass (kg) of each section, of its body."""
+    results = []
+    for one in pieces(tables):
+        if one.diameters is None:
+            raise InputError(
+                f"{one.name} has no diameters to find its mass and axial stiffness from: give "
+                'model = "lumped", top = "force" and a mass',
+                "axial.mass",
+            )
+        outer, inner = one.diameters
+        area = 0.25 * math.pi * (outer**2 - inner**2)
+        density = STEEL_DENSITY if one.density is None else one.density
+        modulus = one.youngs_modulus or tables.axial.youngs_modulus
+        results.append((modulus * area / one.span, density * area * one.span))
+    return results
+
+
 def variation(tables: DesignTables) -> Variation | NoVariation:
     """How the rock varies along the way."""
     table = getattr(tables.bit_rock, "variation", None)
-    return variation_of(table, tables.operating_point.rate_of_penetration, tables.uncertainty.seed)
+    rate = tables.operating_point.rate_of_penetration
+    if getattr(table, "over", "") == "depth" and tables.bit_rock.law == REGENERATIVE:
+        return variation_of(table, 0.0, tables.uncertainty.seed).sinking()
+    return variation_of(table, rate, tables.uncertainty.seed)
 
 
 def _refuse_impossible_friction(law: BitRockLaw, weight: float) -> None:

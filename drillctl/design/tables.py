@@ -23,6 +23,7 @@ from drillctl.design.uncertain_tables import (
 )
 from drillctl.errors import InputError, nearest, shown
 from drillctl.rig import table as q
+from drillctl.rig.axial import AxialTable
 from drillctl.rig.bit_rock.law import friction_laws
 from drillctl.rig.bit_rock.variation import RATE_OF_PENETRATION
 from drillctl.rig.drillstring import GRADES, PIPES, Joint
@@ -426,16 +427,22 @@ class StartTable(Table):
     """State of the string at time zero.
 
     `rest`: still, untwisted, bit stuck. `turning`: every node at `speed`, untwisted.
-    `wound_up`: bit stuck, twisted to the static torque, top at the set speed.
+    `wound_up`: bit stuck, twisted to the static torque, top at the set speed. `steady`: drilling at
+    the set speed with its twist, the rock cut accordingly; `bit_speed` is that of the bit alone.
     """
 
-    kind: Literal["rest", "turning", "wound_up"] = "turning"
+    kind: Literal["rest", "turning", "wound_up", "steady"] = "turning"
     speed: q.Speed | None = None
+    bit_speed: q.Speed | None = None
 
     @model_validator(mode="after")
     def _speed_when_turning(self) -> StartTable:
         if self.kind != "turning" and self.speed is not None:
             raise InputError(f"speed is not allowed with kind = {self.kind!r}, only with 'turning'")
+        if self.kind != "steady" and self.bit_speed is not None:
+            raise InputError(
+                f"bit_speed is not allowed with kind = {self.kind!r}, only with 'steady'"
+            )
         return self
 
 
@@ -578,6 +585,7 @@ class OwnTables(Table):
     drillstring: DrillstringTable
     top_drive: TopDriveTable
     bha: BhaTable = BhaTable()
+    axial: AxialTable = AxialTable()
     well: WellTable = WellTable()
     bit_rock: BitRockTable
     controller: ControllerTable = PITable(law="pi", kp=200.0, ki=100.0)

@@ -31,7 +31,7 @@ from drillctl.store.codec import documented, label
 from drillctl.store.tables import in_columns
 
 SHARED = (
-    "drillstring.", "top_drive.", "bha.", "well.", "simulation.",
+    "drillstring.", "top_drive.", "bha.", "axial.", "well.", "simulation.",
     "controller.drive.sampling_period", "weight_on_bit.observer_modes",
 )  # fmt: skip
 """Paths under these change what all lanes share; the others differ from lane to lane."""

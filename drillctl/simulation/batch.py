@@ -128,6 +128,8 @@ def trace(lanes: Lanes, prepared: Prepared, interval: float) -> tuple[Array, dic
         signals["wall_stuck"] = np.concatenate(
             [traces[:, len(TRACED) :], signals["stuck"][:, None]], axis=1
         )
+    if lanes.axial is not None:
+        signals |= {"bit_depth": traces[:, -2], "penetration": traces[:, -1]}
     return time, signals
 
 
@@ -146,6 +148,8 @@ def _run(
     from drillctl.simulation.kernels.string_step import MOST_READ
     from drillctl.simulation.kernels.wall_step import room_rows
 
+    if lanes.axial is not None:
+        return _cut(lanes, prepared, every, give_up, watch)
     count = len(lanes)
     # Every block is full: the last one is filled up with copies of the last lane.
     padded = lanes[np.minimum(np.arange(-(-count // WIDTH) * WIDTH), count - 1)]
@@ -191,6 +195,29 @@ def _run(
 
     _in_threads(advance, len(padded) // WIDTH, watch)
     return measures[:, :count], traces[:, :, :count]
+
+
+def _cut(
+    lanes: Lanes, prepared: Prepared, every: int, give_up: float, watch: Watch | None
+) -> tuple[Array, Array]:
+    """The same of bits that cut their own wake: those rows, and behind them the axial ones."""
+    from drillctl.simulation import cutting, cutting_step
+    from drillctl.simulation.kernels import rows as r
+
+    duration = prepared.duration
+    window = min(m.WINDOW, duration)
+    watch = new_watch() if watch is None else watch
+    rows, traces = cutting.run(
+        lanes, prepared.scheme, duration, prepared.j1_from, window, every, give_up, watch,
+        _in_threads,
+    )  # fmt: skip
+    raw = np.zeros((r.MEASURES + 4, len(lanes)))
+    for ours, theirs in cutting_step.ROWS.items():
+        raw[(getattr(r, theirs) - r.FIRST_MEASURE) // r.WIDTH] = rows[ours]
+    c = cutting_step
+    raw[(r.WORK - r.FIRST_MEASURE) // r.WIDTH] += rows[cutting_step.AXIAL_WORK]
+    raw[r.MEASURES :] = rows[[c.DEPTH, c.CUT, c.AXIAL_STUCK, c.OFF_BOTTOM]]
+    return raw, traces
 
 
 def _aligned(size: int) -> Array:
@@ -290,6 +317,7 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
             "peak_drive_power": _where(
                 np.full(len(lanes), isinstance(lanes.drive, RealDrive)), row(r.PEAK_POWER)
             ),
+            **_axial(raw[r.MEASURES :], lanes, duration, row(r.WORK)),
         }
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(raw).all(axis=0))
     status = _statuses(finite, row(r.LATE_STUCK), window, values["settling_time_wide"])
@@ -301,6 +329,19 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
         values[name] = _where(~given_up, values[name])
     values["j1"] = np.where(given_up, row(r.BOUND) / lanes.set_speed, values["j1"])
     return Batch(values, status)
+
+
+def _axial(rows: Array, lanes: Lanes, duration: float, work: Array) -> dict[str, Array]:
+    """Measures of axial motion; undefined without any."""
+    if lanes.axial is None:
+        return dict.fromkeys(m.AXIAL_MEASURES, np.full(len(lanes), np.nan))
+    from drillctl.simulation.cutting import axial_measures
+
+    drilled, cut, at_rest, off = rows
+    blades = lanes.friction.blades
+    return axial_measures(
+        lanes.friction, duration, drilled, blades * cut / duration, at_rest, off, work
+    )
 
 
 def _where(condition: NDArray[np.bool_], values: Array) -> Array:

@@ -7,6 +7,7 @@ folder or nowhere, and an entry that cannot be read is compiled again.
 from __future__ import annotations
 
 import getpass
+import hashlib
 import logging
 import os
 import tempfile
@@ -32,6 +33,13 @@ def njit(function: Any, cache: bool = True, **options: Any) -> Any:
     if cache:
         made._cache = _cache_of(function)
     return made
+
+
+def on_disk(function: Any, source: str) -> Any:
+    """A function compiled with all that it calls in its file, which is part of its name on disk."""
+    version = hashlib.sha256(Path(source).read_bytes()).hexdigest()[:16]
+    function.__name__ = function.__qualname__ = f"{function.__name__}_{version}"
+    return njit(function, fastmath={"contract"}, nogil=True, error_model="numpy")
 
 
 def cfunc(signature: Any, function: Any, cache: bool = True, **options: Any) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.design import Design
+from drillctl.rig.axial import AxialString
 from drillctl.rig.bit_rock import contact
 from drillctl.rig.bit_rock.variation import NoVariation, Variation
 from drillctl.rig.drillstring import Drillstring
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from drillctl.linear.observer import Observer
 
 Array = NDArray[np.float64]
-Kind = Literal["rest", "turning", "wound_up"]
+Kind = Literal["rest", "turning", "wound_up", "steady"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +64,7 @@ def start(
     return Start(compliance, -static_torque, compliance / compliance[-1], -set_speed)
 
 
+CUTTING_STEPS = 160.0  # fewest in a period of the cutting, and between two blades
 SPEEDS = 161  # speeds at which a slope is looked for, from rest to eight times the set speed
 
 
@@ -86,7 +88,9 @@ class Lanes:
     variation: Variation | NoVariation  # of the rock along the way
     program: Program  # what changes by the clock, with an array for each number
     observer: Observer | None  # of the bit, shared by all lanes
-    start: Kind  # {'rest', 'turning', 'wound_up'}: Kind of start
+    axial: AxialString | None  # of a bit that cuts its own wake, shared by all lanes
+    bit_speed: Array  # shape (lanes,): of the bit alone as steady drilling begins (rad/s)
+    start: Kind  # {'rest', 'turning', 'wound_up', 'steady'}: Kind of start
     wall: Wall | None = None  # friction of the wall, its torque of shape (nodes, lanes)
 
     def __len__(self) -> int:
@@ -114,6 +118,8 @@ class Lanes:
                 some(self.program.speed), some(self.program.weight), self.program.rock_until[chosen]
             ),
             observer=self.observer,
+            axial=self.axial,
+            bit_speed=self.bit_speed[chosen],
             start=self.start,
             wall=None if self.wall is None else self.wall._replace(
                 torque=np.ascontiguousarray(self.wall.torque[:, chosen])
@@ -130,7 +136,13 @@ class Lanes:
 
     @property
     def longest_step(self) -> float:
-        """Longest step (s) that follows the rock along the way."""
+        """Longest step (s) that follows the rock along the way, and the cutting."""
+        if self.axial is not None:
+            rock = self.friction
+            delay = 2.0 * math.pi / (rock.blades * self.set_speed)
+            stiffness = rock.blades * rock.force_per_depth
+            swing = 2.0 * math.pi * np.sqrt(self.axial.total / stiffness)
+            return float(np.min(np.minimum(delay, swing))) / CUTTING_STEPS
         if isinstance(self.variation, NoVariation):
             return math.inf
         return float(np.min(self.variation.longest_step(self.set_speed)))
@@ -197,6 +209,8 @@ def lane_numbers(design: Design) -> dict[str, float]:
     numbers["rock_until"] = program.rock_until
     numbers["set_speed"] = design.speed
     numbers["turning_speed"] = design.speed if turning is None else turning
+    alone = design.tables.start.bit_speed
+    numbers["bit_speed"] = design.speed if alone is None else alone
     numbers["nominal_weight"] = design.tables.operating_point.weight_on_bit
     numbers["table_low"], numbers["table_high"] = design.table_range
     return numbers
@@ -227,6 +241,8 @@ def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
             numbers["rock_until"],
         ),
         observer=observer_of(design),
+        axial=design.axial,
+        bit_speed=numbers["bit_speed"],
         start=design.tables.start.kind,
         wall=None if design.wall is None else design.wall._replace(
             torque=np.stack([numbers[f"wall.{k}"] for k in range(len(design.wall.nodes))])

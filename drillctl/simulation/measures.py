@@ -22,6 +22,52 @@ for the last 5 s; `censored`: stopped early on request; `failed`: no finite answ
 """
 
 
+@dataclass(frozen=True)
+class Event:
+    """A change of phase."""
+
+    time: float  # when (s)
+    # the bit came to rest (`stick`), or broke loose (`release`); of axial motion, `EVENTS`
+    kind: str
+    direction: int  # +1 or -1 for a bit that breaks loose forward or backward; 0 for a stick
+
+
+@dataclass(frozen=True)
+class EnergyAudit:
+    """Where the energy of a run went (J)."""
+
+    # work of the drive, work taken by the bit, work taken by damping
+    drive: float
+    bit: float
+    damping: float
+    stored: float  # change of kinetic plus elastic energy
+    hook: float = 0.0  # work of hook and weight of the string, of a rig with axial motion
+
+    @property
+    def residual(self) -> float:
+        """What does not balance (J)."""
+        return self.drive + self.hook - self.bit - self.damping - self.stored
+
+    @property
+    def relative_residual(self) -> float:
+        """The residual over the largest of the terms; 0 for a run without any work."""
+        largest = max(
+            abs(self.drive), abs(self.hook), abs(self.bit), abs(self.damping), abs(self.stored)
+        )
+        return abs(self.residual) / largest if largest > 0.0 else 0.0
+
+    def summary(self) -> dict[str, float]:
+        """The terms (J) and the relative residual, by name."""
+        return {
+            "drive": self.drive,
+            "bit": self.bit,
+            "damping": self.damping,
+            "stored": self.stored,
+            "hook": self.hook,
+            "relative_residual": self.relative_residual,
+        }
+
+
 def status_counts(status: Any) -> dict[str, int]:
     """How many runs ended in each way, those that occur; an array of indices into `STATUSES`."""
     counts = {name: int((status == code).sum()) for code, name in enumerate(STATUSES)}
@@ -114,6 +160,23 @@ class Measures:
         "peak drive power", "W", "largest power of the drive; none of an ideal one", 3e-2
     )
 
+    rate_of_penetration: float | None = _row(
+        "rate of penetration", "m/s", "mean over the run; none without axial motion", 1e-2
+    )
+    depth_of_cut: float | None = _row(
+        "depth of cut", "m", "of all blades in a turn, time mean; none without axial motion", 1e-2
+    )
+    axial_stick_time: float | None = _row(
+        "axial stick time", "s", "that the bit neither sinks nor rises on the rock",
+        2e-2, "duration",
+    )  # fmt: skip
+    lost_contact_time: float | None = _row(
+        "lost contact time", "s", "that the bit is off bottom", 2e-2, "duration"
+    )
+    specific_energy: float | None = _row(
+        "mechanical specific energy", "Pa", "work of weight and torque per volume drilled", 2e-2
+    )
+
     def as_dict(self) -> dict[str, Any]:
         """The measures by name; None for what is undefined or not finite."""
         return {
@@ -122,6 +185,11 @@ class Measures:
         }
 
 
+AXIAL_MEASURES = (
+    "rate_of_penetration", "depth_of_cut", "axial_stick_time", "lost_contact_time",
+    "specific_energy",
+)  # fmt: skip
+"""Measures of axial motion, which a bit that cuts its own wake alone has."""
 BATCH_MEASURES = tuple(one.name for one in fields(Measures))
 """Names of what the batch engine returns of a lane, NaN where `Measures` has None."""
 MEASURES = {

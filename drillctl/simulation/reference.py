@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drillctl.arrays import Array, Index
 from drillctl.design import Design
-from drillctl.errors import SimulationError
+from drillctl.errors import InputError, SimulationError
 from drillctl.linear.observer import observer_of
 from drillctl.progress import SILENT, Progress, reporting_compilation
 from drillctl.rig.bit_rock import PrintedThreeBranch
@@ -26,50 +26,10 @@ from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight, ObservedWeight
 from drillctl.simulation.lanes import start
+from drillctl.simulation.measures import EnergyAudit, Event
 
 STEPS = 1_000  # steps from one look at an interruption to the next: some milliseconds
 ROOM = 1 << 13  # steps that a tape has room for at first
-
-
-@dataclass(frozen=True)
-class Event:
-    """A change of phase."""
-
-    time: float  # when (s)
-    kind: Literal["stick", "release"]  # the bit came to rest, or broke loose
-    direction: int  # +1 or -1 for a bit that breaks loose forward or backward; 0 for a stick
-
-
-@dataclass(frozen=True)
-class EnergyAudit:
-    """Where the energy of a run went (J)."""
-
-    # work of the drive, work taken by the bit, work taken by damping
-    drive: float
-    bit: float
-    damping: float
-    stored: float  # change of kinetic plus elastic energy
-
-    @property
-    def residual(self) -> float:
-        """What does not balance (J)."""
-        return self.drive - self.bit - self.damping - self.stored
-
-    @property
-    def relative_residual(self) -> float:
-        """The residual over the largest of the terms; 0 for a run without any work."""
-        largest = max(abs(self.drive), abs(self.bit), abs(self.damping), abs(self.stored))
-        return abs(self.residual) / largest if largest > 0.0 else 0.0
-
-    def summary(self) -> dict[str, float]:
-        """The terms (J) and the relative residual, by name."""
-        return {
-            "drive": self.drive,
-            "bit": self.bit,
-            "damping": self.damping,
-            "stored": self.stored,
-            "relative_residual": self.relative_residual,
-        }
 
 
 class Numbers(NamedTuple):
@@ -192,12 +152,19 @@ def solve(
     design: Design, tolerance: float = 1e-8, progress: Progress = SILENT, stiff: bool | None = None
 ) -> Motion:
     """Simulate a design with located events; `stiff` overrules what its string would take."""
+    if design.axial is not None:
+        from drillctl.simulation.cutting_motion import CuttingMotion, cutting
+
+        with reporting_compilation(progress):
+            return CuttingMotion(design, cutting.solve(design, min(0.1 * tolerance, 1e-9)))  # type: ignore[return-value]
     with reporting_compilation(progress):
         return _run(design, numbers_of(design), tolerance, progress, stiff)
 
 
 def solve_whole(design: Design, tolerance: float = 1e-8) -> Motion:
     """The same, with the motion of every node kept."""
+    if design.axial is not None:
+        raise InputError("'richard-detournay' has no such run: it never repeats", "bit_rock.law")
     return _run(
         design, numbers_of(design, np.arange(2 * design.string.nodes)), tolerance, SILENT, None
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -37,6 +38,9 @@ SIGNALS = {
     "bit_torque": ("N*m", "torque on the bit, positive when it brakes"),
     "weight_on_bit": ("N", "weight on bit"),
     "stuck": ("", "1 while the bit is at rest"),
+    # of axial motion alone
+    "bit_depth": ("m", "depth drilled by the bit"),
+    "penetration": ("m/s", "speed of the bit along its axis"),
 }
 
 
@@ -121,12 +125,14 @@ def sample(motion: Motion, interval: float = 0.01, sections: bool = False) -> Si
     design = motion.design
     duration = design.tables.simulation.duration
     fine = _grid(duration, min(FINE, duration / FEWEST_SAMPLES))
-    fine_signals = _signals(motion, fine)
+    axial = hasattr(motion, "axial_measures")
+    signals_of = motion.signals if axial else partial(_signals, motion)  # type: ignore[attr-defined]
+    fine_signals = signals_of(fine)
     measured = _measures(motion, fine, fine_signals)
     time = _grid(duration, interval)
     signals = fine_signals
     if len(time) != len(fine):
-        signals = _signals(motion, time)
+        signals = signals_of(time)
     status = m.status_of(
         all(bool(np.isfinite(values).all()) for values in fine_signals.values()),
         stuck_between(motion, duration - min(m.WINDOW, duration), duration),
@@ -201,6 +207,11 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
         work_per_turn=m.per_turn(motion.energy.bit, mean, duration),
         time_outside_table=_outside_table(design, time, signals["weight_on_bit"]),
         **_strain(design, time, signals),
+        **(
+            motion.axial_measures()
+            if hasattr(motion, "axial_measures")
+            else dict.fromkeys(m.AXIAL_MEASURES)
+        ),
     )
 
 
@@ -261,7 +272,8 @@ def deviation(motion: Motion, begin: float, end: float) -> float:
 
 def _sticks(motion: Motion) -> int:
     """Times the bit came to rest; a start at rest counts, even if it breaks loose at once."""
-    at_rest = motion.directions[0] == 0 or motion.design.tables.start.kind != "turning"
+    held = ("rest", "wound_up")
+    at_rest = motion.directions[0] == 0 or motion.design.tables.start.kind in held
     return int(at_rest) + sum(event.kind == "stick" for event in motion.events)
 
 
@@ -330,7 +342,7 @@ def _by_batch(design: Design, interval: float) -> Simulation:
     return Simulation(
         design=design,
         time=time,
-        signals={name: signals[name] for name in SIGNALS},
+        signals={name: signals[name] for name in SIGNALS if name in signals},
         events=(),
         measures=measures_of(batch, 0),
         status=m.STATUSES[batch.status[0]],

@@ -30,7 +30,7 @@ def reasons(name, **values):
 def test_reasons_give_the_scheme_of_every_shipped_file(name, accuracy):
     found = reasons(name, **{"simulation.accuracy": accuracy})
     assert found["step"] <= min(found["bounds"].values()) * (1.0 + 1e-12)
-    assert set(found["bounds"]) <= {"accuracy", "elastic_mode", "friction"}
+    assert set(found["bounds"]) <= {"accuracy", "elastic_mode", "friction", "rock"}
 
 
 STIFF = {"drillstring.sections.pipe.length": "1500 m"}

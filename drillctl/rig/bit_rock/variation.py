@@ -84,6 +84,10 @@ def _read(key: str, value: object, kind: units.Kind) -> float:
 class NoVariation(NamedTuple):
     """A rock that is the same everywhere."""
 
+    def sinking(self) -> NoVariation:
+        """The same."""
+        return self
+
 
 class Variation(NamedTuple):
     """A rock that varies; positions in m, rad or s.
@@ -100,6 +104,8 @@ class Variation(NamedTuple):
         Way per angle of the bit: 1 over angle.
     seed, realization : float
         Key of the path.
+    sinks : float
+        Way per depth that the bit itself has drilled: 1 where it has axial motion.
     """
 
     spread: Any
@@ -109,6 +115,11 @@ class Variation(NamedTuple):
     turns: Any
     seed: Any
     realization: Any
+    sinks: Any = 0.0
+
+    def sinking(self) -> Variation:
+        """The same over the depth of a bit that drills by itself."""
+        return self._replace(advance=0.0, sinks=1.0)
 
     @property
     def highest(self) -> Any:

@@ -67,7 +67,7 @@ FORMS = {"undamped": "undamped modes", "blocks": "2 x 2 blocks", "dense": "a den
 class Bound(NamedTuple):
     """A bound on the step."""
 
-    name: str  # 'accuracy', 'elastic_mode', 'friction' or 'given'
+    name: str  # 'accuracy', 'elastic_mode', 'friction', 'rock' or 'given'
     step: float  # longest step that it allows (s)
     reason: str  # in words
 
@@ -76,6 +76,11 @@ def explain(lanes: Lanes, table: SimulationTable, prepared: Prepared) -> dict[st
     """A scheme and why it was chosen, as strict JSON values; SI units."""
     scheme, string = prepared.scheme, lanes.string
     bounds = _bounds(string, table, lanes.steepest_fall)
+    if table.step is None and lanes.longest_step < math.inf:
+        seen = (
+            "the rock along the way" if lanes.axial is None else "the cutting from blade to blade"
+        )
+        bounds = (*bounds, Bound("rock", lanes.longest_step, f"{seen}, seen often enough"))
     asked = min(bound.step for bound in bounds)
     period = _shared(lanes.drive.period) if isinstance(lanes.drive, SampledDrive) else None
     steps, sampling = _whole_steps(table.duration, asked, period, _turns(lanes))

@@ -1,0 +1,573 @@
+"""Reference solver of a bit that cuts its own wake: located events, the surface behind the bit.
+
+Torsion and axial motion are linear systems x' = A x + B f + c, coupled at the bit by the rock
+alone. In each phase the bit slides, sticks axially, is off bottom or stands still; within it the
+motion is smooth and followed by the pair of order 5(4) of Dormand & Prince. The surface left behind
+is a function of the angle of the bit, which never turns back: where the bit was in contact, its own
+depth as a Hermite polynomial of degree five a step; where it was not, the surface a blade before.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+
+from drillctl.simulation.kernel_cache import on_disk
+
+compiled = numba.njit(fastmath={"contract"}, nogil=True, error_model="numpy")
+
+UP, STUCK, DOWN, OFF = -1, 0, 1, 2
+"""Axial phases: rising, at rest and sinking in contact with the rock; off bottom."""
+AXIAL_STICK, AXIAL_SLIP, STICK, RELEASE, LOST, REGAINED = range(6)
+"""Events; `EVENTS` has their names."""
+EVENTS = (
+    "axial_stick", "axial_slip", "stick", "release", "lost_contact", "regained_contact"
+)  # fmt: skip
+DONE, MORE, TOO_SHORT, CHATTERS = range(4)
+WORKS = 7
+"""States beside the motion: work of drive, hook, cutting, wear flat and dampers (J), the integral
+of abs(bit speed - set speed) (rad), and the weight's (N s)."""
+MOST_CHANGES = 200_000
+FIRST, LAST = 3, 27  # columns of the tape: of the polynomials, and behind them
+CLOSE = 1e-14  # share of a step to which an event is located
+REACH = 0.3  # share of the angle between two blades that a step may turn
+
+
+class Side(NamedTuple):
+    """One of the two strings as x' = A x + by_top f_top + by_bit f_bit + load."""
+
+    a: Any  # shape (states, states)
+    by_top: Any  # shape (states,): per torque, or force, at the top
+    by_bit: Any  # shape (states,): per braking torque, or per force, at the bit
+    load: Any  # shape (states,)
+    # shape (7, states): displacement and velocity at the bit, at the top and at the node below it;
+    # power of dampers per state at the set speed
+    read: Any
+    damping: Any  # shape (states, states): power of dampers as a quadratic form
+    steady_loss: float  # power of dampers at the set speed alone (W)
+
+
+class Rock(NamedTuple):
+    """The bit and what it cuts: numbers of `RichardDetournay`, multiplied out."""
+
+    per_depth: float  # force on all blades per depth of one (N/m)
+    torque_per_depth: float  # N m/m
+    flat: float  # force on the wear flat (N)
+    flat_torque: float  # torque on it (N m)
+    between: float  # angle between two blades (rad)
+    blades: float
+
+
+class Drive(NamedTuple):
+    """A PI, or a constant torque, at the top; the axial top is free under a constant force."""
+
+    constant: float  # N m
+    kp: float  # N m s/rad
+    ki: float  # N m/rad
+
+
+class Task(NamedTuple):
+    """A run."""
+
+    torsion: Side
+    axial: Side
+    rock: Rock
+    drive: Drive
+    weight: float  # force of hook and string on the bit (N)
+    set_speed: float
+    duration: float
+    tolerance: float
+    scale: Any  # shape (states,): below which errors do not matter
+    # surface at the start: straight with this slope (m/rad) through the bit's own place
+    slope: float
+    hold: Any  # shape (2,): axial mobility and torsional one of the bit (1/kg, 1/(kg m2))
+    path: Any  # X of a rock that varies, at its nodes; and
+    vary: Any  # shape (4,): spread, spacing, way per time, per angle; way per depth
+
+
+class Memory(NamedTuple):
+    """What a run has been through; arrays so that calls can go on."""
+
+    now: Any  # shape (5,): time, next step; angle and depth at the start; energy of impacts (J)
+    count: Any  # shape (6,): axial phase, torsional one, steps, events, pieces, refused
+    # shape (room, 34): begin (s), length (s), 1 if in contact; value, slope and curvature at both
+    # ends of bit angle, depth, top angle and angle of the node below; force on the bit and its
+    # torque at both ends; phases; depth of cut at both ends
+    tape: Any
+    events: Any  # shape (room, 2): time, kind
+    pieces: Any  # shape (room, 4): begin, end, axial phase, torsional phase
+    state: Any
+    work: Any  # shape (9, states)
+
+
+@compiled
+def _dot(row: Any, x: Any, offset: int) -> float:
+    total = 0.0
+    for i in range(len(row)):
+        total += row[i] * x[offset + i]
+    return total
+
+
+@compiled
+def _bit(task: Any, x: Any, time: float) -> tuple[float, float, float, float]:
+    """Angle, speed, depth and sinking of the bit."""
+    n = len(task.torsion.by_bit)
+    angle = _dot(task.torsion.read[0], x, 0) + task.set_speed * time
+    speed = _dot(task.torsion.read[1], x, 0) + task.set_speed
+    return angle, speed, _dot(task.axial.read[0], x, n), _dot(task.axial.read[1], x, n)
+
+
+@compiled
+def hermite(x: float, h: float, a: float, va: float, aa: float, b: float, vb: float,
+            ab: float) -> float:  # fmt: skip
+    """Polynomial of degree five through value, slope and curvature at both ends of a step."""
+    p, q = va * h, vb * h
+    r, s = 0.5 * aa * h * h, 0.5 * ab * h * h
+    d = b - a - p - r
+    e = q - p - 2.0 * r
+    f = s - r
+    c3 = 10.0 * d - 4.0 * e + f
+    c4 = -15.0 * d + 7.0 * e - 2.0 * f
+    c5 = 6.0 * d - 3.0 * e + f
+    return a + x * (p + x * (r + x * (c3 + x * (c4 + x * c5))))
+
+
+@compiled
+def hermite_slope(x: float, h: float, a: float, va: float, aa: float, b: float, vb: float,
+                  ab: float) -> float:  # fmt: skip
+    """Derivative of `hermite` with respect to the share."""
+    p, q = va * h, vb * h
+    r, s = 0.5 * aa * h * h, 0.5 * ab * h * h
+    d = b - a - p - r
+    e = q - p - 2.0 * r
+    f = s - r
+    c3 = 10.0 * d - 4.0 * e + f
+    c4 = -15.0 * d + 7.0 * e - 2.0 * f
+    c5 = 6.0 * d - 3.0 * e + f
+    return p + x * (2.0 * r + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))
+
+
+@compiled
+def on_step(memory: Any, step: int, share: float, which: int) -> float:
+    """Bit angle (0), depth (1), top angle (2) or that of the node below at a share of a step."""
+    row, k = memory.tape[step], FIRST + 6 * which
+    return hermite(
+        share, row[1], row[k], row[k + 1], row[k + 2], row[k + 3], row[k + 4], row[k + 5]
+    )
+
+
+@compiled
+def slope_on_step(memory: Any, step: int, share: float, which: int) -> float:
+    """Rate of the same."""
+    row, k, h = memory.tape[step], FIRST + 6 * which, memory.tape[step, 1]
+    return (
+        hermite_slope(share, h, row[k], row[k + 1], row[k + 2], row[k + 3], row[k + 4], row[k + 5])
+        / h
+    )
+
+
+@compiled
+def surface(rock: Any, slope: float, memory: Any, angle: float) -> float:
+    """Depth of the rock where the bit was at an angle, as it left it."""
+    tape, begin = memory.tape, memory.now[2]
+    while True:
+        steps = memory.count[2]
+        if steps == 0 or angle <= begin:
+            return memory.now[3] + slope * (angle - begin)
+        low, high = 0, steps - 1
+        while low < high:  # the first step that ends at the angle or beyond
+            middle = (low + high) // 2
+            if tape[middle, FIRST + 3] >= angle:
+                high = middle
+            else:
+                low = middle + 1
+        if tape[low, 2] != 0.0:
+            break
+        angle -= rock.between  # not cut then: as a blade before has left it
+    a, b = tape[low, FIRST], tape[low, FIRST + 3]
+    if angle >= b or b <= a:
+        return tape[low, FIRST + 9]
+    left, right, x = 0.0, 1.0, (angle - a) / (b - a)
+    for _ in range(60):
+        value = on_step(memory, low, x, 0) - angle
+        if value > 0.0:
+            right = x
+        else:
+            left = x
+        rise = slope_on_step(memory, low, x, 0) * tape[low, 1]
+        new = x - value / rise if rise > 0.0 else 0.5 * (left + right)
+        if not left < new < right:
+            new = 0.5 * (left + right)
+        if abs(new - x) < CLOSE:
+            break
+        x = new
+    return on_step(memory, low, x, 1)
+
+
+@compiled
+def hardness(task: Any, time: float, angle: float, depth: float, memory: Any) -> float:
+    """Factor of a rock that varies along the way."""
+    vary = task.vary
+    if vary[0] == 0.0:
+        return 1.0
+    way = vary[2] * time + vary[3] * (angle - memory.now[2]) + vary[4] * (depth - memory.now[3])
+    place = min(max(way / vary[1], 0.0), len(task.path) - 2.0)
+    node = int(place)
+    value = task.path[node] + (place - node) * (task.path[node + 1] - task.path[node])
+    return math.exp(vary[0] * (value - 0.5 * vary[0]))
+
+
+class Contact(NamedTuple):
+    """What the rock does to the bit at a moment."""
+
+    depth: Any  # of cut per blade (m), negative off bottom
+    force: Any  # on the bit upwards (N)
+    torque: Any  # that brakes (N m)
+    share: Any  # of the wear flat's full force that is needed to hold it; its own in other phases
+    top: Any  # torque of the drive (N m)
+    spare: Any  # torque of the rock beyond what holds a bit that stands still (N m)
+    cutting: Any  # force of the cutters (N)
+
+
+@compiled
+def _contact(task: Any, memory: Any, time: float, axial: int, turning: bool, x: Any) -> Contact:
+    rock, torsion, other, n = task.rock, task.torsion, task.axial, len(task.torsion.by_bit)
+    angle, _, place, _ = _bit(task, x, time)
+    drive = task.drive
+    top = (
+        drive.constant
+        - drive.kp * _dot(torsion.read[3], x, 0)
+        - drive.ki * _dot(torsion.read[2], x, 0)
+    )
+    depth = place - surface(rock, task.slope, memory, angle - rock.between)
+    hard = hardness(task, time, angle, place, memory)
+    cut = rock.per_depth * hard * depth if axial != OFF else 0.0
+    share = 0.0
+    if axial == DOWN:
+        share = 1.0
+    elif axial == STUCK:
+        share = (task.weight + _free(other, x, n) / task.hold[0] - cut) / rock.flat
+    used = share if axial != STUCK else min(max(share, 0.0), 1.0) if not turning else share
+    force = cut + rock.flat * used
+    torque = rock.torque_per_depth * hard * (depth if axial != OFF else 0.0)
+    torque += rock.flat_torque * used
+    spare = 0.0
+    if not turning:
+        pull = (_free(torsion, x, 0) + _dot_two(torsion.read[1], torsion.by_top) * top) / (
+            task.hold[1]
+        )
+        spare = torque - pull
+        torque = pull
+    return Contact(depth, force, torque, share, top, spare, cut)
+
+
+@compiled
+def _dot_two(a: Any, b: Any) -> float:
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled
+def _free(side: Any, x: Any, offset: int) -> float:
+    """Acceleration of the bit without torque or force of drive and rock."""
+    total = 0.0
+    read = side.read[1]
+    size = len(read)
+    for i in range(size):
+        if read[i] != 0.0:
+            rate = side.load[i]
+            for j in range(size):
+                rate += side.a[i, j] * x[offset + j]
+            total += read[i] * rate
+    return total
+
+
+@compiled
+def _rates(
+    task: Any, memory: Any, time: float, axial: int, turning: bool, x: Any, out: Any
+) -> None:
+    torsion, other = task.torsion, task.axial
+    n, m = len(torsion.by_bit), len(other.by_bit)
+    now = _contact(task, memory, time, axial, turning, x)
+    held = axial == STUCK or (not turning and axial != OFF)
+    force = now.force
+    push = -_free(other, x, n) / task.hold[0] if held else task.weight - force
+    for i in range(n):
+        rate = torsion.load[i] + torsion.by_top[i] * now.top - torsion.by_bit[i] * now.torque
+        for j in range(n):
+            rate += torsion.a[i, j] * x[j]
+        out[i] = rate
+    for i in range(m):
+        rate = other.load[i] + other.by_bit[i] * push
+        for j in range(m):
+            rate += other.a[i, j] * x[n + j]
+        out[n + i] = rate
+    _, speed, _, sinking = _bit(task, x, time)
+    first = n + m
+    if held:
+        force, sinking = task.weight - push, 0.0
+    out[first] = now.top * (_dot(torsion.read[3], x, 0) + task.set_speed)
+    out[first + 1] = task.weight * sinking + _dot(other.read[6], x, n)
+    turned = 0.0 if not turning else speed
+    flat = force - now.cutting
+    flat_torque = task.rock.flat_torque / task.rock.flat * flat if task.rock.flat > 0.0 else 0.0
+    out[first + 2] = now.cutting * sinking + (now.torque - flat_torque) * turned
+    out[first + 3] = flat * sinking + flat_torque * turned
+    loss = torsion.steady_loss + 2.0 * _dot(torsion.read[6], x, 0)
+    for i in range(n):
+        for j in range(n):
+            if torsion.damping[i, j] != 0.0:
+                loss += x[i] * torsion.damping[i, j] * x[j]
+    for i in range(m):
+        for j in range(m):
+            if other.damping[i, j] != 0.0:
+                loss += x[n + i] * other.damping[i, j] * x[n + j]
+    out[first + 4] = loss
+    out[first + 5] = abs(turned - task.set_speed)
+    out[first + 6] = force
+
+
+# Steps.
+
+_A = np.array([
+    [1 / 5, 0, 0, 0, 0, 0],
+    [3 / 40, 9 / 40, 0, 0, 0, 0],
+    [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],
+    [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0],
+    [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0],
+    [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+])  # fmt: skip
+_C = np.array([1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
+_E = np.array(
+    [71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40]
+)  # fmt: skip
+
+
+@compiled
+def _step(task: Any, memory: Any, time: float, h: float, axial: int, turning: bool) -> float:
+    """A trial step from a state whose rates are in the first row of work; its error."""
+    work, x = memory.work, memory.state
+    size = len(x)
+    for k in range(6):
+        for i in range(size):
+            total = 0.0
+            for j in range(k + 1):
+                total += _A[k, j] * work[j, i]
+            work[7, i] = x[i] + h * total
+        _rates(task, memory, time + _C[k] * h, axial, turning, work[7], work[k + 1])
+    error = 0.0
+    for i in range(size):
+        total = 0.0
+        for j in range(7):
+            total += _E[j] * work[j, i]
+        limit = task.tolerance * max(task.scale[i], max(abs(x[i]), abs(work[7, i])))
+        error = max(error, abs(h * total) / limit)
+    return error
+
+
+@compiled
+def _ends(task: Any, memory: Any, row: Any, column: int, time: float, x: Any, rates: Any) -> None:
+    """Values, slopes and curvatures of what the tape holds, at one end of a step."""
+    n, read, other = len(task.torsion.by_bit), task.torsion.read, task.axial.read
+    turned = task.set_speed * time
+    for which in range(4):
+        k = FIRST + 6 * which + column
+        if which == 1:
+            row[k], row[k + 1] = _dot(other[0], x, n), _dot(other[1], x, n)
+            row[k + 2] = _dot(other[1], rates, n)
+            continue
+        pair = 0 if which == 0 else 2 * which - 2
+        row[k] = _dot(read[pair], x, 0) + turned
+        row[k + 1] = _dot(read[pair + 1], x, 0) + task.set_speed
+        row[k + 2] = _dot(read[pair + 1], rates, 0)
+
+
+@compiled
+def _margins(task: Any, memory: Any, time: float, axial: int, turning: bool, x: Any, out: Any
+             ) -> None:  # fmt: skip
+    """What is left until a phase ends: of contact, of the axial phase twice, of turning."""
+    _, speed, _, sinking = _bit(task, x, time)
+    now = _contact(task, memory, time, axial, turning, x)
+    out[0] = -now.depth if axial == OFF else now.depth
+    out[1] = out[2] = 1.0
+    if axial in (UP, DOWN):
+        out[1] = axial * sinking
+    elif axial == STUCK and turning:
+        out[1], out[2] = now.share, 1.0 - now.share
+    elif not turning:
+        out[0] = 1.0 if axial != OFF else out[0]
+    if axial == STUCK and not turning:
+        out[0] = 1.0
+    out[3] = speed if turning else now.spare
+
+
+@compiled
+def _stop_bit(task: Any, memory: Any, side: Any, offset: int, wanted: float) -> None:
+    """Give the bit a velocity by an impulse; notes the energy that is lost."""
+    x, speed, by = memory.state, _dot(side.read[1], memory.state, offset), 0.0
+    for i in range(len(side.by_bit)):
+        by += side.read[1, i] * side.by_bit[i]
+    change = wanted - speed
+    full = speed + (task.set_speed if offset == 0 else 0.0)
+    memory.now[4] += 0.5 * (full * full - (full + change) ** 2) / abs(by)
+    for i in range(len(side.by_bit)):
+        x[offset + i] += side.by_bit[i] * change / by
+
+
+@compiled
+def _note(memory: Any, kind: int) -> None:
+    count = memory.count
+    memory.events[count[3], 0], memory.events[count[3], 1] = memory.now[0], kind
+    count[3] += 1
+
+
+@compiled
+def _axial_phase(task: Any, memory: Any, time: float, turning: bool) -> int:
+    """The phase of a bit in contact that neither rises nor sinks."""
+    share = _contact(task, memory, time, STUCK, turning, memory.state).share
+    if not turning:
+        return STUCK
+    return DOWN if share > 1.0 else UP if share < 0.0 else STUCK
+
+
+@compiled
+def _after(task: Any, memory: Any, which: int) -> None:
+    """The phases after a margin has come down to zero."""
+    count, x, time = memory.count, memory.state, memory.now[0]
+    n = len(task.torsion.by_bit)
+    axial, turning = count[0], count[1] != 0
+    if which == 3 and turning:
+        _stop_bit(task, memory, task.torsion, 0, -task.set_speed)
+        if axial != OFF:
+            if axial != STUCK:
+                _stop_bit(task, memory, task.axial, n, 0.0)
+                _note(memory, AXIAL_STICK)
+            count[0] = STUCK
+        count[1] = 0
+        _note(memory, STICK)
+        if _contact(task, memory, time, count[0], False, x).spare < 0.0:
+            which, turning = 3, False
+        else:
+            return
+    if which == 3:
+        count[1] = 1
+        _note(memory, RELEASE)
+        if axial != OFF:
+            count[0] = _axial_phase(task, memory, time, True)
+            if count[0] != STUCK:
+                _note(memory, AXIAL_SLIP)
+        return
+    if which == 0 and axial == OFF:
+        sinking = _dot(task.axial.read[1], x, n)
+        _note(memory, REGAINED)
+        if not turning:
+            _stop_bit(task, memory, task.axial, n, 0.0)
+            count[0] = STUCK
+        else:
+            count[0] = DOWN if sinking > 0.0 else UP
+        return
+    if which == 0:
+        count[0] = OFF
+        _note(memory, LOST)
+        return
+    if axial in (UP, DOWN):
+        _stop_bit(task, memory, task.axial, n, 0.0)
+        count[0] = _axial_phase(task, memory, time, turning)
+        _note(memory, AXIAL_STICK)
+        if count[0] != STUCK:
+            _note(memory, AXIAL_SLIP)
+        return
+    count[0] = DOWN if which == 2 else UP
+    _note(memory, AXIAL_SLIP)
+
+
+def _advance(task: Any, memory: Any, most: int) -> int:
+    """Advance a run by at most so many steps."""
+    now, count, work = memory.now, memory.count, memory.work
+    size = len(memory.state)
+    margins = np.zeros((2, 4))
+    fresh = True
+    for _ in range(most):
+        time = now[0]
+        if time >= task.duration * (1.0 - 1e-14):
+            return DONE
+        if count[2] + 2 >= len(memory.tape) or count[3] + 4 >= len(memory.events):
+            return MORE
+        axial, turning = count[0], count[1] != 0
+        _rates(task, memory, time, axial, turning, memory.state, work[0])
+        _margins(task, memory, time, axial, turning, memory.state, margins[0])
+        begin = _contact(task, memory, time, axial, turning, memory.state)
+        _, speed, _, _ = _bit(task, memory.state, time)
+        longest = REACH * task.rock.between / max(speed, task.set_speed)
+        h = min(now[1], longest, task.duration - time)
+        if fresh:
+            h = min(h, 1e-3 * longest)
+        while True:
+            error = _step(task, memory, time, h, axial, turning)
+            if error <= 1.0:
+                break
+            count[5] += 1
+            h *= max(0.2, 0.9 * error**-0.2) if error < 1e30 else 0.1
+            if h < 1e-13 * max(time, task.duration * 1e-3):
+                return TOO_SHORT
+        grown = min(5.0, 0.9 * max(error, 1e-12) ** -0.2)
+        _margins(task, memory, time + h, axial, turning, work[7], margins[1])
+        first = -1
+        for k in range(4):
+            if margins[1, k] < 0.0 and (margins[0, k] > 0.0 or not fresh):
+                first = k
+        if first >= 0:
+            # Bisection of the length of the step: each trial is a step of its own.
+            low, high = 0.0, h
+            for _ in range(60):
+                trial = 0.5 * (low + high)
+                _step(task, memory, time, trial, axial, turning)
+                _margins(task, memory, time + trial, axial, turning, work[7], margins[1])
+                over = -1
+                for k in range(4):
+                    if margins[1, k] < 0.0 and (margins[0, k] > 0.0 or not fresh):
+                        over = k
+                if over >= 0:
+                    high, first = trial, over
+                else:
+                    low = trial
+                if high - low < CLOSE * max(time, h):
+                    break
+            h = high
+            _step(task, memory, time, h, axial, turning)
+        row = memory.tape[count[2]]
+        row[0], row[1], row[2] = time, h, 1.0 if axial != OFF else 0.0
+        _ends(task, memory, row, 0, time, memory.state, work[0])
+        _ends(task, memory, row, 3, time + h, work[7], work[6])
+        end = _contact(task, memory, time + h, axial, turning, work[7])
+        row[LAST], row[LAST + 1] = begin.force, end.force
+        row[LAST + 2], row[LAST + 3] = begin.torque, end.torque
+        row[LAST + 5] = max(begin.depth, 0.0) * task.rock.blades
+        row[LAST + 6] = max(end.depth, 0.0) * task.rock.blades
+        row[LAST + 4] = axial + (10.0 if turning else 0.0)
+        if not turning:
+            row[FIRST + 3], row[FIRST + 1], row[FIRST + 4] = row[FIRST], 0.0, 0.0
+            row[FIRST + 2], row[FIRST + 5] = 0.0, 0.0
+        count[2] += 1
+        for i in range(size):
+            memory.state[i] = work[7, i]
+        now[0] = time + h
+        fresh = False
+        if first >= 0:
+            _after(task, memory, first)
+            fresh = True
+            now[1] = longest
+            if count[3] > MOST_CHANGES:
+                return CHATTERS
+        else:
+            now[1] = h * grown
+    return MORE
+
+
+advance = on_disk(_advance, __file__)
+"""Compiled, and kept on disk under a name that its source is part of."""

@@ -1,0 +1,154 @@
+"""A bit that cuts its own wake: three independent codes, energy, both engines."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import drillctl
+from drillctl.errors import InputError
+from drillctl.simulation import cutting
+from drillctl.simulation import cutting_step as steps
+from drillctl.units import SI
+
+UNIT = math.sqrt(116.0 / 938.0)  # s
+SECOND = {  # sharp wear flats at twice the speed, where contact is lost
+    "bit_rock.wear_flat_length": "1.2 mm",
+    "operating_point.weight_on_bit": "23.4093 kN",
+    "operating_point.speed": "11.374503 rad/s",
+    "start.bit_speed": "9.952691 rad/s",
+    "simulation.duration": "4 s",
+}
+
+
+@pytest.fixture(scope="module")
+def design():
+    """The shipped case."""
+    return drillctl.load("richard-detournay-2dof")
+
+
+@pytest.fixture(scope="module")
+def run(design):
+    """Its run with located events."""
+    return drillctl.simulate(design)
+
+
+def times(run, kind):
+    """Moments of events in units of the torsional swing."""
+    return np.array([one.time for one in run.events if one.kind == kind]) / UNIT
+
+
+def test_events_are_those_of_independent_codes(run):
+    assert times(run, "axial_stick")[0] == pytest.approx(2.31200, abs=1e-4)
+    sticks = [11.5431, 16.8474, 23.1084, 29.2025, 35.6081, 41.9721]
+    assert times(run, "stick")[:6] == pytest.approx(sticks, abs=1e-4)
+    assert times(run, "release")[:4] == pytest.approx(
+        [11.7774, 17.9366, 24.2344, 30.6121], abs=1e-4
+    )
+    assert run.measures.peak_bit_speed * UNIT == pytest.approx(4.85144, abs=1e-4)
+    assert len(times(run, "lost_contact")) == 0
+    assert run.measures.lost_contact_time == 0.0
+
+
+def test_without_twist_the_bit_waits_for_the_spring(design, monkeypatch):
+    wound = cutting.begin
+
+    def untwisted(*given):
+        angles, speeds = wound(*given)
+        return 0.0 * angles, speeds
+
+    monkeypatch.setattr(cutting, "begin", untwisted)
+    free = {"controller.ki": 0.0, "simulation.duration": "1.2 s"}
+    run = drillctl.simulate(design.replace(free))
+    # It stands still at once, and sinks no more until the spring is wound up.
+    assert times(run, "release")[0] == pytest.approx(2.956, abs=2e-4)
+
+
+def test_contact_is_lost_where_independent_codes_lose_it(design):
+    run = drillctl.simulate(design.replace(SECOND))
+    assert times(run, "axial_stick")[0] == pytest.approx(2.3894, abs=1e-4)
+    assert times(run, "lost_contact")[0] == pytest.approx(6.5425, abs=1e-4)
+    assert run.measures.lost_contact_time > 0.0
+    assert run.energy.relative_residual < 1e-6
+
+
+def test_energy_of_drive_and_hook_is_that_of_rock_and_string(run, design):
+    assert run.energy.hook > 0.0
+    assert run.energy.relative_residual < 1e-6
+    # What the bit has drilled is the hook's work over its weight, and the volume's energy.
+    depth = run.signals["bit_depth"][-1]
+    assert depth == pytest.approx(run.energy.hook / 102546.7, rel=1e-6)
+    volume = math.pi * design.bit_rock.radius**2 * depth
+    assert run.measures.specific_energy == pytest.approx(run.energy.bit / volume, rel=1e-6)
+
+
+def batch_times(design, step):
+    """Sticks of the batch engine at a step in units of the torsional swing."""
+    fixed = design.replace({"simulation.step": SI(step * UNIT)})
+    run = drillctl.simulate(fixed, "batch", interval=step * UNIT)
+    still = run.signals["stuck"] > 0.5
+    return run.time[1:][still[1:] & ~still[:-1]][:6] / UNIT
+
+
+def test_fixed_steps_meet_the_events_with_order_one(design, run):
+    exact = times(run, "stick")[:6]
+    errors = [np.abs(batch_times(design, step) - exact).max() for step in (4e-3, 1e-3, 2.5e-4)]
+    assert errors[2] < 1e-3
+    assert np.log(errors[0] / errors[2]) / np.log(16.0) > 0.85  # measured to a step's length
+
+
+def test_engines_agree_at_the_step_that_standard_chooses(design, run):
+    batch = drillctl.simulate(design, engine="batch")
+    assert batch.measures.j1 == pytest.approx(run.measures.j1, rel=1e-2)
+    for name in ("rate_of_penetration", "depth_of_cut", "specific_energy", "work_at_bit",
+                 "mean_weight_on_bit", "axial_stick_time"):  # fmt: skip
+        exact, value = getattr(run.measures, name), getattr(batch.measures, name)
+        assert value == pytest.approx(exact, rel=1e-2), name
+    assert batch.measures.sticks == run.measures.sticks
+
+
+def test_steady_drilling_stays_steady(design):
+    """Started without a disturbance, at a speed at which the axial motion decays."""
+    calm = design.replace({
+        "operating_point.speed": "20 rad/s", "start.bit_speed": "20 rad/s",
+        "simulation.duration": "3 s",
+    })  # fmt: skip
+    point = cutting.steady(calm.bit_rock, 102546.7, 20.0)
+    for engine in ("reference", "batch"):
+        run = drillctl.simulate(calm, engine)
+        assert run.measures.j1 < 1e-6
+        assert run.measures.rate_of_penetration == pytest.approx(point.velocity, rel=1e-6)
+        assert run.measures.depth_of_cut == pytest.approx(point.depth_of_cut, rel=1e-6)
+
+
+def test_a_varying_rock_is_the_same_in_both_engines(design):
+    short = design.replace({
+        "bit_rock.variation": {"cv": 0.1, "length": "2 cm"}, "simulation.duration": "4 s",
+    })  # fmt: skip
+    exact, batch = drillctl.simulate(short), drillctl.simulate(short, "batch")
+    assert exact.energy.relative_residual < 1e-6
+    assert batch.measures.j1 == pytest.approx(exact.measures.j1, rel=5e-3)
+    plain = drillctl.simulate(design.replace({"simulation.duration": "4 s"}), "batch")
+    assert abs(batch.measures.j1 / plain.measures.j1 - 1.0) > 0.01
+
+
+def test_lanes_do_not_see_each_other(design):
+    axes = [{"path": "operating_point.speed", "min": "50 rpm", "max": "60 rpm", "points": 3}]
+    result = drillctl.sweep(design.replace({"map.axes": axes, "map.audit_cells": 0}))
+    alone = drillctl.simulate(design.replace({"operating_point.speed": "60 rpm"}), "batch")
+    assert result.j1[2] == alone.measures.j1
+
+
+def test_what_it_does_not_go_with_is_refused(design):
+    with pytest.raises(InputError, match="axial string"):
+        drillctl.simulate(
+            design.replace(
+                {"weight_on_bit.law": "navarro-lopez-suarez", "weight_on_bit.gain": "2 kN*s/rad"}
+            ),
+            "batch",
+        )
+    with pytest.raises(InputError, match="PI"):
+        drillctl.simulate(design.replace({"controller.drive.torque_limit": "30 kN*m"}))
+    assert steps.RING & (steps.RING - 1) == 0
