@@ -19,10 +19,10 @@ HEAD = """# Keys of a design file
 
 Generated from the code by `docs/make_design_file.py`; a test keeps it up to date. TOML,
 `schema = 1`. Keys at the top level: `schema`, `model` (a shipped name or a path, whose values the
-design overrides), `title`, `source`, `status`, `notes`, and `units`: `"field"` (rpm, klbf, klbf ft,
-ft, in, lb ft²; klbf ft/rpm for slopes and Kp, klbf ft/rev for Ki and stiffness) or `"si"`, in which
-tables, pictures, sentences, CSV files and the report are, unless `--units` asks for others. All
-tables below are optional in a design that names a model.
+design overrides), `title`, `author` (named by a report), `source`, `status`, `notes`, and `units`:
+`"field"` (rpm, klbf, klbf ft, ft, in, lb ft²; klbf ft/rpm for slopes and Kp, klbf ft/rev for Ki and
+stiffness) or `"si"`, in which tables, pictures, sentences, CSV files and the report are, unless
+`--units` asks for others. All tables below are optional in a design that names a model.
 
 A key with a unit takes text with any unit of the same kind. Gains may be bare numbers. Ranges are
 wide, a thousand times beyond any rig: what lies outside is a slip of the pen. Sections of

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from drillctl.design.design import Design
 
 _HIDDEN = (
-    "title", "source", "status", "notes", "schema_version", "map", "uncertain", "uncertainty",
+    "title", "author", "source", "status", "notes", "schema_version", "map", "uncertain",
+    "uncertainty",
     *settings_of_studies(),
 )  # fmt: skip
 

@@ -577,6 +577,7 @@ class OwnTables(Table):
 
     schema_version: Literal[1] = Field(default=1, alias="schema")
     title: str = ""
+    author: str = ""
     source: str = ""
     status: str = ""
     notes: str = ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
@@ -213,7 +214,8 @@ class Gathered:
             (one.name, figure(one, name, partial(draw, name=one.name), system), True)
             for one in kind.pictures(result)
         ]
-        tables = [(one.name, block(one, system), one.shown) for one in kind.tables(result)]
+        made = [(one.name, block(one, system), one.shown) for one in kind.tables(result)]
+        tables = [one for one in made if one[1].rows]
         return Shown(said, tuple(kind.checks(result)), (*pictures, *tables))
 
     def key(self, names: Iterable[str]) -> str:
@@ -303,7 +305,7 @@ def _study(
     try:
         design = recipe.variant(requested)
     except InputError as error:
-        return ended("failed", str(error))
+        return ended("failed", explained(error))
     options = study.defaults() | dict(recipe.options)
     with store.claim(
         study.name, design, place, study.growing(design), **study.settings(options)
@@ -316,7 +318,22 @@ def _study(
             run.conclude(result, recipe.summary(result))
         except KeyboardInterrupt:
             return ended("interrupted", INTERRUPTED)
-        except (DrillctlError, ArithmeticError, MemoryError, ValueError) as error:
+        except Exception as error:  # one study less, whatever it raises
             run.discard()
-            return ended("failed", str(error) or type(error).__name__)
+            return ended("failed", explained(error))
     return ended("done")
+
+
+_LISTS = re.compile(r"[;,.]?\s*(?:did you mean '[^']*'\? )?allowed: .*$|^[^:\s]+\.toml:(?:\d+:)? ")
+
+
+def explained(error: BaseException) -> str:
+    """Why a study failed, as the end of a sentence: no list of keys, no file of its own."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory"
+    known = isinstance(error, (DrillctlError, ArithmeticError, ValueError))
+    first = (str(error).splitlines() or [""])[0]
+    text = _LISTS.sub("", _LISTS.sub("", first)).rstrip(" .;:")
+    if known and text:
+        return text
+    return f"an error of the program itself ({type(error).__name__}{f', {text}' if text else ''})"

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import os
+import time
+from collections import Counter
 from collections.abc import Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -16,7 +20,16 @@ from drillctl.arrays import own_errstate
 from drillctl.design import Design
 from drillctl.errors import DrillctlError, InputError, nearest
 from drillctl.progress import SILENT, Progress
-from drillctl.reporting.blocks import Checks, Document, Section, Table, Words
+from drillctl.reporting.blocks import (
+    Block,
+    Checks,
+    Document,
+    Figure,
+    InteractiveMap,
+    Section,
+    Table,
+    Words,
+)
 from drillctl.reporting.gather import (
     INTERRUPTED,
     PROFILES,
@@ -35,7 +48,6 @@ from drillctl.text import one_line
 
 if TYPE_CHECKING:
     from drillctl import units
-    from drillctl.reporting.blocks import Document
 
 NAMES = {"html": "report.html", "pdf": "report.pdf", "md": "report.md"}  # files by format
 
@@ -117,6 +129,7 @@ def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> D
         except NotThereError as reason:
             left_out.append((kind.title, reason.why))
     design = gathered.requested
+    made = [_with_own_files(one, _taken_twice(made)) for one in made]
     return Document(
         title=one_line(title or design.tables.title or design.name),
         subtitle=f"Torsional stick-slip of a drillstring: report of the design {design.name}",
@@ -127,10 +140,44 @@ def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> D
     )
 
 
+def _figures(section: Section) -> list[Figure]:
+    blocks = (one.figure if isinstance(one, InteractiveMap) else one for one in section.blocks)
+    return [one for one in blocks if isinstance(one, Figure)]
+
+
+def _taken_twice(sections: Iterable[Section]) -> set[str]:
+    """Names of figures that several sections have."""
+    names = Counter(one.name for section in sections for one in _figures(section))
+    return {name for name, count in names.items() if count > 1}
+
+
+def _with_own_files(section: Section, taken: set[str]) -> Section:
+    """A section whose figures have files of their own: with its name before one taken twice."""
+
+    def own(block: Block) -> Block:
+        if isinstance(block, InteractiveMap):
+            figure = own(block.figure)
+            assert isinstance(figure, Figure)
+            return replace(block, figure=figure)
+        if isinstance(block, Figure) and block.name in taken:
+            return replace(block, name=f"{section.name}-{block.name}")
+        return block
+
+    return replace(section, blocks=tuple(map(own, section.blocks)))
+
+
+def _today() -> str:
+    """The date, or that of `SOURCE_DATE_EPOCH` where the same report is to be the same file."""
+    now = datetime.fromtimestamp(float(os.environ.get("SOURCE_DATE_EPOCH", time.time())), UTC)
+    return f"{now.day} {now:%B %Y}"
+
+
 def _facts(gathered: Gathered) -> tuple[tuple[str, str], ...]:
     design, table = gathered.requested, gathered.design.tables.uncertainty
     facts = [
         ("design", design.name),
+        *([("author", one_line(design.tables.author))] if design.tables.author else []),
+        ("date", _today()),
         ("profile", f"{gathered.profile.name} ({gathered.profile.meaning})"),
         ("program", f"drillctl {drillctl.__version__}"),
         ("seed", str(table.seed)),

@@ -24,6 +24,9 @@ _UNIT = re.compile(
 )
 _NUMBER = re.compile(r"^[−-]?[\d.]+( × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?( [%°]| s| Hz| ms)?$|^–$|^∞$")
 
+_LONG = re.compile(r"[\w./=-]{15,}")
+_JOINT = re.compile(r"([./_=])(?=\w)")
+
 SHORT = 26  # longest text (characters) of a cell kept on one line
 
 
@@ -66,9 +69,12 @@ def _figures(rows: tuple[tuple[str, ...], ...], column: int) -> bool:
     return column > 0 and all(_NUMBER.match(row[column]) for row in rows)
 
 
-def _kept(text: str) -> str:
-    """Join numbers and units by non-breaking spaces."""
-    return _UNIT.sub("\u00a0", text)
+def _kept(text: str) -> Any:
+    """Join numbers and units by non-breaking spaces; say where a long name may be broken."""
+    from markupsafe import Markup
+
+    joined = escape(_UNIT.sub("\u00a0", clean(text)))
+    return Markup(_LONG.sub(lambda word: _JOINT.sub(r"\1<wbr>", word[0]), joined))
 
 
 def _short(rows: tuple[tuple[str, ...], ...], column: int) -> bool:

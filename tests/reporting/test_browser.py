@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import re
-import subprocess
 from collections.abc import Iterator
-from shutil import which
+from pathlib import Path
 from typing import Any
 
+import pypdf
 import pytest
 
 from drillctl.reporting import Report
@@ -200,6 +201,54 @@ def test_nothing_stands_in_the_way_of_reading(browser, small, scheme, width):
     seen.context.close()
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious(browser, small, scheme):
+    """Deque's own rules, in the open parts of the page."""
+    axe = importlib.util.find_spec("axe_playwright_python")
+    if axe is None:
+        pytest.skip("no axe")
+    seen = Seen(browser, small, color_scheme=scheme, viewport={"width": 1280, "height": 900})
+    seen.page.evaluate(Path(axe.origin).with_name("axe.min.js").read_text(encoding="utf-8"))
+    found = seen.page.evaluate("axe.run({ resultTypes: ['violations'] })")
+    serious = [
+        (one["id"], one["impact"], [node["html"][:80] for node in one["nodes"][:3]])
+        for one in found["violations"]
+        if one["impact"] in ("serious", "critical")
+    ]
+    assert serious == []
+    assert len(found["passes"]) > 20
+    seen.context.close()
+
+
+# Words of cells that lie on two lines, where neither hyphen nor <wbr> allows it.
+BROKEN = r"""
+() => {
+  const broken = [];
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const node = walker.currentNode;
+    if (!node.parentElement.closest("th, td, caption, h2, figcaption")) continue;
+    for (const word of node.textContent.matchAll(/[^\s\u2010-\u2015-]+/g)) {
+      const range = document.createRange();
+      range.setStart(node, word.index);
+      range.setEnd(node, word.index + word[0].length);
+      const lines = new Set([...range.getClientRects()].map((box) => Math.round(box.top)));
+      if (lines.size > 1) broken.push(word[0]);
+    }
+  }
+  return broken;
+}
+"""
+
+
+def test_no_word_is_broken_in_print(browser, small):
+    seen = Seen(browser, small, viewport={"width": 680, "height": 960})
+    seen.page.emulate_media(media="print")
+    assert seen.page.evaluate(BROKEN) == []
+    assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    seen.context.close()
+
+
 def test_it_is_whole_without_scripts(browser, small):
     seen = Seen(browser, small, java_script_enabled=False)
     assert seen.page.locator("section").count() >= 10
@@ -224,11 +273,12 @@ def test_it_prints_with_no_clipped_picture(browser, small, tmp_path):
         assert height < 297 / 25.4 * 96 - 2 * 60  # of a page without its margins
     seen.context.close()
     made = pdf.printed(small.files["html"], tmp_path / "report.pdf")
-    if which("pdfinfo"):
-        told = subprocess.run(
-            ["pdfinfo", str(made)], capture_output=True, text=True, check=True
-        ).stdout
-        pages = int(re.search(r"Pages:\s+(\d+)", told)[1])
-        assert 8 <= pages <= 40
-        assert "(A4)" in told
+    pages = pypdf.PdfReader(made).pages
+    assert 8 <= len(pages) <= 40
+    assert [round(float(size) * 25.4 / 72.0) for size in pages[0].mediabox[2:]] == [210, 297]
+    heads = re.findall(r"<h2[^>]*>(.*?)</h2>", small.files["html"].read_text(encoding="utf-8"))
+    for number, page in enumerate(pages, start=1):
+        lines = page.extract_text().strip().splitlines()
+        assert f"page {number} of {len(pages)}" in lines
+        assert lines[-1].strip() not in heads  # which stay with what follows
     assert made.stat().st_size > 100_000

@@ -10,7 +10,7 @@ from itertools import pairwise
 import pytest
 from small_report import NOTES, TITLE
 
-VOID = {"meta", "link", "img", "br", "input", "hr"}
+VOID = {"wbr", "meta", "link", "img", "br", "input", "hr"}
 
 
 class Elements(HTMLParser):

@@ -45,7 +45,7 @@ def test_the_numbers_are_those_of_the_studies(small, page):
 def test_pictures_and_tables_lie_beside_it(small):
     drawn = {path.stem for path in (small.folder / "figures").glob("*.svg")}
     assert drawn == {path.stem for path in (small.folder / "figures").glob("*.png")}
-    assert {"rig", "map", "responses", "nyquist", "impedance", "convergence"} <= drawn
+    assert {"rig", "map", "runs", "responses", "nyquist", "impedance", "convergence"} <= drawn
     with (small.folder / "tables" / "map-regions.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
     assert rows[0][:2] == ["J1 at or under (s)", "cells"]

@@ -34,10 +34,12 @@ KINDS = (
          ("simulate", "map", "uncertainty", "doctor", "mesh-1", "mesh-2", "mesh-4", "step-2",
           "step-4"), runs.build_audit),
     Kind("glossary", "Glossary", (), rig.build_glossary),
+    Kind("design", "Appendix: the design", (), rig.build_design),
 )  # fmt: skip
 """Every section that is not of a study object, in the order in which they are read."""
 _ORDER = {
     "summary": 0, "rig": 10, "responses": 60, "audit": 120, "glossary": 130,
+    "design": 140,
 }  # fmt: skip
 
 

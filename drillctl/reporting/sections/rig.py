@@ -14,11 +14,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawn
 from matplotlib.patches import Polygon, Rectangle
 
-from drillctl.design import Design
+from drillctl.design import Design, to_toml
 from drillctl.design.parts import pieces, section
 from drillctl.design.tables import SectionTable
 from drillctl.plots import style
-from drillctl.reporting.blocks import Block, Figure, Table, Text, Words
+from drillctl.reporting.blocks import Block, Code, Figure, Table, Text, Words
 from drillctl.reporting.gather import Gathered
 from drillctl.store.tables import NOTHING, number
 
@@ -184,6 +184,11 @@ def _alt(gathered: Gathered) -> str:
         for table in gathered.design.tables.drillstring.sections
     ]
     return f"Drawing of the drillstring from top drive to bit: {', '.join(names)}."
+
+
+def build_design(gathered: Gathered) -> tuple[Block, ...]:
+    """The resolved design, word for word."""
+    return (Code("The design in full", to_toml(gathered.requested)),)
 
 
 GLOSSARY = Path(__file__).parents[1] / "templates" / "glossary.tsv"  # SI units in braces

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
-from drillctl.design import parameter, to_toml
+from drillctl.design import parameter
 from drillctl.provenance import provenance
-from drillctl.reporting.blocks import Block, Checks, Code, Figure, Table, Words
+from drillctl.reporting.blocks import Block, Checks, Figure, Table, Words
 from drillctl.reporting.gather import Gathered, NotThereError, Study, opened
 from drillctl.simulation.measures import MEASURES, Measure
 from drillctl.store.tables import NOTHING, number, percent
@@ -41,14 +41,19 @@ def build_responses(gathered: Gathered) -> tuple[Block, ...]:
     rows += _places(gathered, runs)
     table = Table("responses", "Measures of the runs", tuple(heads), tuple(map(tuple, rows)))
     figure = Figure(
-        "responses",
-        "Speeds of bit and top drive at the current, the best and a bad setting, in this order; "
-        "grey: bit at rest.",
+        "runs",
+        f"Speeds of bit and top drive: {_listed(runs)}; grey: bit at rest.",
         _alt(runs),
         partial(_drawn, [(one.folder, one.key) for one in runs.values()], paths, words.system),
         tuple(runs),
     )
     return figure, table
+
+
+def _listed(runs: dict[str, Study]) -> str:
+    """The runs that there are, in words."""
+    *most, last = (NAMES[name] for name in runs)
+    return f"{', '.join(most)} and {last}, in this order" if most else last
 
 
 def _drawn(runs: list[tuple[Path, str]], paths: list[str], system: units.System) -> Drawn:
@@ -100,14 +105,13 @@ DETAILS = ("energy", "scheme", "errors")  # their tables and pictures beside the
 
 
 def build_audit(gathered: Gathered) -> tuple[Block, ...]:
-    """Checks, convergence, errors, versions, design."""
+    """Checks, convergence, errors, versions."""
     shown = [gathered.shown(name) for name in CHECKED]
     checks = (*(check for one in shown for check in one.checks), *mesh_check(gathered))
     details = [part for one in shown for name, part, _ in one.parts if name in DETAILS]
     return (
         Checks("audit", "Checks of the numbers of this report", checks),
         *_convergence(gathered), *details, _versions(gathered),
-        Code("The design in full", to_toml(gathered.requested)),
     )  # fmt: skip
 
 

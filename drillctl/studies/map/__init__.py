@@ -76,8 +76,13 @@ def pictures(result: Sweep) -> Iterator[Picture]:
         alt += f" Least J1 {minimum[0]:.4g} s."
     for level, region in result.regions.items():
         alt += f" {region.cells} cells at or under {level:g} s."
+    marked = [
+        *(["regions"] if any(region.cells for region in result.regions.values()) else []),
+        *(["minimum"] if minimum is not None else []),
+        *(["audited cells"] if len(result.audit.cells) else []),
+    ]
     yield Picture(
-        "map", "J1 over the map with its regions, its minimum and the audited cells.", alt,
+        "map", f"J1 over the map{', with ' * bool(marked)}{', '.join(marked)}.", alt,
         lambda system: draw(result, system=system), paper=len(axes) == 2,
     )  # fmt: skip
     if len(axes) == 2:

@@ -87,7 +87,9 @@ STUDY = Study(
     recipes=(
         Recipe(
             "torque-drag", "torque and drag", order=5,
-            missing=lambda request: "" if request.design.tables.well.survey else "no survey",
+            missing=lambda request: (
+                "" if request.design.tables.well.survey else "the design has no survey"
+            ),
         ),
     ),
     sections=(
