@@ -18,6 +18,7 @@ from drillctl.linear.loop_margins import Margins, margins, weight_delay_margin, 
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.mesh_limited import Figures, figures_of, mesh_limited
 from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
+from drillctl.linear.regenerative import CuttingLoop, cutting_loop
 from drillctl.linear.slope_margin import slope_margin
 from drillctl.store.codec import label
 from drillctl.store.result import Result
@@ -64,6 +65,9 @@ class LoopAnalysis(Result, kind="loop"):
     mesh_limited: Figures = label(
         means="figures that the mesh decides, each with its value of the exact string (SI) or None"
     )
+    cutting: CuttingLoop | None = label(
+        means="roots of a bit that cuts its own wake, which decide its stability; else None"
+    )
 
     @property
     def bit_side(self) -> BitSide:
@@ -84,7 +88,8 @@ class LoopAnalysis(Result, kind="loop"):
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI; None where something is undefined."""
         result = self.margins
-        return {
+        more = {} if self.cutting is None else {"cutting": self.cutting.summary()}
+        return more | {
             "stable": self.stable,
             "spectral_abscissa": self.spectral_abscissa,
             "slope": self.operating_point.slope,
@@ -143,6 +148,7 @@ def loop(design: Design) -> LoopAnalysis:
     gains = design.linear_drive.gains()
     poles = loop_poles(design.string, *gains, point.slope) if simple else model_poles(design, bit)
     stable = bool(point.slope < tolerated)
+    cutting = None if design.axial is None else cutting_loop(design)
     at_top = margins(ends, design.linear_drive, bit, poles) if stable else None
     moving = _moving(design, point) if stable else None
     later, later_at = (
@@ -154,7 +160,8 @@ def loop(design: Design) -> LoopAnalysis:
     return LoopAnalysis(
         design=design,
         operating_point=point,
-        stable=stable,
+        stable=stable and (cutting is None or cutting.unstable_roots == 0),
+        cutting=cutting,
         poles=poles,
         slope_margin=tolerated,
         deciding_frequency_hz=omega / (2.0 * math.pi),

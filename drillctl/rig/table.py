@@ -178,6 +178,7 @@ PositiveWeight = Annotated[float, units.FORCE, _positive(1e-3, 1e9, units.FORCE)
 Torque = Annotated[float, units.TORQUE, _any(MOST_TORQUE, units.TORQUE)]
 TorqueOrZero = Annotated[float, units.TORQUE, _not_negative(MOST_TORQUE, units.TORQUE)]
 Length = Annotated[float, units.LENGTH, _positive(1e-4, 1e8, units.LENGTH)]
+ShortLength = Annotated[float, units.SHORT_LENGTH, _positive(1e-6, 10.0, units.SHORT_LENGTH)]
 Diameter = Annotated[float, units.DIAMETER, _positive(1e-5, 1e3, units.DIAMETER)]
 Bore = Annotated[float, units.DIAMETER, _not_negative(1e3, units.DIAMETER)]
 Depth = Annotated[float, units.LENGTH, _not_negative(1e8, units.LENGTH)]

@@ -116,7 +116,7 @@ class RichardDetournayTable(RockTable):
     radius: q.Diameter
     intrinsic_energy: q.Modulus
     zeta: q.PositiveNumber = 0.6
-    wear_flat_length: q.Length
+    wear_flat_length: q.ShortLength
     contact_stress: q.Modulus
     gamma: q.PositiveNumber = 1.0
     mu: q.PositiveNumber = 0.6

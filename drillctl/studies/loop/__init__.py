@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -14,6 +15,7 @@ from drillctl.studies.base import Option, Picture, Recipe, Run, Section, Study
 if TYPE_CHECKING:
     from drillctl.design import Design
     from drillctl.linear.loop_analysis import LoopAnalysis
+    from drillctl.linear.regenerative import CuttingLoop
 
 SHOWN = 10  # oscillating poles in the table
 SLOPE = "N*m*s/rad"
@@ -42,13 +44,29 @@ def tables(result: LoopAnalysis) -> Iterator[Table]:
     )  # fmt: skip
     poles = [[k, *one] for k, one in enumerate(result.oscillations[:SHOWN], start=1)]
     yield Table("closed-loop-modes", "oscillations of the loop, lowest first", columns, poles)
+    if result.cutting is not None:
+        yield from _cutting(result.cutting)
     if getattr(result, "map", None) is not None:
         yield from of_map(result.map)  # type: ignore[attr-defined]
 
 
+def _cutting(cutting: CuttingLoop) -> Iterator[Table]:
+    """Roots of a bit that cuts its own wake."""
+    columns = (
+        Column("pair"), Column("growth", unit="1/s", digits=6),
+        Column("frequency", unit="Hz", digits=6),
+    )  # fmt: skip
+    rows = [
+        [k, float(root.real), float(root.imag) / (2.0 * math.pi)]
+        for k, root in enumerate(cutting.roots[:SHOWN], start=1)
+    ]
+    title = f"roots of the cutting bit up to {cutting.limit_hz:.3g} Hz, rightmost first"
+    yield Table("cutting-roots", title, columns, rows)
+
+
 def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
     requested, steady = result.design.tables.operating_point, result.operating_point
-    rows = (
+    rows: tuple[tuple[str, float | None, str], ...] = (
         ("set speed", requested.speed, "rad/s"),
         ("weight on bit", requested.weight_on_bit, "N"),
         ("speed of steady drilling", steady.speed, "rad/s"),
@@ -58,6 +76,14 @@ def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
         ("critical speed (stability changes)", result.critical_speed, "rad/s"),
         ("nearest weight at which stability changes", result.critical_weight_on_bit, "N"),
     )
+    cut = result.cutting
+    if cut is not None:
+        rows += (
+            ("depth of cut in a turn", cut.depth_of_cut, "m"),
+            ("rate of penetration", cut.rate_of_penetration, "m/s"),
+            ("speed above which axial motion alone is stable", cut.boundary_speed, "rad/s"),
+            ("roots in the right half-plane", float(cut.unstable_roots), "1"),
+        )
     return [[name, Quantity(value, unit), Unit(unit)] for name, value, unit in rows]
 
 
@@ -110,6 +136,11 @@ def pictures(result: LoopAnalysis) -> Iterator[Picture]:
 
 def remarks(result: LoopAnalysis, system: units.System) -> Iterator[str]:
     """Why there may be no margins; what a limit of the rate brings into the loop."""
+    if result.cutting is not None:
+        yield (
+            "Stability is that of the roots of the cutting bit; slope margin and poles are of its "
+            "steady torque alone, which does not fall."
+        )
     if result.margins is None:
         yield "The loop is not stable: it has no margins at the top torque."
     if result.mesh_limited:

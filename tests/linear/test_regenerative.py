@@ -1,0 +1,89 @@
+"""Roots and boundary of a bit that cuts its own wake: the closed form, other codes, simulation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import drillctl
+from drillctl.errors import InputError
+from drillctl.linear.regenerative import (
+    Characteristic,
+    axial_boundary,
+    axial_mobility,
+    count_roots,
+    cutting_loop,
+)
+from drillctl.rig.axial import AxialTable, axial_string
+from drillctl.units import SI
+
+UNIT = math.sqrt(116.0 / 938.0)
+SHARP = {
+    "bit_rock.wear_flat_length": "1.2 mm",
+    "operating_point.weight_on_bit": "23.4093 kN",
+    "operating_point.speed": "11.374503 rad/s",
+    "start.bit_speed": "9.952691 rad/s",
+}
+
+
+@pytest.fixture(scope="module")
+def design():
+    """The shipped case."""
+    return drillctl.load("richard-detournay-2dof")
+
+
+def test_roots_are_those_of_other_codes(design):
+    found = cutting_loop(design.replace(SHARP))
+    expected = [1.0300738 + 9.3976237j, 3.94394e-4 + 1.0086095j]
+    assert found.roots[:2] * UNIT == pytest.approx(expected, abs=2e-6)
+    assert found.unstable_roots == 4
+    assert found.whole  # none beyond the limit
+
+
+@pytest.mark.parametrize(("blades", "expected"), [(4, 5.318219), (6, 4.342308)])
+def test_axial_boundary_is_the_closed_form(design, blades, expected):
+    found = axial_boundary(design.replace({"bit_rock.blades": blades})) * UNIT
+    psi = 0.6 * 60e6 * 0.108 * UNIT**2 / 34000.0
+    assert found == pytest.approx(math.sqrt(8.0 * psi / blades), rel=1e-9)
+    assert found == pytest.approx(expected, abs=2e-6)
+
+
+def test_the_number_of_roots_changes_at_the_boundary(design):
+    boundary = axial_boundary(design)
+    for share, count in ((0.99, 2), (1.01, 0)):
+        chi = Characteristic(design.replace({"operating_point.speed": SI(share * boundary)}), False)
+        assert count_roots(chi, 1e-9 * chi.scale - 60j, 60.0 + 60j) == count
+
+
+@pytest.mark.parametrize(("share", "grows"), [(0.99, True), (1.01, False)])
+def test_simulation_meets_the_boundary(design, share, grows):
+    speed = share * axial_boundary(design)
+    one = design.replace({
+        "operating_point.speed": SI(speed), "start.bit_speed": SI(speed * (1.0 - 1e-3)),
+        "operating_point.weight_on_bit": SI(1.02 * design.bit_rock.flat_force),
+        "simulation.duration": "16 s",
+    })  # fmt: skip
+    swing = drillctl.simulate(one, "batch", interval=0.02).signals["penetration"]
+    swing = np.abs(swing - swing.mean())
+    early, late = (swing[int(a * len(swing)) : int(b * len(swing))].max()
+                   for a, b in ((0.2, 0.4), (0.8, 1.0)))  # fmt: skip
+    assert (late > 1.1 * early) if grows else (late < 0.95 * early)
+
+
+def test_mobility_of_coupled_dampers_is_that_of_the_matrices():
+    table = AxialTable(model="elements", damping=SI(2e4), stiffness_damping=SI(1e-3), top="force")
+    string = axial_string(table, np.full(3, 4e6), np.full(3, 900.0), consistent=True)
+    s = np.array([0.3 + 7.0j, 0.1 + 90.0j])
+    for one, found in zip(s, axial_mobility(string, s), strict=True):
+        dynamic = one * string.mass + string.damping + string.stiffness / one
+        assert found == pytest.approx(np.linalg.inv(dynamic)[-1, -1], rel=1e-9)
+
+
+def test_a_loop_with_this_bit_tells_its_roots(design):
+    result = drillctl.loop(design)
+    assert not result.stable
+    assert result.summary()["cutting"]["unstable_roots"] == 4
+    with pytest.raises(InputError, match="richard-detournay"):
+        cutting_loop(drillctl.load("monteiro-trindade-140kn"))
