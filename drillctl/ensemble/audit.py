@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Hashable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,8 +27,8 @@ from drillctl.design.tables import SimulationTable
 from drillctl.errors import SimulationError
 from drillctl.progress import SILENT, Progress, Silent
 from drillctl.rig.drillstring import Drillstring
-from drillctl.simulation.batch import Prepared, Watch, new_watch, prepare, run_batch
-from drillctl.simulation.lanes import single_lane
+from drillctl.simulation.batch import Prepared, new_watch, prepare, run_batch
+from drillctl.simulation.lanes import kinds, lane_numbers, lanes_of, timed
 from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES
 from drillctl.simulation.propagator import string_step
 from drillctl.simulation.scheme import ACCURACIES, Scheme
@@ -267,20 +268,21 @@ def audited(
 
     progress.begin(f"auditing {of}s", len(designs))
     end, runs = time.perf_counter() + seconds, list[tuple[dict[str, float], ...]]()
+    batches = by_batch(designs)
     until = _UntilStopped()
 
-    def in_time(design: Design) -> tuple[dict[str, float], ...] | None:
+    def in_time(design: Design) -> dict[str, float] | None:
         if time.perf_counter() >= end:
             return None
-        return (*by_batch(design, until.watch), by_reference(design, until))
+        return by_reference(design, until)
 
     # As many as the lanes may use, which is what `--threads` sets.
     with ThreadPoolExecutor(min(len(designs), numba.get_num_threads())) as pool:
         try:
-            for one in pool.map(in_time, designs):
+            for ran, one in zip(batches, pool.map(in_time, designs), strict=True):
                 if one is None:
                     break
-                runs.append(one)
+                runs.append((*ran, one))
                 progress.advance(1)
         finally:  # interrupted, or out of time
             until.watch[0] = 1
@@ -308,18 +310,35 @@ class _UntilStopped(Silent):
             raise SimulationError("stopped")
 
 
-def by_batch(
-    design: Design, watch: Watch | None = None
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Measures and status of a design by the batch engine, at its step and at a quarter of it."""
-    lane, table = single_lane(design), design.tables.simulation
-    own = prepare(lane, table)
-    results = []
-    for prepared in (own, refined(design.string, table, own, PARTS)):
-        ran = run_batch(lane, prepared, watch=watch)
-        values = {name: float(column[0]) for name, column in ran.measures.items()}
-        results.append(values | {"status": float(ran.status[0])})
-    return results[0], results[1]
+def by_batch(designs: Sequence[Design]) -> list[tuple[dict[str, float], ...]]:
+    """Measures and status of designs by the batch engine, at their step and at a quarter of it.
+
+    Those that can share a string run together: a block of lanes costs as much as one.
+    """
+    groups: dict[Hashable, list[int]] = {}
+    for place, design in enumerate(designs):
+        groups.setdefault(_in_common(design), []).append(place)
+    results: list[tuple[dict[str, float], ...]] = [()] * len(designs)
+    for places in groups.values():
+        design = designs[places[0]]
+        numbers = [lane_numbers(designs[place]) for place in places]
+        lanes = lanes_of(design, {k: np.array([one[k] for one in numbers]) for k in numbers[0]})
+        table = design.tables.simulation
+        own = prepare(lanes, table)
+        for prepared in (own, refined(design.string, table, own, PARTS)):
+            ran = run_batch(lanes, prepared)
+            for lane, place in enumerate(places):
+                values = {name: float(column[lane]) for name, column in ran.measures.items()}
+                results[place] += (values | {"status": float(ran.status[lane])},)
+    return results
+
+
+def _in_common(design: Design) -> Hashable:
+    """What designs agree on whose lanes run together: all but numbers of laws and of the start."""
+    tables = design.tables
+    numbered: Any = dict.fromkeys(("controller", "operating_point", "bit_rock", "scenario"), True)
+    others = tables.model_dump_json(exclude=numbered | {"start": {"speed"}})
+    return kinds(design), design.string.parts, timed(lane_numbers(design)), others
 
 
 def by_reference(design: Design, progress: Progress = SILENT) -> dict[str, float]:

@@ -32,7 +32,7 @@ from drillctl.ensemble.parameters import drawing
 from drillctl.ensemble.running import Block, Pieces, Run, Strings, collect, load_kernel, pieces
 from drillctl.errors import InputError
 from drillctl.simulation.batch import Prepared, prepare
-from drillctl.simulation.lanes import Lanes, kinds, lane_numbers, lanes_of
+from drillctl.simulation.lanes import TIMED, Lanes, kinds, lane_numbers, lanes_of, timed
 
 LANES = 2**17  # lanes of a block: some seconds' work at most
 MOST = 4096  # realizations of a block at most
@@ -120,13 +120,6 @@ def _rig(design: Design) -> Design:
     """The design without them: thousands of variants are validated, samples and all."""
     tree = {key: table for key, table in design.tree.items() if key not in STUDIES}
     return Design(design.name, validated(tree, design.origin), tree, design.origin)
-
-
-TIMED = ("speed_program.begin", "speed_program.end", "weight_program.begin",
-         "weight_program.end", "speed_program.first", "weight_program.first", "rock_until",
-         "drive.period", "variation.spread", "variation.spacing",
-         "variation.advance")  # fmt: skip
-"""Numbers of a lane that the moments at which steps end follow from, and how long steps are."""
 
 
 @dataclass
@@ -294,12 +287,12 @@ class _Part:
     @cached_property
     def _telling(self) -> slice:
         """Cells with every friction that a realization meets: one, where gains alone differ."""
-        gains = all(key.startswith("drive.") and key not in TIMED for key in self.moved)
+        gains = all(key.startswith("drive.") and not key.startswith(TIMED) for key in self.moved)
         return slice(0, 1) if gains else slice(None)
 
     def _string_key(self, design: Design, numbers: dict[str, float]) -> Hashable:
         """What the strings of realizations depend on, beside the friction."""
-        return (kinds(design), tuple(numbers.get(key, 0.0) for key in TIMED))
+        return kinds(design), timed(numbers)
 
     def _run(self, group: list[_Resolved], lanes: Lanes, ready: Prepared) -> Run:
         rows = np.array([one.row for one in group])

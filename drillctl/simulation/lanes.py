@@ -216,6 +216,18 @@ def lane_numbers(design: Design) -> dict[str, float]:
     return numbers
 
 
+TIMED = (
+    "speed_program.", "weight_program.", "rock_until", "drive.period", "variation.spread",
+    "variation.spacing", "variation.advance",
+)  # fmt: skip
+"""How the names of those numbers begin that the ends of steps, and their length, follow from."""
+
+
+def timed(numbers: dict[str, Any]) -> tuple[Any, ...]:
+    """Those numbers: lanes that agree on them can share a prepared string."""
+    return tuple(value for name, value in numbers.items() if name.startswith(TIMED))
+
+
 def lanes_of(design: Design, numbers: dict[str, Array]) -> Lanes:
     """Lanes on the string of `design`, with the types of its laws."""
     from drillctl.linear.observer import observer_of  # SciPy, which axes need not wait for

@@ -6,6 +6,7 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import drillctl
 from drillctl.rig.drillstring import Drillstring, Section, assemble
 from drillctl.rig.top_drive import PI
 from drillctl.simulation.kernels import rows as r
@@ -193,6 +194,23 @@ def test_dense_and_block_steps_agree(monkeypatch):
     monkeypatch.setattr(propagator, "WORST_CONDITION", 0.0)
     stepper, dense = by_kernel(string, angle, speed, torques)
     assert isinstance(stepper.string, DenseString)
+    assert np.abs(dense - by_blocks).max() <= 1e-10 * np.abs(by_blocks).max()
+
+
+def test_modes_that_die_out_below_the_top_are_blocks_too(monkeypatch):
+    """Short stiff pieces above the bit swing alone: the top sees them at 1e-17 of the others."""
+    from drillctl.simulation import propagator
+
+    string = drillctl.load("typical-slim").string
+    top = np.abs(string.undamped_modes[1][0])
+    assert top.min() < 1e-15 * top.max()
+    random = np.random.default_rng(7)
+    angle, speed = random.normal(size=(2, string.nodes))
+    torques = 1e3 * random.normal(size=(100, 2))
+    stepper, by_blocks = by_kernel(string, angle, speed, torques)
+    assert isinstance(stepper.string, BlockString)
+    monkeypatch.setattr(propagator, "WORST_CONDITION", 0.0)
+    _, dense = by_kernel(string, angle, speed, torques)
     assert np.abs(dense - by_blocks).max() <= 1e-10 * np.abs(by_blocks).max()
 
 

@@ -36,7 +36,7 @@ def test_reasons_give_the_scheme_of_every_shipped_file(name, accuracy):
 STIFF = {"drillstring.sections.pipe.length": "1500 m"}
 STEEP = {
     "bit_rock.law": "navarro-lopez-suarez", "bit_rock.a1": 0.03, "bit_rock.a2": 0.07,
-    "bit_rock.beta": 2.0,
+    "bit_rock.beta": 0.6,
 }  # fmt: skip
 LIMITED = {
     "controller.drive.torque_limit": "20 kN*m", "controller.drive.sampling_period": "13 ms",
@@ -83,7 +83,8 @@ def test_another_scheme_than_the_reasons_give_is_an_error(monkeypatch):
     wrong = Prepared(made.stepper, replace(made.scheme, modes=7), made.duration, made.j1_from)
     with pytest.raises(RuntimeError, match="13 modes"):
         explain(lanes, table, wrong)
-    monkeypatch.setattr(scheme_reasons, "STEEPEST", 1e-3)
+    shorter = replace(scheme_reasons.ACCURACIES["standard"], fall=1e-3)
+    monkeypatch.setitem(scheme_reasons.ACCURACIES, "standard", shorter)
     with pytest.raises(RuntimeError, match="chosen was"):
         explain(lanes, table, made)
 

@@ -53,6 +53,7 @@ from drillctl.simulation.scheme import (
     Scheme,
     _whole_steps,
     bit_inertia,
+    share_of_longest,
 )
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
@@ -133,8 +134,9 @@ def _bounds(string: Drillstring, table: SimulationTable, fall: float) -> tuple[B
         ),
     ]
     if fall > 0.0:
-        reason = f"the friction falls by up to {fall:.4g} N*m*s/rad: one root at the bit"
-        bounds.append(Bound("friction", STEEPEST * bit_inertia(string) / fall, reason))
+        reason = f"the friction falls by up to {fall:.4g} N*m*s/rad: what a light bit follows"
+        allowed = STEEPEST * share_of_longest(string, accuracy)
+        bounds.append(Bound("friction", allowed * bit_inertia(string) / fall, reason))
     return tuple(bounds)
 
 
