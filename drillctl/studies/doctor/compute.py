@@ -50,6 +50,7 @@ from drillctl.simulation.scheme import (
     ROUNDING,
     SMALLEST,
     STEEPEST,
+    WALLED,
     Scheme,
     _whole_steps,
     bit_inertia,
@@ -76,7 +77,7 @@ class Bound(NamedTuple):
 def explain(lanes: Lanes, table: SimulationTable, prepared: Prepared) -> dict[str, Any]:
     """A scheme and why it was chosen, as strict JSON values; SI units."""
     scheme, string = prepared.scheme, lanes.string
-    bounds = _bounds(string, table, lanes.steepest_fall)
+    bounds = _bounds(string, table, lanes.steepest_fall, 1.0 if lanes.wall is None else WALLED)
     if table.step is None and lanes.longest_step < math.inf:
         seen = (
             "the rock along the way" if lanes.axial is None else "the cutting from blade to blade"
@@ -119,18 +120,22 @@ def form_of(string: Any) -> str:
     return "blocks" if isinstance(string, BlockString) else "dense"
 
 
-def _bounds(string: Drillstring, table: SimulationTable, fall: float) -> tuple[Bound, ...]:
+def _bounds(
+    string: Drillstring, table: SimulationTable, fall: float, share: float
+) -> tuple[Bound, ...]:
+    """What bounds the step; `share` of the usual ones is left where the wall rubs."""
     if table.step is not None:
         return (Bound("given", table.step, "simulation.step"),)
     accuracy = ACCURACIES[table.accuracy]
     elastic = float(2.0 * math.pi / string.undamped_modes[0][1])
+    wall = "" if share == 1.0 else f", times {share:g} for friction along the wall"
     bounds = [
-        Bound("accuracy", accuracy.step, f"the longest step of '{table.accuracy}'"),
+        Bound("accuracy", share * accuracy.step, f"the longest step of '{table.accuracy}'{wall}"),
         Bound(
             "elastic_mode",
-            elastic / accuracy.steps_per_period,
+            share * elastic / accuracy.steps_per_period,
             f"{accuracy.steps_per_period:g} steps in a period of the first elastic mode, "
-            f"{elastic:.3g} s",
+            f"{elastic:.3g} s{wall}",
         ),
     ]
     if fall > 0.0:
