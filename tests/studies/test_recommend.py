@@ -11,8 +11,10 @@ from drillctl import units
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.linear.loop_margins import Margins
+from drillctl.reporting.sections.summary import _margins
 from drillctl.simulation import simulate
 from drillctl.simulation.measures import STATUSES
+from drillctl.studies.recommend import help as help_
 from drillctl.studies.recommend.assess import FAILS, FRAGILE, PASSES, best_of, drawn
 from drillctl.studies.recommend.candidates import (
     ROBUST,
@@ -30,8 +32,9 @@ from drillctl.studies.recommend.criteria import (
     own_delay,
     run_criteria,
 )
+from drillctl.studies.recommend.deeper import at_depth, depth_of
 from drillctl.studies.recommend.window import Line
-from drillctl.studies.recommend.words import in_drive_units, others
+from drillctl.studies.recommend.words import detail, in_drive_units, numbers_of, others
 from drillctl.studies.tune.search import search
 
 HOLDS = (
@@ -151,6 +154,31 @@ def test_criteria_of_the_runs(j1, status, low, missed):
     assert [one.name for one in kept if not one.kept] == missed
 
 
+def test_what_is_kept_is_told_with_its_limit():
+    design = drillctl.load("monteiro-trindade-140kn")
+    told = [detail(one) for one in loop_criteria(design, figures(), design.tables.recommend)]
+    assert told[0] == "the loop bears 150 N*m*s/rad, the rock falls by 100 N*m*s/rad"
+    assert told[1:] == ["1.5, limit 1.1", "2, limit 2.5", "0.05 s, limit 0 s"]
+
+
+def test_a_report_asks_for_the_margins_too():
+    design = drillctl.load("monteiro-trindade-140kn")
+
+    def asked(**changed):
+        kept = loop_criteria(design, figures(**changed), design.tables.recommend)
+        summary = {"candidates": {"in the drive now": {"criteria": [x.summary() for x in kept]}}}
+        study = SimpleNamespace(summary=summary)
+        have = {"recommend": study}.get
+        return _margins(
+            SimpleNamespace(have=have, design=design, words=SimpleNamespace(system="si"))
+        )
+
+    assert asked().answer is True
+    assert asked(peak=71.0).answer is False
+    assert "peak sensitivity 71" in asked(peak=71.0).detail
+    assert asked(margin=105.0).detail.endswith("110 N m s needed)")
+
+
 def test_what_passes_goes_before_what_is_fragile_and_that_before_the_least_bad():
     def one(verdict, objective, miss=0.0):
         return SimpleNamespace(verdict=verdict, objective=objective, badness=(miss, objective))
@@ -221,11 +249,16 @@ def test_a_rig_without_a_pi_has_one_to_tune():
 
 def test_the_sentence_names_setting_limit_and_room(result):
     best = result.recommended
-    assert best.name in result.sentence
+    assert numbers_of(best) in result.sentence
     assert all(text in result.sentence for text in (*result.limits, "What limits it is"))
     said = others(result)
     assert len(said) == len(result.candidates) - 1
     assert any(text.startswith("soft torque: unstable in the first mode") for text in said)
+    last, fails = result.until
+    assert last >= depth_of(best.design) - 1e-9
+    assert f"it passes to {units.full(last, 'm', 5)}" in result.sentence
+    if fails is not None:
+        assert not help_._passes(at_depth(best.design, fails))
     summary = result.summary()
     assert summary["recommended"]["gains"] == best.gains
     assert set(summary["candidates"]) == {one.name for one in result.candidates}

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from drillctl import units
 from drillctl.reporting.blocks import Block, Check, Checks, Table, Text
 from drillctl.reporting.gather import Gathered
 from drillctl.store.tables import NOTHING, between, chance, number, percent
@@ -19,6 +20,8 @@ STATUS = {
     "failed": "gives no finite result",
 }
 """The motion of the bit by status."""
+MARGINS = ("slope_reserve", "peak_sensitivity", "delay", "time_at_limit")
+"""Criteria of `[recommend]` that are asked beside stability, J1 and its probability."""
 PASSES, FAILS, OPEN = "passes", "does not pass", "is undecided"
 
 
@@ -32,7 +35,10 @@ class Verdict:
 
 def verdict(gathered: Gathered) -> Verdict:
     """Decide the verdict from the finished studies."""
-    checks = (_stable(gathered), _keeps_level(gathered), _probable(gathered), _strong(gathered))
+    checks = (
+        _stable(gathered), _keeps_level(gathered), _probable(gathered), _margins(gathered),
+        _strong(gathered),
+    )  # fmt: skip
     known = tuple(check for check in checks if check is not None)
     answers = [check.answer for check in known]
     if False in answers:
@@ -84,6 +90,18 @@ def _probable(gathered: Gathered) -> Check | None:
     question = f"Is P(J1 ≤ {number(result['level'])} s) at least {percent(required)}?"
     detail = f"{chance(result['probability'], (low, high))}, {result['realizations']} draws"
     return Check(question, answer, detail)
+
+
+def _margins(gathered: Gathered) -> Check | None:
+    """Whether the loop of the current setting keeps what `[recommend]` asks of its margins."""
+    study = gathered.have("recommend")
+    if study is None or gathered.design.tables.recommend.present:
+        return None
+    criteria = next(iter(study.summary["candidates"].values()))["criteria"]
+    asked = [one for one in criteria if one["name"] in MARGINS]
+    missed = [one["said"] for one in asked if not one["kept"]]
+    detail = units.told("; ".join(missed), gathered.words.system) or "all that [recommend] asks"
+    return Check("Does the loop keep its margins?", not missed, detail)
 
 
 def _strong(gathered: Gathered) -> Check | None:

@@ -2,8 +2,8 @@
 
 `candidates.py`: laws by rules, by the linear loop, by search; `criteria.py`: what must be kept;
 `window.py`: speeds and weights without sticking; `assess.py`: a setting with all that is said of
-it; `help.py`: what would help next; `words.py`: the sentence, and units of drives; `compute.py`:
-`recommend`.
+it; `deeper.py`: pipe added at the top; `help.py`: what would help next, and until which depth a
+setting passes; `words.py`: the sentence, and units of drives; `compute.py`: `recommend`.
 """
 
 from __future__ import annotations
@@ -167,10 +167,10 @@ def remarks(result: Recommendation, system: units.System) -> Iterator[str]:
 
 def checks(result: Recommendation) -> Iterator[Check]:
     """What the recommended setting keeps."""
-    from drillctl.studies.recommend.words import question
+    from drillctl.studies.recommend.words import detail, question
 
     for one in result.recommended.criteria:
-        said = units.told(one.said, result.design.tables.units or "si")
+        said = units.told(detail(one), result.design.tables.units or "si")
         yield Check(question(result.recommended, one), one.kept, said)
 
 

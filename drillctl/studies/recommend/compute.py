@@ -22,7 +22,7 @@ from drillctl.store.tables import Estimate
 from drillctl.studies.delay.compute import following_law
 from drillctl.studies.recommend import candidates as c
 from drillctl.studies.recommend.assess import FAILS, Assessed, assessed, best_of
-from drillctl.studies.recommend.help import what_helps
+from drillctl.studies.recommend.help import until_depth, what_helps
 from drillctl.studies.recommend.words import in_drive_units, limits_of, sentence
 from drillctl.studies.tune.search import Tuning
 from drillctl.studies.tune.tuned import tuned_parameters
@@ -39,6 +39,9 @@ class Recommendation(Result, kind="recommend"):
     left_out: dict[str, str] = label(means="those that do not, with the reason")
     confirmed: tuple[c.Confirmed, ...] = label(means="what grids over the gains say, if asked")
     helps: tuple[str, ...] = label(means="what would help next, in words")
+    until: tuple[float, float | None] | None = label(
+        means="depth (m) down to which the recommended setting keeps passing, and where not"
+    )
     seed: int = label(means="of the draws")
     trajectories: int = label(means="runs of the search")
     total_seconds: float = label(unit="s", means="from call to return")
@@ -98,6 +101,8 @@ class Recommendation(Result, kind="recommend"):
             "left_out": self.left_out,
             "confirmed": [one.sentence for one in self.confirmed],
             "helps": list(self.helps),
+            "passes_to_depth": self.until and self.until[0],
+            "fails_at_depth": self.until and self.until[1],
             "realizations": len(best.j1),
             **picked(self, "seed", "trajectories", "total_seconds"),
         }
@@ -150,6 +155,7 @@ def recommend(design: Design, progress: Progress = SILENT) -> Recommendation:
         left_out=left_out,
         confirmed=tuple(confirmed),
         helps=what_helps(best),
+        until=until_depth(best),
         seed=design.tables.tune.fresh_seed,
         trajectories=0 if found is None else found.trajectories,
         total_seconds=time.perf_counter() - begin,

@@ -13,10 +13,13 @@ from drillctl.ensemble.cases import share_interval
 from drillctl.errors import InputError
 from drillctl.studies.recommend.assess import Assessed, drawn
 from drillctl.studies.recommend.criteria import loop_criteria, loop_figures
+from drillctl.studies.recommend.deeper import at_depth, depth_of
 from drillctl.studies.recommend.window import SPEED, WEIGHT
 
 STEPS = (0.03, 0.06, 0.10, 0.15, 0.20, 0.30, 0.40, 0.60)
 """Changes of speed and weight that are tried, over the design's own."""
+DEEPER = (0.05, 0.10, 0.20, 0.40, 0.70, 1.0)
+"""How much deeper a setting that passes is tried, over the depth of the design."""
 DRAWS = 300  # at which the probability is looked at
 
 
@@ -36,6 +39,30 @@ def _room(one: Assessed) -> Iterator[str]:
     if high is not None:
         least = "at least " if window.weight_open else ""
         yield f"nor up to {least}{units.full(high, 'N', 4)} on bit"
+
+
+def until_depth(one: Assessed) -> tuple[float, float | None] | None:
+    """Depth (m) down to which a setting keeps passing, and where it no longer does.
+
+    None where it does not pass, or the string has no depth; the second is None if it passes at
+    every depth that is tried.
+    """
+    if one.missed:
+        return None
+    try:
+        last = depth = depth_of(one.design)
+    except InputError:
+        return None
+    for more in DEEPER:
+        there = depth * (1.0 + more)
+        try:
+            passes = _passes(at_depth(one.design, there))
+        except InputError:  # beyond holes or survey of the well
+            return last, None
+        if not passes:
+            return last, there
+        last = there
+    return last, None
 
 
 def _changes(one: Assessed) -> Iterator[str]:

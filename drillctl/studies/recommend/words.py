@@ -126,7 +126,17 @@ def sentence(result: Recommendation) -> str:
         verdict = f"passes, but fragile: {'; '.join(best.fragile)}"
     room = f" {helps[:1].upper()}{helps[1:]}." if helps else ""
     limit = "; ".join(limits_of(best))
-    return f"{what}. It {verdict}. It has {chance}. What limits it is {limit}.{room}"
+    deeper = f" {_deeper(result)}" if result.until else ""
+    return f"{what}. It {verdict}. It has {chance}. What limits it is {limit}.{room}{deeper}"
+
+
+def _deeper(result: Recommendation) -> str:
+    """Until which depth a setting that passes may stay."""
+    assert result.until is not None
+    last, fails = (None if x is None else units.full(x, "m", 5) for x in result.until)
+    if fails is None:
+        return f"As pipe is added at the top it passes to {last} at least."
+    return f"As pipe is added at the top it passes to {last}, and no longer at {fails}."
 
 
 def others(result: Recommendation) -> list[str]:
@@ -161,3 +171,20 @@ def question(one: Assessed, criterion: Criterion) -> str:
         "time_at_limit": f"Is the drive at its limit less than {percent(asked.time_at_limit)} of "
         "the time?",
     }[criterion.name]
+
+
+def detail(criterion: Criterion) -> str:
+    """What a criterion comes to, in full: what is missed, else its number beside its limit."""
+    value, limit = criterion.value, criterion.limit
+    if criterion.said or value is None:
+        return criterion.said
+    if criterion.name == "stable":
+        return (
+            f"the loop bears {units.full(value, 'N*m*s/rad', 4)}, the rock falls by "
+            f"{units.full(limit, 'N*m*s/rad', 4)}"
+        )
+    if criterion.name in ("delay", "j1"):
+        return f"{units.full(value, 's', 3)}, limit {units.full(limit, 's', 3)}"
+    if criterion.name in ("probability", "time_at_limit"):
+        return f"{percent(value)}, limit {percent(limit)}"
+    return f"{value:.3g}, limit {limit:.3g}"
