@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from drillctl import units
 from drillctl.design import Design
 from drillctl.errors import InputError
@@ -67,6 +69,12 @@ def loop_figures(design: Design, share: float) -> LoopFigures:
         margin, omega = tolerated_slope(design, point.speed)
     except InputError as error:
         return LoopFigures(math.nan, math.nan, math.nan, None, None, str(error))
+    if math.isnan(margin):
+        poles = model_poles(design, bit_side(design, 0.0, point.speed))
+        growing = poles[poles.real > 0.0]
+        seen = growing[np.abs(growing.imag) <= followed(design.string.parts)]
+        some = seen if len(seen) else growing if len(growing) else poles
+        omega = float(abs(some[np.argmax(some.real)].imag))
     whole, part = (
         _margins(design, one * point.slope, point.speed) if one * point.slope < margin else None
         for one in (1.0, share)
@@ -135,7 +143,7 @@ def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Cri
     needed = asked.slope_reserve * max(one.slope, 0.0)
     no_slope = math.isnan(one.slope_margin)
     ratio = math.inf if one.slope <= 0.0 < one.slope_margin else one.slope_margin / one.slope
-    without = one.problem or "unstable even without falling friction"
+    without = one.problem or f"unstable even without falling friction, in {mode}"
     own = own_delay(design.tables.controller.drive) if asked.delay is None else asked.delay
     delay = None if one.whole is None else one.whole.delay
     peak = None if one.part is None else one.part.peak_sensitivity
@@ -145,9 +153,13 @@ def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Cri
         f"bears {units.full(one.slope_margin, 'N*m*s/rad', 4)}"
     )  # fmt: skip
     small = (
-        f"slope margin {ratio:.2f} times the slope of the rock, {asked.slope_reserve:.2f} asked "
-        f"({mode} decides: {units.full(one.slope_margin, 'N*m*s/rad', 4)}, "
-        f"{units.full(needed, 'N*m*s/rad', 4)} needed)"
+        "no slope margin"
+        if no_slope
+        else (
+            f"slope margin {ratio:.2f} times the slope of the rock, {asked.slope_reserve:.2f} asked "
+            f"({mode} decides: {units.full(one.slope_margin, 'N*m*s/rad', 4)}, "
+            f"{units.full(needed, 'N*m*s/rad', 4)} needed)"
+        )
     )
     late = (
         "no delay margin: the loop is not stable"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,7 +13,7 @@ from drillctl.design import Design
 from drillctl.ensemble.cases import share_interval
 from drillctl.errors import InputError
 from drillctl.studies.recommend.assess import Assessed, drawn
-from drillctl.studies.recommend.criteria import loop_criteria, loop_figures
+from drillctl.studies.recommend.criteria import loop_criteria, loop_figures, own_delay
 from drillctl.studies.recommend.deeper import at_depth, depth_of
 from drillctl.studies.recommend.window import SPEED, WEIGHT
 
@@ -74,11 +75,30 @@ def _changes(one: Assessed) -> Iterator[str]:
         yield f"speed up by {units.full(STEPS[more] * speed, 'rad/s', 7)} makes it pass"
     if less is not None:
         yield f"weight down by {units.full(STEPS[less] * weight, 'N', 5)} makes it pass"
+    late = own_delay(design.tables.controller.drive)
+    if late > 0.0 and (bears := _borne(design)) < late:
+        yield (
+            f"without the {1e3 * late:.3g} ms of delay and lags of the drive the loop bears "
+            f"{1e3 * bears:.3g} ms: a faster drive would help, or damping that the design leaves out"
+        )
     if more is None and less is None:
         yield (
             f"neither {100 * STEPS[-1]:.0f} % more speed nor {100 * STEPS[-1]:.0f} % less weight "
             "makes it pass"
         )
+
+
+def _borne(design: Design) -> float:
+    """Delay (s) that the loop bears with a drive at once; infinite if it is not stable at all."""
+    at_once = design.replace({
+        f"controller.drive.{key}": value
+        for key, value in (
+            ("sampling_period", "0 s"), ("one_sample_delay", False), ("lag", "0 s"),
+            ("encoder_lag", "0 s"), ("torque_lag", "0 s"), ("torque_rate_limit", "inf"),
+        )
+    })  # fmt: skip
+    whole = loop_figures(at_once, design.tables.recommend.slope_share).whole
+    return math.inf if whole is None else whole.delay
 
 
 def _first(design: Design, changes: list[dict[str, Any]]) -> int | None:

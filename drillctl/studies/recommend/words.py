@@ -113,7 +113,7 @@ def sentence(result: Recommendation) -> str:
     helps = "; ".join(result.helps)
     if best.verdict == FAILS:
         worst = max(best.missed, key=lambda one: one.miss)
-        missed = f"misses by {100 * worst.miss:.2g} %: {worst.said}"
+        missed = f"misses by {100 * worst.miss:.0f} %: {worst.said}"
         others = [one.said for one in best.missed if one is not worst]
         also = f"; also {'; '.join(others)}" if others else ""
         return (
