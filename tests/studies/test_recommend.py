@@ -201,6 +201,17 @@ def test_figures_of_the_loop_are_those_of_loop(design):
     assert one.part.peak_sensitivity == pytest.approx(1.93, abs=0.01)
 
 
+def test_a_drive_that_is_late_is_told_what_would_help():
+    late = drillctl.load("torque-limited-140kn")
+    one = loop_figures(late, 0.5)
+    # Some modes above what its elements follow grow; they are no matter of the rig.
+    assert one.aside
+    assert np.isfinite(one.slope_margin)
+    own = own_delay(late.tables.controller.drive)
+    assert own == pytest.approx(0.027)
+    assert 0.02 < help_._borne(late) < own
+
+
 def test_a_land_rig_is_told_which_mode_is_unstable():
     land = drillctl.load("typical-land")
     made = {one.name: one.design for one in by_rules(land)}

@@ -194,6 +194,8 @@ def _fragile(one: Assessed) -> Iterable[str]:
         if off < asked.fragile_tolerance and not at_bound:
             name = drift.path.removeprefix("controller.")
             yield f"{name} may be off by {100 * off:.2g} % only"
+    if one.loop.aside:
+        yield "modes grow that are too high for the elements to follow, and were not counted"
     whole = one.loop.whole
     if whole is not None and whole.delay < asked.fragile_delay:
         more = own_delay(one.design.tables.controller.drive)

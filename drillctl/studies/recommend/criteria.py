@@ -13,7 +13,7 @@ from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import bit_side, ends_of
 from drillctl.linear.loop_analysis import tolerated_slope
-from drillctl.linear.loop_margins import Margins, margins
+from drillctl.linear.loop_margins import Margins, margins, whole_crossings
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.operating_point import operating_point
 from drillctl.rig.drillstring.frequencies import followed, natural_frequencies
@@ -38,6 +38,9 @@ class LoopFigures:
     whole: Margins | None = label(means="margins at the top torque; None if it is not stable")
     part: Margins | None = label(means="the same with a share of the slope")
     problem: str = label(means="why there are no figures, if so")
+    aside: bool = label(
+        default=False, means="whether modes grow that the elements do not follow, not counted"
+    )
 
     @property
     def stable(self) -> bool:
@@ -69,17 +72,32 @@ def loop_figures(design: Design, share: float) -> LoopFigures:
         margin, omega = tolerated_slope(design, point.speed)
     except InputError as error:
         return LoopFigures(math.nan, math.nan, math.nan, None, None, str(error))
+    aside = False
     if math.isnan(margin):
-        poles = model_poles(design, bit_side(design, 0.0, point.speed))
-        growing = poles[poles.real > 0.0]
-        seen = growing[np.abs(growing.imag) <= followed(design.string.parts)]
-        some = seen if len(seen) else growing if len(growing) else poles
-        omega = float(abs(some[np.argmax(some.real)].imag))
+        margin, omega, aside = _as_far_as_followed(design, point.speed)
     whole, part = (
         _margins(design, one * point.slope, point.speed) if one * point.slope < margin else None
         for one in (1.0, share)
     )
-    return LoopFigures(point.slope, margin, omega / (2.0 * math.pi), whole, part, "")
+    return LoopFigures(point.slope, margin, omega / (2.0 * math.pi), whole, part, "", aside)
+
+
+def _as_far_as_followed(design: Design, speed: float) -> tuple[float, float, bool]:
+    """Slope margin and its frequency (rad/s) of a loop that is not stable without slope.
+
+    Where only modes grow that the elements do not follow, that of the others, and True. Else NaN,
+    with the frequency of what grows.
+    """
+    bit, limit = bit_side(design, 0.0, speed), followed(design.string.parts)
+    poles = model_poles(design, bit)
+    seen = poles[(poles.real > 0.0) & (np.abs(poles.imag) <= limit)]
+    if len(seen):
+        return math.nan, float(abs(seen[np.argmax(seen.real)].imag)), False
+    result = whole_crossings(ends_of(design.string), design.linear_drive, bit)
+    over = np.flatnonzero((result.slope > 0.0) & (result.omega <= limit))
+    if len(over) == 0:
+        return math.inf, math.nan, True
+    return float(result.slope[over[0]]), float(result.omega[over[0]]), True
 
 
 def _margins(design: Design, slope: float, speed: float) -> Margins:
@@ -156,7 +174,7 @@ def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Cri
         "no slope margin"
         if no_slope
         else (
-            f"slope margin {ratio:.2f} times the slope of the rock, {asked.slope_reserve:.2f} asked "
+            f"slope margin {ratio:.2f} times that of the rock, {asked.slope_reserve:.2f} asked "
             f"({mode} decides: {units.full(one.slope_margin, 'N*m*s/rad', 4)}, "
             f"{units.full(needed, 'N*m*s/rad', 4)} needed)"
         )

@@ -79,7 +79,7 @@ def _changes(one: Assessed) -> Iterator[str]:
     if late > 0.0 and (bears := _borne(design)) < late:
         yield (
             f"without the {1e3 * late:.3g} ms of delay and lags of the drive the loop bears "
-            f"{1e3 * bears:.3g} ms: a faster drive would help, or damping that the design leaves out"
+            f"{1e3 * bears:.3g} ms: a faster drive would help, or damping not in the design"
         )
     if more is None and less is None:
         yield (
