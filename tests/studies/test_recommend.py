@@ -33,7 +33,7 @@ from drillctl.studies.recommend.criteria import (
     run_criteria,
 )
 from drillctl.studies.recommend.deeper import at_depth, depth_of
-from drillctl.studies.recommend.window import Line
+from drillctl.studies.recommend.window import Line, window
 from drillctl.studies.recommend.words import detail, in_drive_units, numbers_of, others
 from drillctl.studies.tune.search import search
 
@@ -90,6 +90,16 @@ def test_a_window_ends_where_single_runs_stick(result):
         ]
         assert ends[0] in ("ok", "not_settled")
         assert ends[1] in ("sticking", "stalled")
+
+
+def test_a_window_ends_where_the_drive_does():
+    land = drillctl.load(
+        "typical-land",
+        **{"recommend.speed_step": "40 rpm", "recommend.weight_step": "60 kN",
+           "simulation.duration": "5 s", "simulation.accuracy": "fast"},
+    )  # fmt: skip
+    speeds = window(land).speed.values
+    assert speeds[-1] == pytest.approx(200.0 * units.RPM)  # it turns 220 rpm at most
 
 
 def line(words, own=3.0):

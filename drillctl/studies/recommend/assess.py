@@ -21,6 +21,7 @@ from drillctl.studies.recommend import candidates as c
 from drillctl.studies.recommend.criteria import (
     Criterion,
     LoopFigures,
+    drive_of,
     limit_criterion,
     loop_criteria,
     loop_figures,
@@ -198,7 +199,7 @@ def _fragile(one: Assessed) -> Iterable[str]:
         yield "modes grow that are too high for the elements to follow, and were not counted"
     whole = one.loop.whole
     if whole is not None and whole.delay < asked.fragile_delay:
-        more = own_delay(one.design.tables.controller.drive)
+        more = own_delay(drive_of(one.design))
         yield (
             f"it bears {1e3 * whole.delay:.2g} ms more delay than the {1e3 * more:.2g} ms of the "
             "drive as described"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
-from drillctl.design import Design
+from drillctl.design import Design, parts
 from drillctl.errors import InputError
 from drillctl.linear.ends import bit_side, ends_of
 from drillctl.linear.loop_analysis import tolerated_slope
@@ -111,6 +111,12 @@ def _margins(design: Design, slope: float, speed: float) -> Margins:
     return margins(ends, drive, bit, poles, followed(design.string.parts))
 
 
+def drive_of(design: Design) -> DriveTable:
+    """The drive of a design, with the limits of its motors."""
+    drive: DriveTable = parts.drive_of(design.tables)
+    return drive
+
+
 def own_delay(drive: DriveTable) -> float:
     """Delay and lags (s) that a drive has: samples, motor, encoder, filter of the torque."""
     late = drive.sampling_period * (1.5 if drive.one_sample_delay else 0.5)
@@ -162,7 +168,7 @@ def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Cri
     no_slope = math.isnan(one.slope_margin)
     ratio = math.inf if one.slope <= 0.0 < one.slope_margin else one.slope_margin / one.slope
     without = one.problem or f"unstable even without falling friction, in {mode}"
-    own = own_delay(design.tables.controller.drive) if asked.delay is None else asked.delay
+    own = own_delay(drive_of(design)) if asked.delay is None else asked.delay
     delay = None if one.whole is None else one.whole.delay
     peak = None if one.part is None else one.part.peak_sensitivity
     peak_at = None if one.part is None else one.part.peak_sensitivity_hz

@@ -13,7 +13,7 @@ from drillctl.design import Design
 from drillctl.ensemble.cases import share_interval
 from drillctl.errors import InputError
 from drillctl.studies.recommend.assess import Assessed, drawn
-from drillctl.studies.recommend.criteria import loop_criteria, loop_figures, own_delay
+from drillctl.studies.recommend.criteria import drive_of, loop_criteria, loop_figures, own_delay
 from drillctl.studies.recommend.deeper import at_depth, depth_of
 from drillctl.studies.recommend.window import SPEED, WEIGHT
 
@@ -75,7 +75,7 @@ def _changes(one: Assessed) -> Iterator[str]:
         yield f"speed up by {units.full(STEPS[more] * speed, 'rad/s', 7)} makes it pass"
     if less is not None:
         yield f"weight down by {units.full(STEPS[less] * weight, 'N', 5)} makes it pass"
-    late = own_delay(design.tables.controller.drive)
+    late = own_delay(drive_of(design))
     if late > 0.0 and (bears := _borne(design)) < late:
         yield (
             f"without the {1e3 * late:.3g} ms of delay and lags of the drive the loop bears "

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import bisect
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl import units
 from drillctl.arrays import Array, Mask
 from drillctl.design import Design
 from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.sweeps import sweep
+from drillctl.errors import InputError
+from drillctl.simulation.lanes import lane_numbers
 from drillctl.simulation.measures import STATUSES
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
@@ -119,22 +122,31 @@ def window(design: Design) -> Window:
     Whole grids and no bracketing: lanes are cheap, and what sticks need not do so monotonically. An
     interval is reported only as far as nothing sticks in between.
     """
-    asked = design.tables.recommend
-    speed = _line(design, SPEED, "rad/s", design.speed, asked.speed_step, lambda value: value)
-    low, high = design.table_range
-
-    def inside(values: Array) -> Array:
-        return values[(values >= low) & (values <= high)]
-
-    own = design.tables.operating_point.weight_on_bit
-    return Window(speed, _line(design, WEIGHT, "N", own, asked.weight_step, inside))
+    asked, point = design.tables.recommend, design.tables.operating_point
+    speed = _line(design, SPEED, "rad/s", point.speed, asked.speed_step)
+    return Window(speed, _line(design, WEIGHT, "N", point.weight_on_bit, asked.weight_step))
 
 
-def _line(
-    design: Design, path: str, unit: str, own: float, step: float, inside: Callable[[Array], Array]
-) -> Line:
+def _line(design: Design, path: str, unit: str, own: float, step: float) -> Line:
     steps = np.arange(1.0, max(2, math.ceil(AS_FAR * own / step)) + 1.0) * step
-    values = np.unique(np.round(np.append(inside(steps), own), 12))
+    if path == WEIGHT:
+        low, high = design.table_range
+        steps = steps[(steps >= low) & (steps <= high)]
+    values = np.unique(np.round(np.append(steps, own), 12))
     values = values[np.append(np.diff(values) > 1e-6 * step, True)]
+    values = values[: _possible(design, path, values)]
     result = sweep(design, (Axis(path, unit, values),), audit_cells=0, measures=("j1",))
     return Line(path, unit, own, values, result.j1, result.status)
+
+
+def _possible(design: Design, path: str, values: Array) -> int:
+    """How many of rising values a design may have: a drive ends at a speed, and at a torque."""
+
+    def refused(value: float) -> bool:
+        try:
+            lane_numbers(design.replace({path: units.SI(float(value))}))
+        except InputError:
+            return True
+        return False
+
+    return bisect.bisect_left(range(len(values)), True, key=lambda k: refused(values[k]))

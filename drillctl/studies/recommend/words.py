@@ -10,7 +10,7 @@ from drillctl.design import Design, parameter
 from drillctl.store.tables import percent
 from drillctl.studies.recommend.assess import FAILS, FRAGILE, Assessed
 from drillctl.studies.recommend.candidates import NAMES, PRESENT
-from drillctl.studies.recommend.criteria import Criterion, mode_at
+from drillctl.studies.recommend.criteria import Criterion, drive_of, mode_at
 
 if TYPE_CHECKING:
     from drillctl.studies.recommend.compute import Recommendation
@@ -38,7 +38,7 @@ def numbers_of(one: Assessed) -> str:
 
 def rated(design: Design) -> tuple[float | None, float | None]:
     """Rated torque (N m) and speed (rad/s) that per-unit numbers are of; None where unknown."""
-    asked, drive = design.tables.recommend, design.tables.controller.drive
+    asked, drive = design.tables.recommend, drive_of(design)
     torque = asked.rated_torque or drive.continuous_torque or drive.torque_limit
     speed = asked.rated_speed or drive.maximum_speed or design.speed
     return torque, speed
