@@ -144,9 +144,9 @@ def _possible(design: Design, path: str, values: Array) -> int:
 
     def refused(value: float) -> bool:
         try:
-            lane_numbers(design.replace({path: units.SI(float(value))}))
+            lane_numbers(design.replace({path: units.SI(value)}))
         except InputError:
             return True
         return False
 
-    return bisect.bisect_left(range(len(values)), True, key=lambda k: refused(values[k]))
+    return bisect.bisect_left(range(len(values)), True, key=lambda k: refused(float(values[k])))
