@@ -155,6 +155,20 @@ def test_its_folder_holds_every_table_and_picture(ran):
         assert (ran.folder / name).stat().st_size > 2000
 
 
+def test_its_result_shows_itself(ran):
+    """At a prompt in ten lines, in a notebook with its first picture, as a table of its arrays."""
+    result = ran.result
+    lines = repr(result).splitlines()
+    assert 3 <= len(lines) <= 10
+    assert lines[0].startswith(f"{type(result).__name__}: ")
+    pictured = bool(list(ran.study.pictures(result)))
+    assert ('<img src="data:image/png' in result._repr_html_()) == pictured
+    if any(one.dims for one in result.data.data_vars.values()):
+        frame = result.to_dataframe()
+        assert len(frame) > 0
+        assert {*frame.columns} <= frame.attrs["units"].keys()
+
+
 OF_SI = re.compile(
     r"(?<![\w×])(?:[kM]?N|rad|kg|mm|k?J|[kM]?W|[kMG]?Pa)\b(?!-)|(?:[\d.] |[(\[]|re 1 )m(?![\w])"
 )
