@@ -15,7 +15,7 @@ from drillctl.reporting.sections.summary import _margins
 from drillctl.simulation import simulate
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.recommend import help as help_
-from drillctl.studies.recommend.assess import FAILS, FRAGILE, PASSES, best_of, drawn
+from drillctl.studies.recommend.assess import FAILS, FRAGILE, PASSES, best_of
 from drillctl.studies.recommend.candidates import (
     ROBUST,
     by_rules,
@@ -35,6 +35,7 @@ from drillctl.studies.recommend.criteria import (
 from drillctl.studies.recommend.deeper import at_depth, depth_of
 from drillctl.studies.recommend.window import Line, window
 from drillctl.studies.recommend.words import detail, in_drive_units, numbers_of, others
+from drillctl.studies.tune.certificate import FreshDraws
 from drillctl.studies.tune.search import search
 
 HOLDS = (
@@ -70,10 +71,12 @@ def result(design):
 
 def test_the_robust_gains_are_those_of_tune(design, result):
     robust = next(one for one in result.candidates if one.name == ROBUST)
-    assert robust.gains == search(design).gains
-    j1, _ = drawn(robust.design)
-    assert np.array_equal(j1, robust.j1)
-    assert robust.probability == np.mean(j1 <= design.tables.tune.level)
+    found = search(design)
+    assert robust.gains == found.gains
+    _, runs = FreshDraws(design, found.tuned).of_gains(found.values)
+    assert np.array_equal(runs.j1, robust.j1)
+    assert (robust.probability, robust.interval) == (runs.probability, runs.interval)
+    assert robust.objective == runs.value
 
 
 def test_a_window_ends_where_single_runs_stick(result):

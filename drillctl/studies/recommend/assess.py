@@ -109,13 +109,8 @@ class Assessed:
 
 def best_of(some: Iterable[Assessed]) -> Assessed:
     """The setting that is recommended among some."""
-    ranks = {PASSES: 0, FRAGILE: 1, FAILS: 2}
-
-    def key(one: Assessed) -> tuple[float, ...]:
-        rank = ranks[one.verdict]
-        return (rank, *one.badness) if rank == 2 else (rank, one.objective)
-
-    return min(some, key=key)
+    ranks = (PASSES, FRAGILE, FAILS)
+    return min(some, key=lambda one: (ranks.index(one.verdict), *one.badness))
 
 
 def assessed(one: c.Candidate, design: Design) -> Assessed:
