@@ -27,6 +27,7 @@ from drillctl.design.tables import SimulationTable
 from drillctl.errors import SimulationError
 from drillctl.progress import SILENT, Progress, Silent
 from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.well.wall import Wall
 from drillctl.simulation.batch import Prepared, new_watch, prepare, run_batch
 from drillctl.simulation.lanes import kinds, lane_numbers, lanes_of, timed
 from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES
@@ -325,7 +326,7 @@ def by_batch(designs: Sequence[Design]) -> list[tuple[dict[str, float], ...]]:
         lanes = lanes_of(design, {k: np.array([one[k] for one in numbers]) for k in numbers[0]})
         table = design.tables.simulation
         own = prepare(lanes, table)
-        for prepared in (own, refined(design.string, table, own, PARTS)):
+        for prepared in (own, refined(design.string, table, own, PARTS, design.wall)):
             ran = run_batch(lanes, prepared)
             for lane, place in enumerate(places):
                 values = {name: float(column[lane]) for name, column in ran.measures.items()}
@@ -355,7 +356,10 @@ def by_reference(design: Design, progress: Progress = SILENT) -> dict[str, float
     return values | {"status": float(STATUSES.index(ran.status))}
 
 
-def refined(string: Drillstring, table: SimulationTable, prepared: Prepared, parts: int) -> Any:
+def refined(
+    string: Drillstring, table: SimulationTable, prepared: Prepared, parts: int,
+    wall: Wall | None = None,
+) -> Any:  # fmt: skip
     """The same run with each step in parts, and as many times the modes."""
     if parts == 1:
         return prepared
@@ -364,5 +368,5 @@ def refined(string: Drillstring, table: SimulationTable, prepared: Prepared, par
     followed = int((string.undamped_modes[0] * step <= ACCURACIES[table.accuracy].phase).sum())
     modes = min(string.nodes, max(parts * old.modes, followed))
     scheme = Scheme(step, parts * old.steps, modes, parts * old.sampling)
-    stepper = string_step(string, step, modes)
+    stepper = string_step(string, step, modes, wall)
     return Prepared(stepper, scheme, prepared.duration, prepared.j1_from)

@@ -230,7 +230,9 @@ def _key(runs: list[Run], names: tuple[str, ...], give_up: float) -> str:
     for lanes, prepared, at in runs:
         laws = (lanes.friction, lanes.drive, lanes.weight, lanes.before, *lanes.program[:2])
         result.update(repr((prepared.scheme, prepared.duration, *map(type, laws))).encode())
-        for column in (at, lanes.set_speed, lanes.turning_speed, *(c for law in laws for c in law)):
+        wall = () if lanes.wall is None else lanes.wall.torque
+        own = (at, lanes.set_speed, lanes.turning_speed, *wall)
+        for column in (*own, *(c for law in laws for c in law)):
             result.update(np.asarray(column).tobytes())
     return result.hexdigest()
 
@@ -247,9 +249,10 @@ def _string_arrays(prepared: Prepared) -> dict[str, Any]:
 
 
 def _string_from(held: dict[str, Any]) -> Prepared:
-    from drillctl.simulation.kernels.string_step import BlockString, DenseString, UndampedString
+    from drillctl.simulation.kernels import string_step as s
 
-    kinds = {kind.__name__: kind for kind in (UndampedString, BlockString, DenseString)}
+    forms = (s.UndampedString, s.BlockString, s.DenseString, s.WallString)
+    kinds = {kind.__name__: kind for kind in forms}
     kind = kinds[str(held["kind"])]
     string = kind(**{name: _number(held[f"kernel.{name}"]) for name in kind._fields})
     scheme = StringScheme(

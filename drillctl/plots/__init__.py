@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from drillctl.plots.uncertainty import sensitivity_bars as sensitivity_bars
     from drillctl.plots.uncertainty import uncertain_regions as uncertain_regions
     from drillctl.plots.well import friction_sweep as friction_sweep
+    from drillctl.plots.well import sticking as sticking
     from drillctl.plots.well import torque_drag as torque_drag
 
 _MODULES = {
@@ -99,7 +100,7 @@ _MODULES = {
         "sensitivity_bars",
         "uncertain_regions",
     ),
-    "well": ("friction_sweep", "torque_drag"),
+    "well": ("friction_sweep", "sticking", "torque_drag"),
 }
 
 __all__ = [name for names in _MODULES.values() for name in names]

@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from drillctl import units
+from drillctl.errors import InputError
 from drillctl.plots import style
 
 if TYPE_CHECKING:
+    from drillctl.simulation import Simulation
     from drillctl.studies.torque_drag.compute import TorqueDrag
 
 _LABELS = {
@@ -76,4 +79,28 @@ def friction_sweep(
     for panel in (left, right):
         panel.axvline(result.friction_factor, color=style.BLACK, linewidth=0.8, linestyle=":")
     left.legend(fontsize=style.SMALL, frameon=False)
+    return figure
+
+
+@style.picture(result="Of a string on which the wall rubs.", raises="The wall does not rub.")
+def sticking(
+    result: Simulation, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
+    """Parts of the string that the wall holds, over depth and time; the length that it holds."""
+    if result.wall_stuck is None or result.wall_depth is None:
+        raise InputError("the wall does not rub in this run", "well.friction_factor")
+    figure, (upper, lower) = style.grid_or_new(ax, 2, 1, 8.0, 5.6, share_x=True)
+    depth, unit = units.displayed(result.wall_depth, "m", system)
+    stuck = result.wall_stuck[:-1].T
+    colours = ListedColormap(["#FFFFFF", "#777777"])
+    upper.pcolormesh(
+        result.time, depth, stuck, cmap=colours, vmin=0.0, vmax=1.0, rasterized=True,
+        shading="flat",
+    )  # fmt: skip
+    upper.set_ylim(float(depth[-1]), float(depth[0]))
+    style.dress(upper, "", f"measured depth ({unit})", "grey: held by the wall")
+    length, _ = units.displayed(result.signals["stuck_length"], "m", system)
+    lower.plot(result.time, length, color=style.BLUE, linewidth=1.0)
+    lower.set_xlim(0.0, float(result.time[-1]))
+    style.dress(lower, "time (s)", f"length held ({unit})")
     return figure

@@ -42,18 +42,18 @@ class EnergyAudit:
     damping: float
     stored: float  # change of kinetic plus elastic energy
     hook: float = 0.0  # work of hook and weight of the string, of a rig with axial motion
+    wall: float = 0.0  # work taken by the friction of the wall, but for that at the bit
 
     @property
     def residual(self) -> float:
         """What does not balance (J)."""
-        return self.drive + self.hook - self.bit - self.damping - self.stored
+        return self.drive + self.hook - self.bit - self.damping - self.stored - self.wall
 
     @property
     def relative_residual(self) -> float:
         """The residual over the largest of the terms; 0 for a run without any work."""
-        largest = max(
-            abs(self.drive), abs(self.hook), abs(self.bit), abs(self.damping), abs(self.stored)
-        )
+        terms = (self.drive, self.hook, self.bit, self.damping, self.stored, self.wall)
+        largest = max(map(abs, terms))
         return abs(self.residual) / largest if largest > 0.0 else 0.0
 
     def summary(self) -> dict[str, float]:
@@ -64,6 +64,7 @@ class EnergyAudit:
             "damping": self.damping,
             "stored": self.stored,
             "hook": self.hook,
+            "wall": self.wall,
             "relative_residual": self.relative_residual,
         }
 

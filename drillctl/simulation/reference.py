@@ -135,6 +135,12 @@ class Motion:
         first, last = self.bit_angle(np.array([begin, end]))
         return float(last - first) / (end - begin) + self.design.speed
 
+    def wall_stuck(self, time: Array) -> Array:
+        """1 where the wall holds a node, the bit last, at times (s), shape (times, nodes)."""
+        piece = np.minimum(np.searchsorted(self.ends, time), len(self.ends) - 1)
+        modes = np.column_stack([self.pieces[:, 4:], self.directions])
+        return (modes[piece] == 0.0).astype(float)
+
     def states(self, time: Array) -> Array:
         """Angles and speeds in the frame at times (s), shape (2 nodes, times), of `solve_whole`."""
         size = 2 * self.design.string.nodes
@@ -202,7 +208,7 @@ def _run(
         changes=clock.changes[: count[r.CHANGES]],
         crossings=clock.crossings[: count[r.CROSSINGS]],
         extremes=clock.extremes[: count[r.EXTREMES]],
-        energy=_audit(design, numbers.arrays["begin"], state),
+        energy=_audit(design, numbers.arrays["begin"], state, float(rig["wall_work"][0])),
         tolerance=tolerance,
         method="Rodas5P" if stiff else "DOP853",
         steps=int(rig["steps"][0]),
@@ -216,7 +222,8 @@ def _clock(design: Design, numbers: Numbers, tolerance: float) -> Any:
     return r.Clock(
         tolerance, design.tables.simulation.duration, 0, numbers.kept,
         np.array(design.program.breaks()), np.zeros(8), np.zeros(7, dtype=np.int64),
-        np.zeros((64, 4)), np.zeros((64, 4)), np.zeros((256, 2)), np.zeros((1024, 2)),
+        np.zeros((64, 4 + max(int(numbers.rig["wall_nodes"][0]), 0))), np.zeros((64, 4)),
+        np.zeros((256, 2)), np.zeros((1024, 2)),
     )  # fmt: skip
 
 
@@ -243,7 +250,7 @@ def _with_room(numbers: Numbers, clock: Any) -> Any:
     )
 
 
-def _audit(design: Design, before: Array, after: Array) -> EnergyAudit:
+def _audit(design: Design, before: Array, after: Array, wall: float) -> EnergyAudit:
     """Energy balance between the first and the final state."""
     string, nodes = design.string, design.string.nodes
 
@@ -253,7 +260,7 @@ def _audit(design: Design, before: Array, after: Array) -> EnergyAudit:
         return float(kinetic + 0.5 * angle @ (string.stiffness @ angle))
 
     drive, bit, damping = (float(w) for w in after[2 * nodes : 2 * nodes + 3])
-    return EnergyAudit(drive, bit, damping, stored(after) - stored(before))
+    return EnergyAudit(drive, bit, damping, stored(after) - stored(before), wall=wall)
 
 
 # Explicit or stiff steps.
@@ -271,6 +278,8 @@ TURNS = 60  # of the power iteration: the fastest mode within a few per cent
 def is_stiff(design: Design, rig: Any) -> bool:
     """Whether explicit steps would follow modes that have died out long before."""
     if rig["tolerance"][0] > 0.0 or rig["full"][0] or not rig["damped"][0]:
+        return False
+    if rig["wall_nodes"][0] >= 0:  # nodes that stick are in no Jacobian
         return False
     if rig["turns"][0] > 0.0:  # torques that follow the angle are in no Jacobian
         return False
@@ -318,7 +327,13 @@ def numbers_of(design: Design, also_kept: NDArray[np.integer[Any]] | None = None
     arrays |= _string_arrays(design.string, design.speed)
     numbers, arrays["path"] = _variation_of(design)
     plain |= numbers
-    arrays |= {"begin": np.zeros(size), "tape": np.empty((ROOM, f.FIRST + 8 * (len(kept) + 2)))}
+    numbers, arrays["wall"] = _wall_of(design)
+    plain |= numbers
+    components = len(kept) + (3 if plain["wall_nodes"] > 0 else 2)
+    arrays |= {
+        "begin": np.zeros(size), "scratch": np.zeros(size),
+        "tape": np.empty((ROOM, f.FIRST + 8 * components)),
+    }  # fmt: skip
     damping = design.string.damping.tocoo()
     rig = np.zeros(1, dtype=f.RIG)
     for name, value in {
@@ -328,7 +343,7 @@ def numbers_of(design: Design, also_kept: NDArray[np.integer[Any]] | None = None
         "damped": not design.string.undamped,
         "full": bool(np.any(np.abs(damping.row - damping.col) > 1)),
         "coupled": bool(np.any(arrays["bands"][f.SIDE_MASS])),
-        **addresses(), "components": len(kept) + 2,
+        **addresses(), "components": components,
         "set_speed": design.speed,
         "drag": float(design.string.ground_damping.sum()) * design.speed,
     }.items():  # fmt: skip
@@ -401,7 +416,8 @@ def _laws_of(design: Design) -> tuple[dict[str, Any], dict[str, Array]]:
         "drive_torque": address(drive, "torque") if drive_kind == f.IDEAL else 0,
         "rock_torque": address(rocks[1], "torque_and_slope"),
         "static_torque": address(rocks[1], "static_torque"),
-        "set_valued": bool(design.bit_rock.set_valued),
+        "set_valued": bool(design.bit_rock.set_valued) or design.wall is not None,
+        "smooth": not (design.bit_rock.set_valued or tolerance > 0.0),
         "weight_kind": weight_kind,
         "weight": address(weight, method),
         "observer_states": observer.shape[1],
@@ -409,6 +425,22 @@ def _laws_of(design: Design) -> tuple[dict[str, Any], dict[str, Array]]:
         "rock_until": float(program.rock_until),
     }
     return plain, {"laws": laws, "observer": np.ascontiguousarray(observer)}
+
+
+def _wall_of(design: Design) -> tuple[dict[str, Any], Array]:
+    """Friction of the wall at the bit and at other nodes; -1 nodes where there is none at all."""
+    from drillctl.simulation import reference_wall as w
+
+    one = design.wall
+    if one is None:
+        return {"wall_nodes": -1}, np.zeros((w.ROWS, 1))
+    table = np.zeros((w.ROWS, max(len(one.nodes) - 1, 1)))
+    table[w.NODE, : len(one.nodes) - 1] = one.nodes[:-1]
+    table[w.FRICTION, : len(one.nodes) - 1] = one.torque[:-1]
+    return {
+        "wall_nodes": len(one.nodes) - 1, "bit_friction": float(one.torque[-1]), "bit_level": 1.0,
+        "wall_ratio": one.ratio, "wall_critical": one.critical,
+    }, table  # fmt: skip
 
 
 def _variation_of(design: Design) -> tuple[dict[str, Any], Array]:

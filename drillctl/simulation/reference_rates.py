@@ -26,6 +26,7 @@ from drillctl.rig.program import MOST_RAMPS, Ramp
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.top_drive.real_drive import MEMORY, SAMPLED_MEMORY, respond, respond_held, sample
 from drillctl.simulation import kernel_cache
+from drillctl.simulation import reference_wall as wall
 from drillctl.simulation.law_calls import (
     CALL,
     OPTIONS,
@@ -72,11 +73,11 @@ With lumped masses and no damping exactly nothing does, but for rounding.
 WHOLE_NUMBERS = (
     "nodes", "states", "drive_states", "weight_states", "observer_states",
     "damped", "coupled", "full",  # damping at all; M more than a diagonal; C no band
-    "drive_kind", "drive_torque", "rock_torque", "static_torque", "set_valued",
+    "drive_kind", "drive_torque", "rock_torque", "static_torque", "set_valued", "smooth",
     "weight_kind", "weight",  # addresses of `law_calls` among them
     "rates", "margin", "decision", "weighing",  # addresses of what is compiled by itself
     "bands", "full_damping", "laws", "observer", "begin", "tape", "path",  # addresses of arrays
-    "path_nodes",
+    "path_nodes", "wall", "wall_nodes", "scratch",
     "components", "steps",  # kept of each step; on the tape
 )  # fmt: skip
 NUMBERS = (
@@ -90,6 +91,13 @@ NUMBERS = (
     "advance",
     "turns",
     "drag",  # torque of all damping to ground at the set speed (N m)
+    # friction of the wall: at the bit (N m), the share of it that is left now; beyond which speed
+    # (rad/s) what is left; work of the wall elsewhere (J)
+    "bit_friction",
+    "bit_level",
+    "wall_critical",
+    "wall_ratio",
+    "wall_work",
 )
 RIG = np.dtype([(name, np.int64) for name in WHOLE_NUMBERS] + [(name, float) for name in NUMBERS])
 """A rig as the solver knows it: plain numbers, and where its arrays lie.
@@ -208,6 +216,18 @@ def band(rig: Any, row: int) -> Any:
 def law(rig: Any, row: int) -> Any:
     """A row of `laws`."""
     return numba.carray(_pointer(rig.laws + 8 * row * MOST_NUMBERS), (MOST_NUMBERS,))
+
+
+@compiled
+def wall_of(rig: Any) -> Any:
+    """The table of the nodes at which the wall rubs, the bit aside."""
+    return numba.carray(_pointer(rig.wall), (wall.ROWS, rig.wall_nodes))
+
+
+@compiled
+def scratch_of(rig: Any) -> Any:
+    """Room for rates that nobody keeps."""
+    return numba.carray(_pointer(rig.scratch), (rig.states,))
 
 
 @compiled
@@ -579,8 +599,11 @@ def friction(rig: Any, time: float, state: Any, speed: float) -> float:
 def static_torque(rig: Any, time: float, state: Any) -> float:
     """Largest torque on a bit at rest (N m)."""
     load = weight(rig, time, 0.0, state)
-    torque = _static_law(rig, _rock(rig, time), load, 0.0, 0.0, 0.0)
-    return rock_factor(rig, time, state) * torque
+    if rig.smooth:
+        torque = _rock_law(rig, _rock(rig, time), load, 0.0, 0.0, 0.0)
+    else:
+        torque = _static_law(rig, _rock(rig, time), load, 0.0, 0.0, 0.0)
+    return rock_factor(rig, time, state) * torque + rig.bit_friction
 
 
 @compiled
@@ -594,7 +617,8 @@ def slip_torque(rig: Any, time: float, state: Any, phase: int) -> float:
     direction = float(phase)
     if not rig.set_valued and rig.tolerance == 0.0:
         direction = 1.0 if speed >= 0.0 else -1.0
-    return direction * friction(rig, time, state, direction * speed)
+    of_wall = rig.bit_level * rig.bit_friction
+    return direction * (friction(rig, time, state, direction * speed) + of_wall)
 
 
 # The drive.
@@ -650,6 +674,8 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
     for i in range(n):
         rates[i] = state[n + i]
     _forces(rig, state, force)
+    if rig.wall_nodes > 0:
+        wall.push_wall(wall_of(rig), force)
     at_bit, bit_torque, count = force[n - 1], 0.0, n - 1
     if not held:
         bit_torque, count = slip_torque(rig, time, state, phase), n
@@ -661,6 +687,8 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
     top_torque = drive_torque(rig, time, state, force[0], by_top[0], rates)
     for i in range(n):
         force[i] += by_top[i] * top_torque
+    if rig.wall_nodes > 0:
+        wall.hold_wall(wall_of(rig), band(rig, SIDE_MASS), force)
     if held:
         bit_torque = at_bit - band(rig, SIDE_MASS)[n - 2] * force[n - 2]
     rates[2 * n] = top_torque * (state[n] + rig.set_speed)
@@ -669,6 +697,23 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
     if rig.weight_states:
         weight_rates(rig, time, state, top_torque, rates)
     return bit_torque
+
+
+@compiled
+def factorise_anew(rig: Any) -> None:
+    """Factors of the masses, and accelerations per torque at the top, for the nodes that slide."""
+    n = rig.nodes
+    if rig.wall_nodes < 1:  # the bit alone: the factors have room for it held and free
+        return
+    wall.factorise(
+        wall_of(rig), band(rig, MASS), band(rig, SIDE_MASS), band(rig, FACTOR), band(rig, PIVOT)
+    )
+    for row in (HELD_TOP, FREE_TOP):
+        by_top = band(rig, row)
+        for i in range(n):
+            by_top[i] = 0.0
+        by_top[0] = 1.0
+        _accelerate(rig, by_top, n - 1 if row == HELD_TOP else n)
 
 
 def factorised(bands: Array) -> Array:

@@ -17,6 +17,7 @@ from drillctl.rig.top_drive import SampledDrive
 from drillctl.simulation import reference_rates as f
 from drillctl.simulation import reference_steps as s
 from drillctl.simulation import reference_stiff as stiff_steps
+from drillctl.simulation import reference_wall as wall
 from drillctl.simulation.law_calls import STATE, on_disk
 
 LONGEST_STEP = 0.05  # longest step (s): a touch of zero speed shorter than that could go unseen
@@ -210,6 +211,8 @@ def _margin(rig: Any, time: float, phase: int, which: int, torque: float, state:
     Exactly zero is where the phase came from, in a step too short to move the bit.
     """
     tiny = 1e-300
+    if which == 1 and rig.wall_nodes >= 0:
+        return _wall_margin(rig, time, phase, state)
     if which == 1 and phase not in (f.CREEPING, f.PUSHED):
         return 1.0
     if phase == f.STUCK:
@@ -230,8 +233,104 @@ def _margin(rig: Any, time: float, phase: int, which: int, torque: float, state:
 
 
 @f.compiled
+def _wall_margin(rig: Any, time: float, phase: int, state: Any) -> float:
+    """What is left until some node of the wall changes, the bit's critical speed among that."""
+    n, table, least = rig.nodes, f.wall_of(rig), 1.0
+    if rig.wall_nodes > 0:
+        f.rates_of(rig, time, phase, state, f.scratch_of(rig))
+    for k in range(rig.wall_nodes):
+        speed = state[n + int(table[wall.NODE, k])] + rig.set_speed
+        margin = wall.margin_of(table, k, speed, rig.wall_ratio, rig.wall_critical)
+        least = min(least, margin)
+    if abs(phase) == 1 and rig.wall_ratio < 1.0:
+        ahead = phase * f.bit_speed(rig, state)
+        away = rig.wall_critical - ahead if rig.bit_level == 1.0 else ahead - rig.wall_critical
+        least = min(least, away or 1e-300)
+    return least
+
+
+@f.compiled
+def _turn_wall(rig: Any, time: float, phase: int, state: Any) -> None:
+    """Change the nodes whose margins are used up, at least the one that has the least left."""
+    n, table = rig.nodes, f.wall_of(rig)
+    ratio, critical, count = rig.wall_ratio, rig.wall_critical, rig.wall_nodes
+    if count > 0:
+        f.rates_of(rig, time, phase, state, f.scratch_of(rig))
+    # An event that was located to the last bit looks like the place that a node came from: the one
+    # with the least left changes in any case.
+    least = _wall_margin(rig, time, phase, state)
+    for k in range(count):
+        i = n + int(table[wall.NODE, k])
+        speed = state[i] + rig.set_speed
+        margin = wall.margin_of(table, k, speed, ratio, critical)
+        if margin <= least or (margin <= wall.SAME and margin != 1e-300):
+            stuck = table[wall.MODE, k] == 0.0
+            exact = wall.turn_node(table, k, speed, ratio, critical)
+            if not stuck:
+                state[i] = exact - rig.set_speed
+    if abs(phase) == 1 and ratio < 1.0:
+        ahead = phase * f.bit_speed(rig, state)
+        if abs(ahead - critical) <= max(abs(least), wall.SAME):
+            rig.bit_level = ratio if rig.bit_level == 1.0 else 1.0
+            state[2 * n - 1] = phase * critical - rig.set_speed
+
+
+@f.compiled
+def _settle(rig: Any, time: float, phase: int, state: Any) -> int:
+    """Make the sets of nodes that stick, the bit among them, agree with the torques; the phase."""
+    n, table, rates = rig.nodes, f.wall_of(rig), f.scratch_of(rig)
+    for _ in range(wall.MOST_TURNS):
+        f.factorise_anew(rig)
+        holding = f.rates_of(rig, time, phase, state, rates)
+        changed = False
+        for k in range(rig.wall_nodes):
+            i = int(table[wall.NODE, k])
+            push = f.band(rig, f.MASS)[i] * rates[n + i]
+            if wall.settle_node(table, k, state[n + i] + rig.set_speed, push):
+                changed = True
+        static = f.static_torque(rig, time, state)
+        if phase == f.STUCK and abs(holding) > static * (1.0 + 1e-12):
+            phase, changed = 1 if holding > 0.0 else -1, True
+        if not changed:
+            break
+    f.factorise_anew(rig)
+    return phase
+
+
+@f.compiled
+def _begin_wall(rig: Any, state: Any) -> None:
+    """Nodes at rest stick, others slide."""
+    table = f.wall_of(rig)
+    for k in range(rig.wall_nodes):
+        speed = state[rig.nodes + int(table[wall.NODE, k])] + rig.set_speed
+        table[wall.MODE, k] = 0.0 if speed == 0.0 else math.copysign(1.0, speed)
+        slow = abs(speed) <= rig.wall_critical
+        table[wall.LEVEL, k] = 1.0 if slow else rig.wall_ratio
+    slow = abs(f.bit_speed(rig, state)) <= rig.wall_critical
+    rig.bit_level = 1.0 if slow else rig.wall_ratio
+    f.factorise_anew(rig)
+
+
+@f.compiled
 def _decide(rig: Any, time: float, phase: int, what: int, state: Any, unused: Any) -> int:
-    """What happens between two pieces; returns the phase that follows.
+    """What happens between two pieces, the nodes of the wall included; the phase that follows."""
+    if rig.wall_nodes < 0:
+        return _decide_bit(rig, time, phase, what, state, unused)
+    if what == BEGIN_RUN:
+        _begin_wall(rig, state)
+    if what == BY_WALL:
+        _turn_wall(rig, time, phase, state)
+        f.factorise_anew(rig)
+        return _settle(rig, time, phase, state)
+    after = _decide_bit(rig, time, phase, what, state, unused)
+    if after != phase and what != BEGIN_RUN:
+        rig.bit_level = 1.0
+    return _settle(rig, time, after, state)
+
+
+@f.compiled
+def _decide_bit(rig: Any, time: float, phase: int, what: int, state: Any, unused: Any) -> int:
+    """What happens to the bit between two pieces; returns the phase that follows.
 
     A bit that came to rest sticks if the rock can hold it. A bit that was stuck may be loose at
     once after a stop, by a jump of weight or torque.
@@ -261,7 +360,7 @@ def _decide(rig: Any, time: float, phase: int, what: int, state: Any, unused: An
     return 1 if holding > 0.0 else -1
 
 
-BEGIN_RUN, AT_STOP, BY_ITSELF = range(3)  # what there is to decide
+BEGIN_RUN, AT_STOP, BY_ITSELF, BY_WALL = range(4)  # what there is to decide
 _MARGIN = (types.float64, types.int64, types.int64, types.float64, STATE)
 _DECISION = (types.float64, types.int64, types.int64, STATE, STATE)
 _margin_of, _decided = f.by_address("margin", *_MARGIN), f.by_address("decision", *_DECISION)
@@ -343,6 +442,11 @@ def _begin_piece(rig: Any, method: Any, clock: Any, work: Any, state: Any) -> No
     for which in range(2):
         now[MARGINS + which] = _margin_of(rig, time, phase, which, torque, state)
     clock.pieces[clock.count[PIECES], 3] = rig.steps
+    if rig.wall_nodes > 0:
+        table = f.wall_of(rig)
+        for k in range(rig.wall_nodes):
+            clock.pieces[clock.count[PIECES], 4 + k] = table[wall.MODE, k]
+            table[wall.ANGLE, k] = state[int(table[wall.NODE, k])]
     clock.count[IN_PIECE] = 1
 
 
@@ -352,18 +456,19 @@ def _longest(phase: int) -> float:
 
 
 @f.compiled
-def _end_piece(rig: Any, clock: Any, work: Any, state: Any, by_itself: bool) -> None:
+def _end_piece(rig: Any, clock: Any, work: Any, state: Any, what: int) -> None:
     """Close a piece, and go over to the next phase."""
     count, time = clock.count, clock.now[TIME]
     phase, piece = count[PHASE], clock.pieces[count[PIECES]]
     piece[0], piece[1], piece[2] = clock.now[PIECE_BEGIN], time, phase
     count[PIECES] += 1
     count[IN_PIECE] = 0
+    if rig.wall_nodes > 0:
+        _add_work(rig, time - piece[0], state)
     if time >= clock.duration:
         return
-    what = BY_ITSELF if by_itself else AT_STOP
     after = int(_decided(rig, time, phase, what, state, work.trial))
-    if after == phase and not by_itself:
+    if after == phase and what != BY_ITSELF:
         return
     count[PHASE] = after
     change, direction = clock.changes[count[CHANGES]], direction_of(after)
@@ -371,6 +476,16 @@ def _end_piece(rig: Any, clock: Any, work: Any, state: Any, by_itself: bool) -> 
     # A change between two phases of a bit that counts as stuck is none for the user.
     change[3] = direction != 0 or direction_of(phase) != 0
     count[CHANGES] += 1
+
+
+@f.compiled
+def _add_work(rig: Any, length: float, state: Any) -> None:
+    """Work of the wall in a piece: torques that stayed, times angles."""
+    table = f.wall_of(rig)
+    for k in range(rig.wall_nodes):
+        turned = state[int(table[wall.NODE, k])] - table[wall.ANGLE, k] + rig.set_speed * length
+        torque = table[wall.MODE, k] * table[wall.LEVEL, k] * table[wall.FRICTION, k]
+        rig.wall_work += torque * turned
 
 
 @f.compiled
@@ -436,8 +551,8 @@ def _try_step(
 def _keep_step(
     rig: Any, method: Any, solver: Any, clock: Any, work: Any, sums: Any, state: Any, step: float,
     torque: float,
-) -> bool:  # fmt: skip
-    """Record a step and its events, move on; whether the phase ended by itself."""
+) -> int:  # fmt: skip
+    """Record a step and its events, move on; how the phase ended, `AT_STOP` if it did not."""
     now, phase, last = clock.now, clock.count[PHASE], 2 * rig.nodes - 1
     time = now[TIME]
     if solver is None:
@@ -445,8 +560,13 @@ def _keep_step(
     row = f.tape_row(rig, rig.steps)
     summed = sums[0 if f.is_held(phase) else 1]
     s.record(method.dense, work, time, step, state, summed, clock.kept, row)
+    if rig.wall_nodes > 0:  # which holds nodes of the wall, no sum tells the bit's torque
+        place = f.FIRST + 8 * (len(clock.kept) + 2)
+        for i in range(2, 8):
+            row[place + i] = 0.0
+        row[place], row[place + 1] = now[BIT_TORQUE], torque - now[BIT_TORQUE]
     rig.steps += 1
-    values, until = work.values, 2.0
+    values, until, what = work.values, 2.0, AT_STOP
     values[2], values[3] = state[last], work.stages[0, last]
     for which in range(2):
         values[which] = now[MARGINS + which]
@@ -461,20 +581,23 @@ def _keep_step(
         if which < 2 and until == 2.0:
             s.record(method.dense, work, time, step, state, work.none, work.every, work.whole)
         share = _locate(which, rig, work, row, phase, before, after)
-        if which < 2:
-            until = min(until, share)
+        if which < 2 and share < until:
+            until = share
+            what = BY_WALL if which == 1 and rig.wall_nodes >= 0 else BY_ITSELF
+        elif which < 2:
+            continue
         elif share <= until:
             _note(which, clock, row, share)
     if until <= 1.0:
         now[TIME] = time + until * step
         s.state_at(work, until, work.trial)
         f.copy(state, work.trial)
-        return True
+        return what
     now[TIME] = now[STOP] if step == now[STOP] - time else time + step
     f.copy(state, work.after)
     f.copy(work.stages[0], work.stages[s.STAGES])
     now[BIT_TORQUE] = torque
-    return False
+    return AT_STOP
 
 
 @f.uncounted
@@ -512,7 +635,7 @@ def advance(
         if step == 0.0:
             return TOO_SHORT
         ended = _keep_step(rig, method, solver, clock, work, sums, state, step, torque)
-        if ended or now[TIME] >= now[STOP]:
+        if ended != AT_STOP or now[TIME] >= now[STOP]:
             _end_piece(rig, clock, work, state, ended)
         if not math.isfinite(state[0]) or not math.isfinite(state[2 * rig.nodes - 1]):
             return NOT_FINITE

@@ -42,7 +42,9 @@ def torques_at(
             free = f.on_tape(row, sums, share) + end[0] - end[1] * rock
         gain = f.band(rig, f.HELD_TOP if held else f.FREE_TOP)[0]
         torque = f.drive_torque(rig, moment, state, free, gain, unused)
-        if held:
+        if held and rig.wall_nodes > 0:
+            rock = f.on_tape(row, sums + 2, share)
+        elif held:
             rock = f.on_tape(row, sums + 1, share) + ends[2, 0] + ends[2, 1] * torque
         speed = 0.0 if phase == f.STUCK else abs(f.bit_speed(rig, state))
         out[0, i], out[1, i], out[2, i] = torque, f.weight(rig, moment, speed, state), rock

@@ -16,6 +16,7 @@ from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design
 from drillctl.progress import SILENT, Progress
 from drillctl.rig.top_drive import RealDrive
+from drillctl.rig.well.wall import edges_of
 from drillctl.simulation import measures as m
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, stuck_between
 from drillctl.simulation.strain import section_peaks
@@ -44,12 +45,16 @@ SIGNALS = {
 }
 
 
+OF_WALL = {"stuck_length": ("m", "length of string that the friction of the wall holds")}
+"""Signals of a string on which the wall rubs."""
+
+
 def _unit(signal: str) -> str:
-    return SIGNALS[signal][0]
+    return (SIGNALS | OF_WALL)[signal][0]
 
 
 def _meaning(signal: str) -> str:
-    return SIGNALS[signal][1]
+    return (SIGNALS | OF_WALL)[signal][1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +78,13 @@ class Simulation(Result, kind="simulate"):
         unit="N*m", means="largest in each section whose torsional yield is known",
         default_factory=dict,
     )  # fmt: skip
+    wall_depth: Array | None = label(
+        "edge", unit="m", means="depths between which the string belongs to each node of the wall",
+        default=None,
+    )  # fmt: skip
+    wall_stuck: Array | None = label(
+        "time", "wall_node", means="1 while the wall holds a node, the bit last", default=None
+    )
 
     @property
     def share_of_yield(self) -> float | None:
@@ -133,6 +145,7 @@ def sample(motion: Motion, interval: float = 0.01, sections: bool = False) -> Si
     signals = fine_signals
     if len(time) != len(fine):
         signals = signals_of(time)
+    wall = {} if design.wall is None else _sticking(design, motion.wall_stuck(time), signals)
     status = m.status_of(
         all(bool(np.isfinite(values).all()) for values in fine_signals.values()),
         stuck_between(motion, duration - min(m.WINDOW, duration), duration),
@@ -142,8 +155,16 @@ def sample(motion: Motion, interval: float = 0.01, sections: bool = False) -> Si
     return Simulation(
         design, time, signals, motion.events, measured, status, "reference",
         motion.method, None, None, motion.energy,
-        section_peaks(design, fine, fine_signals) if sections else {},
+        section_peaks(design, fine, fine_signals) if sections else {}, **wall,
     )  # fmt: skip
+
+
+def _sticking(design: Design, stuck: Array, signals: dict[str, Array]) -> dict[str, Any]:
+    """Fields of a run of which nodes of the wall stick; the length that does joins the signals."""
+    assert design.wall is not None
+    edges = edges_of(design.wall, design.string.depth)
+    signals["stuck_length"] = stuck @ np.diff(edges)
+    return {"wall_depth": edges, "wall_stuck": stuck}
 
 
 def _grid(duration: float, interval: float) -> Array:
@@ -203,7 +224,7 @@ def _measures(motion: Motion, time: Array, signals: dict[str, Array]) -> m.Measu
         mean_weight_on_bit=weight,
         rop_proxy=_rop_proxy(design, time, signals),
         work_at_bit=motion.energy.bit,
-        work_at_wall=0.0,
+        work_at_wall=motion.energy.wall,
         work_per_turn=m.per_turn(motion.energy.bit, mean, duration),
         time_outside_table=_outside_table(design, time, signals["weight_on_bit"]),
         **_strain(design, time, signals),
@@ -336,13 +357,15 @@ def _by_batch(design: Design, interval: float) -> Simulation:
     prepared = prepare(lanes, design.tables.simulation)
     batch = run_batch(lanes, prepared)
     time, traced = trace(lanes, prepared, interval)
-    signals = {name: values[:, 0] for name, values in traced.items()}
+    signals = {name: values[:, 0] for name, values in traced.items() if values.ndim == 2}
     signals["twist"] = signals["top_angle"] - signals["bit_angle"]
+    shown = {name: signals[name] for name in SIGNALS if name in signals}
+    wall = {} if design.wall is None else _sticking(design, traced["wall_stuck"][:, :, 0], shown)
     scheme = prepared.scheme
     return Simulation(
         design=design,
         time=time,
-        signals={name: signals[name] for name in SIGNALS if name in signals},
+        signals=shown,
         events=(),
         measures=measures_of(batch, 0),
         status=m.STATUSES[batch.status[0]],
@@ -352,4 +375,5 @@ def _by_batch(design: Design, interval: float) -> Simulation:
         modes=scheme.modes,
         energy=None,
         section_torque=section_peaks(design, time, signals),
+        **wall,
     )

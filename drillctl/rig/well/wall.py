@@ -35,6 +35,16 @@ class Wall(NamedTuple):
         return float(self.torque.sum())
 
 
+def edges_of(wall: Wall, depth: Array) -> Array:
+    """Measured depths (m) between which the string belongs to each node, shape (nodes + 1,)."""
+    places = depth[list(wall.nodes)]
+    if len(places) == 1:
+        return np.array([0.0, places[0]])
+    between = 0.5 * (places[:-1] + places[1:])
+    first = max(0.0, places[0] - (between[0] - places[0]))
+    return np.concatenate([[first], between, places[-1:]])
+
+
 def cell_torque(line: Line, factor: Array, weight_on_bit: float, coupled: bool) -> Array:
     """Largest torque of the wall on each cell of a string that turns (N m)."""
     along = tension(line, -weight_on_bit, 0.0 * factor)

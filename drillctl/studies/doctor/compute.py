@@ -41,7 +41,7 @@ from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import SampledDrive
 from drillctl.simulation.batch import Prepared, _shared, _turns, prepare
-from drillctl.simulation.kernels.string_step import BlockString, UndampedString
+from drillctl.simulation.kernels.string_step import BlockString, UndampedString, WallString
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
 from drillctl.simulation.scheme import (
@@ -62,7 +62,10 @@ from drillctl.store.result import Result
 
 SHORTENED = 1e-3
 """Share by which a step must be shorter than its bound for whole steps to be the reason."""
-FORMS = {"undamped": "undamped modes", "blocks": "2 x 2 blocks", "dense": "a dense matrix"}
+FORMS = {
+    "undamped": "undamped modes", "blocks": "2 x 2 blocks", "dense": "a dense matrix",
+    "wall": "2 x 2 blocks, with nodes at which the wall rubs",
+}  # fmt: skip
 """Forms of the string, in words."""
 
 
@@ -117,6 +120,8 @@ def form_of(string: Any) -> str:
     """Name of the form of a string made ready: a key of `FORMS`."""
     if isinstance(string, UndampedString):
         return "undamped"
+    if isinstance(string, WallString):
+        return "wall"
     return "blocks" if isinstance(string, BlockString) else "dense"
 
 
@@ -458,7 +463,7 @@ class _Sample:
         for part in self.parts:
             lanes, table = part.group.some(part.chosen), part.group.design.tables.simulation
             for row, parts in enumerate(REFINEMENTS):
-                made = auditing.refined(lanes.string, table, part.prepared, parts)
+                made = auditing.refined(lanes.string, table, part.prepared, parts, lanes.wall)
                 batch = measured(lanes, made)
                 j1[row, part.at] = batch.measures["j1"]
                 if parts == 1:

@@ -72,6 +72,7 @@ def tables(result: Simulation) -> Iterator[Table]:
     if result.energy is not None:
         terms = (("work of the drive", "drive"), ("work on the rock", "bit"),
                  ("dissipated by damping", "damping"),
+                 ("dissipated along the wall", "wall"),
                  ("change of stored energy", "stored"))  # fmt: skip
         work: list[list[Any]] = [[name, getattr(result.energy, key)] for name, key in terms]
         energy = Column("energy", unit="J", digits=6)
@@ -96,13 +97,21 @@ def pictures(result: Simulation) -> Iterator[Picture]:
         lambda system: plots.time_response(result, system=system),
     )  # fmt: skip
 
+    if result.wall_stuck is not None:
+        yield Picture(
+            "sticking", "Which parts of the string the wall holds, over depth and time.",
+            "Depth against time: dark where the string stands still; fronts of slip run along it.",
+            lambda system: plots.sticking(result, system=system),
+        )  # fmt: skip
+
 
 def files(result: Simulation, folder: Path, system: units.System) -> None:
     """Every signal over time."""
-    from drillctl.simulation.run import SIGNALS
+    from drillctl.simulation.run import OF_WALL, SIGNALS
 
+    about = SIGNALS | OF_WALL
     figures = [("time", result.time, "s")]
-    figures += [(name, values, SIGNALS[name][0]) for name, values in result.signals.items()]
+    figures += [(name, values, about[name][0]) for name, values in result.signals.items()]
     write_columns(folder / "signals.csv", in_columns(figures, system))
 
 
