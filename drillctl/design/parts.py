@@ -63,8 +63,28 @@ def drillstring(tables: DesignTables) -> Drillstring:
 
 def parts_of(tables: DesignTables) -> Parts:
     """Sections with their elements, and ends."""
-    made = _parts(tables)
-    return replace(made, sections=meshed(made, _free(tables)))
+    made, free = _parts(tables), _free(tables)
+    sections = meshed(made, free)
+    if rubs(tables):
+        given = {one.name for one, open_ in zip(pieces(tables), free, strict=True) if not open_}
+        sections = tuple(
+            one if one.name in given or one.inertia == 0.0 else replace(
+                one, elements=max(one.elements, math.ceil(one.length / LONGEST_RUBBED))
+            )
+            for one in sections
+        )  # fmt: skip
+    return replace(made, sections=sections)
+
+
+LONGEST_RUBBED = 20.0
+"""Longest element (m) where the wall rubs and the design names none: fronts run along it."""
+
+
+def rubs(tables: DesignTables) -> bool:
+    """Whether the wall rubs in simulations."""
+    well = tables.well
+    factors = (well.friction_factor, *(hole.friction_factor for hole in well.holes))
+    return any(factor is not None for factor in factors)
 
 
 def mesh(tables: DesignTables, string: Drillstring) -> tuple[MeshedSection, ...]:
@@ -459,8 +479,10 @@ def controller_of(tables: DesignTables) -> Any:
     return tables.controller.model_copy(update={"drive": drive_of(tables)})
 
 
-def refuse_weak_drive(tables: DesignTables, string: Drillstring, torque: float) -> None:
-    """Refuse a drive that cannot hold its set speed."""
+def refuse_weak_drive(
+    tables: DesignTables, string: Drillstring, torque: float, of_wall: float = 0.0
+) -> None:
+    """Refuse a drive that cannot hold its set speed under rock, drag and sliding along the wall."""
     drive, speed = drive_of(tables), tables.operating_point.speed
     fastest = drive.maximum_speed
     if fastest is not None and speed > fastest:
@@ -471,7 +493,7 @@ def refuse_weak_drive(tables: DesignTables, string: Drillstring, torque: float) 
         )
     if isinstance(tables.controller, ConstantTorqueTable):  # holds no speed
         return
-    needed = torque + float(string.ground_damping.sum()) * speed
+    needed = torque + float(string.ground_damping.sum()) * speed + of_wall
     for key, limit in (
         ("torque_limit", drive.torque_limit),
         ("power_limit", None if drive.power_limit is None else drive.power_limit / speed),

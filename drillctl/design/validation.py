@@ -71,12 +71,15 @@ def _impossible(tables: DesignTables) -> Iterator[InputError]:
 
 def _refuse_impossible_drive(tables: DesignTables) -> None:
     from drillctl.design import parts
+    from drillctl.design.well import wall
 
     if drive_laws()[tables.controller.law].tuned_to_string:
         top_drive(tables.controller, lambda: parts.drillstring(tables))
     if not parts.drive_of(tables).ideal:
         string, torque = parts.drillstring(tables), parts.torque_at_set_speed(tables)
-        parts.refuse_weak_drive(tables, string, torque)
+        rubbing = wall(tables, string)
+        sliding = 0.0 if rubbing is None else rubbing.ratio * rubbing.total
+        parts.refuse_weak_drive(tables, string, torque, sliding)
 
 
 def _telling(problems: list[Any]) -> list[Any]:

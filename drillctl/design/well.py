@@ -172,14 +172,6 @@ def _contact(table: SectionTable) -> float:
     return max(table.diameters[0], *(one.outer_diameter for one in table.joint), 0.0)
 
 
-def has_friction(tables: DesignTables) -> bool:
-    """Whether the wall rubs in simulations."""
-    well = tables.well
-    return well.friction_factor is not None or any(
-        hole.friction_factor is not None for hole in well.holes
-    )
-
-
 def friction_factors(tables: DesignTables, line_runs: tuple[Run, ...], other: float) -> Array:
     """Friction factor of each run: of its hole, else of the well, else `other`."""
     well = tables.well
@@ -205,7 +197,7 @@ def line(tables: DesignTables) -> tuple[Line, tuple[Run, ...]]:
 
 def wall(tables: DesignTables, string: Drillstring) -> Wall | None:
     """Friction of the wall at nodes of the string; None without any."""
-    if not has_friction(tables):
+    if not parts.rubs(tables):
         return None
     well = tables.well
     placed, made = line(tables)
@@ -219,5 +211,14 @@ def refuse_impossible_well(tables: DesignTables) -> None:
     """Refuse (`InputError`) a path that is none, or friction of a string without weight."""
     if tables.well.survey:
         path(tables)
-    if has_friction(tables):
+    if parts.rubs(tables):
         line(tables)
+        if parts.axial(tables) is not None:
+            raise InputError(
+                "is not allowed with a bit that cuts its own wake: no solver has both",
+                "well.friction_factor",
+            )
+        if tables.bit_rock.law == "printed-three-branch":
+            raise InputError(
+                "is not allowed with the printed friction of the bit", "well.friction_factor"
+            )
