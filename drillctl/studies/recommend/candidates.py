@@ -13,12 +13,11 @@ from drillctl.arrays import Array
 from drillctl.design import Design, parameter, tuned_ranges
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
-from drillctl.linear.loop_analysis import tolerated_slope
 from drillctl.linear.operating_point import operating_point
 from drillctl.linear.slope_margin import slope_margins
 from drillctl.progress import Progress
 from drillctl.rig.top_drive.law import drive_laws
-from drillctl.studies.recommend.criteria import loop_criteria, loop_figures
+from drillctl.studies.recommend.criteria import loop_criteria, loop_figures, slope_margin_of
 from drillctl.studies.tune.linear_design import linear_design
 from drillctl.studies.tune.problem import GainProblem
 from drillctl.studies.tune.search import Tuning, search, search_problem
@@ -216,7 +215,7 @@ def _slopes_kept(design: Design, tuned: tuple[Tuned, ...], grid: Array) -> Any:
 
 
 def _tolerated(design: Design) -> float:
-    return tolerated_slope(design, design.speed)[0]
+    return slope_margin_of(design, design.speed)[0]
 
 
 def _loop_kept(design: Design) -> bool:

@@ -69,12 +69,9 @@ def loop_figures(design: Design, share: float) -> LoopFigures:
     """
     try:
         point = operating_point(design)
-        margin, omega = tolerated_slope(design, point.speed)
+        margin, omega, aside = slope_margin_of(design, point.speed)
     except InputError as error:
         return LoopFigures(math.nan, math.nan, math.nan, None, None, str(error))
-    aside = False
-    if math.isnan(margin):
-        margin, omega, aside = _as_far_as_followed(design, point.speed)
     whole, part = (
         _margins(design, one * point.slope, point.speed) if one * point.slope < margin else None
         for one in (1.0, share)
@@ -82,12 +79,15 @@ def loop_figures(design: Design, share: float) -> LoopFigures:
     return LoopFigures(point.slope, margin, omega / (2.0 * math.pi), whole, part, "", aside)
 
 
-def _as_far_as_followed(design: Design, speed: float) -> tuple[float, float, bool]:
-    """Slope margin and its frequency (rad/s) of a loop that is not stable without slope.
+def slope_margin_of(design: Design, speed: float) -> tuple[float, float, bool]:
+    """Slope margin (N m s/rad), its frequency (rad/s), and whether modes were left aside.
 
-    Where only modes grow that the elements do not follow, that of the others, and True. Else NaN,
-    with the frequency of what grows.
+    Of a loop in which, without slope, only modes grow that the elements do not follow it is that
+    of the others. Where others grow it is NaN, with the frequency of what grows.
     """
+    margin, omega = tolerated_slope(design, speed)
+    if not math.isnan(margin):
+        return margin, omega, False
     bit, limit = bit_side(design, 0.0, speed), followed(design.string.parts)
     poles = model_poles(design, bit)
     seen = poles[(poles.real > 0.0) & (np.abs(poles.imag) <= limit)]
