@@ -164,6 +164,7 @@ def clearances(tables: DesignTables) -> Iterator[tuple[int, SectionTable, float,
         top = bottom
 
 
+@lru_cache(maxsize=256)  # each draw of a rock reads and checks its string anew
 def section(table: SectionTable) -> Section:
     """The physical section that a table describes; of one element where it does not say."""
     damping = table.stiffness_damping or 0.0
