@@ -287,3 +287,25 @@ def test_the_sentence_names_setting_limit_and_room(result):
     assert summary["recommended"]["gains"] == best.gains
     assert set(summary["candidates"]) == {one.name for one in result.candidates}
     assert summary["candidates"]["soft torque"]["verdict"] == FAILS
+
+
+def test_a_weight_that_follows_stands_beside_the_constant_one_where_it_is_asked(design):
+    asked = design.replace(
+        {
+            "recommend.laws": ["soft-torque"],
+            "recommend.dynamic_weight": {"gain": "6 kN*s/rad"},
+            "tune.certificate.realizations": 10,
+            "recommend.speed_step": "50 rpm",
+            "recommend.weight_step": "70 kN",
+        }
+    )
+    result = recommend(asked)
+    names = [one.name for one in result.candidates]
+    assert names == [
+        "in the drive now", "soft torque", "in the drive now, dynamic weight",
+        "soft torque, dynamic weight",
+    ]  # fmt: skip
+    _, constant, _, moving = result.candidates
+    assert moving.design.tables.weight_on_bit.gain == 6e3
+    assert moving.loop.slope < 0.1 * constant.loop.slope  # the weight takes the slope away
+    assert np.median(moving.j1) < np.median(constant.j1)
