@@ -52,3 +52,14 @@ def test_titles_of_a_user_are_no_markup():
     law = drillctl.export(drillctl.load(DESIGN, title="<b>& 'x'"))
     assert "<b>" not in law._repr_html_()
     assert "&lt;b&gt;&amp;" in law._repr_html_()
+
+
+def test_a_number_that_the_design_leaves_open_is_not_named():
+    """As those of active damping, which follow from the string."""
+    values = {"simulation.duration": "5 s", "drillstring.sections.pipe.elements": 4}
+    design = drillctl.load(DESIGN, controller={"law": "active-damping"}, **values)
+    run = drillctl.simulate(design, "batch")
+    paths = ("controller.spring", "controller.damper")
+    assert drillctl.plots.time_response(run, paths=paths).axes[0].get_title(loc="left") == (
+        f"J1 {run.measures.j1:.1f} s: active-damping"
+    )

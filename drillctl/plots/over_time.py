@@ -74,7 +74,10 @@ LAW_UNITS = {"kp": "N*m*s/rad", "ki": "N*m/rad", "sensed_inertia": "kg*m^2"}  # 
 
 def _title(run: Simulation, paths: Sequence[str], system: units.System) -> str:
     if paths:
-        numbers = ", ".join(_named(run, path, system) for path in paths)
+        # A parameter that the design leaves open has no number.
+        given = [path for path in paths if parameter(run.design, path).value is not None]
+        numbers = ", ".join(_named(run, path, system) for path in given)
+        numbers = numbers or run.design.tables.controller.law
     elif run.design.simple_drive:
         law = run.design.linear_drive._asdict()  # type: ignore[attr-defined]
         shown = (units.displayed(v, LAW_UNITS.get(k, "N*m"), system) for k, v in law.items())

@@ -13,7 +13,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drillctl.errors import DrillctlError, InputError
+from drillctl.errors import InputError
 from drillctl.plots.style import axes_or_new, default_look, lay_out
 from drillctl.reporting.blocks import Document, Figure, InteractiveMap
 from drillctl.reporting.gather import Gathered
@@ -132,8 +132,8 @@ def _left_alone() -> None:
 def _draw_or_say(folder: Path, figure: Figure) -> Picture | str:
     try:
         return _draw(folder, figure)
-    except (DrillctlError, ArithmeticError, ValueError, LookupError) as error:
-        return str(error)
+    except Exception as error:  # one picture less, whatever it raises
+        return str(error) or type(error).__name__
 
 
 def _draw(folder: Path, figure: Figure) -> Picture:
