@@ -25,9 +25,12 @@ from drillctl.studies.recommend.assess import drawn
 from drillctl.studies.recommend.candidates import gains_of
 from drillctl.studies.recommend.window import window
 from drillctl.studies.schedule.strings import Along
-from drillctl.studies.tune.search import NEAR, optimum, search_problem
+from drillctl.studies.tune.search import optimum, polished, search_problem
 from drillctl.studies.tune.tuned import Tuned, put
 
+STAYS = 1.1
+"""Merit, over that of a search from nowhere, up to which gains stay in the valley of the depth
+before: between two valleys, where the table of stands would go, there are no good gains."""
 HALVINGS = 24  # of the stretch in which gains must be changed
 
 
@@ -247,8 +250,12 @@ def searched(design: Design, before: dict[str, float] | None) -> dict[str, float
         for path, (low, high) in tuned_ranges(design).items()
     )
     problem = search_problem(design, tuned)
-    known = [] if before is None else [np.array([before[t.path] for t in tuned])]
-    best = optimum(problem, known, NEAR, ends=1)
+    best = optimum(problem, ends=1)
+    if before is not None:
+        values = problem.shares(np.array([before[t.path] for t in tuned]))
+        (start,) = problem.points(problem.values(values)[None, :], len(problem))
+        near = polished(problem, start)
+        best = near if near.merit <= STAYS * best.merit else best
     return gains_of(put(design, tuned, best.values))
 
 

@@ -20,8 +20,8 @@ class Settings(Table):
     `values`: "500 m:5000 m:10", first, last and how many; by default ten depths from the string
     with half its topmost section to the whole of it. `along`: what they are values of: `depth`,
     the length of the whole string, to which pipe is added at the top, or a dotted path. `law`:
-    `tuned` searches the PI of the least objective of `[tune]` at each depth, from the gains of the
-    one before; others follow from the string by their rule.
+    `tuned` searches the PI of the least objective of `[tune]` at each depth, and from the gains of
+    the one before; others follow from the string by their rule.
 
     Gains of an earlier depth are compared: those of `kept_from` times each depth, a quarter deeper.
     They must be changed where a drive that keeps them reflects `reflection` more of a wave at the
