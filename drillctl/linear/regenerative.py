@@ -166,8 +166,8 @@ def frequency_limit(chi: Characteristic, design: Design) -> tuple[float, bool]:
     grid = chi.scale * np.geomspace(0.5, 400.0, 4000)
     large = np.flatnonzero(2.0 * np.abs(chi.stiffness(1e-6 * chi.scale + 1j * grid)) > FAR)
     last = grid[min(int(large[-1]) + 1, len(grid) - 1)] if large.size else grid[0]
-    limits = [string[0][-1] for string in (design.axial.modes,) if len(string[0]) > 1]
-    mesh = min(limits, default=math.inf)
+    elements = design.tables.axial.model == "elements"
+    mesh = float(design.axial.modes[0][-1]) if elements else math.inf
     return float(min(last, mesh)), bool(last < min(mesh, grid[-1]))
 
 
@@ -252,16 +252,24 @@ def axial_boundary(design: Design) -> float | None:
 
     chi = Characteristic(design, coupled=False)
 
+    def inverse(omega: Any) -> ComplexArray:
+        with np.errstate(all="ignore"):  # nothing is left of 1/G at a resonance without dampers
+            one = 1.0 / chi.stiffness(1j * np.asarray(omega, dtype=complex))
+        return np.nan_to_num(one)
+
     def excess(omega: Any) -> Any:
-        return np.abs(1.0 + 1.0 / chi.stiffness(1j * np.asarray(omega, dtype=complex))) - 1.0
+        return np.abs(1.0 + inverse(omega)) - 1.0
 
     grid = chi.scale * np.geomspace(1e-2, 100.0, 20_001)
     values = excess(grid)
     speeds = []
     for k in np.flatnonzero(values[:-1] * values[1:] < 0.0):
         omega = brentq(lambda w: float(excess(w)), grid[k], grid[k + 1], xtol=1e-14 * chi.scale)
-        turn = -np.angle(1.0 + 1.0 / complex(chi.stiffness(np.array([1j * omega]))[0]))
+        left = complex(inverse(np.array([omega]))[0])
+        turn = -np.angle(1.0 + left)
         turn = turn % (2.0 * math.pi)
+        if abs(left) < 1e-6:  # a resonance: a delay of whole turns changes nothing
+            continue
         speeds.append(2.0 * math.pi * omega / (chi.blades * float(turn)))
     return max(speeds, default=None)
 

@@ -310,6 +310,8 @@ def _pairs(system: System, n: int) -> Array:
     poles, vectors = np.linalg.eig(system.a)
     # Two zero poles of a rigid body without dampers are no pair of eigenvectors.
     kept = np.abs(poles) > 1e-9 * np.abs(poles).max()
+    if (~kept).sum() == 1:  # a damper to ground leaves the place alone free
+        kept[:] = True
     columns = [] if kept.all() else [np.eye(2 * n)[0], np.eye(2 * n)[n]]
     pairs = [k for k in np.flatnonzero(poles.imag > 0.0) if kept[k]]
     real = [k for k in np.flatnonzero(poles.imag == 0.0) if kept[k]]

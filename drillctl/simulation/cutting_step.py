@@ -37,7 +37,8 @@ SIGNALS = 11
 """Of a trace: those of `kernels.advance.TRACED`, then depth (m) and rate of penetration (m/s)."""
 
 
-compiled = numba.njit(**OPTIONS)
+compiled = numba.njit(_nrt=False, **OPTIONS)
+"""No references are counted in what makes no array: each look at one would count, atomically."""
 
 
 class Blocks(NamedTuple):
@@ -101,29 +102,72 @@ def _by(read: Any, which: int, push: Any) -> float:
     return total
 
 
-@compiled
-def _pipe(read: Any, element: Any, z: Any) -> float:
-    """Torque of the first element."""
-    total = 0.0
-    for k in range(z.shape[0]):
+PACKED = 20  # numbers of a block, side by side, so that a step passes on one array a string
+
+
+def _packed(blocks: Any, stiffness: float, damping: float) -> Any:
+    """Each block's F, answers to top, bit and load, and what is read of it, in one row."""
+    count = blocks.free.shape[0]
+    packed = np.empty((count, PACKED))
+    for k in range(count):
+        packed[k, 0:4] = blocks.free[k]
         for i in range(2):
-            twist = (read[0, k, i] - read[4, k, i]) * element[0]
-            total += (twist + (read[1, k, i] - read[5, k, i]) * element[1]) * z[k, i]
-    return total
+            packed[k, 4 + i], packed[k, 6 + i] = blocks.top[k, i], blocks.bit[k, i]
+            packed[k, 8 + i] = blocks.load[k, i]
+            for which in range(4):  # angle and speed of the top, of the bit
+                packed[k, 10 + 2 * which + i] = blocks.read[which, k, i]
+            packed[k, 18 + i] = stiffness * (
+                blocks.read[0, k, i] - blocks.read[4, k, i]
+            ) + damping * (blocks.read[1, k, i] - blocks.read[5, k, i])
+    return packed
+
+
+pack = numba.njit(**OPTIONS)(_packed)
 
 
 @compiled
-def _swing(blocks: Any, speed: float, z: Any) -> None:
-    for k in range(z.shape[0]):
-        a, b = z[k, 0], z[k, 1]
-        z[k, 0] = blocks.free[k, 0] * a + blocks.free[k, 1] * b + speed * blocks.load[k, 0]
-        z[k, 1] = blocks.free[k, 2] * a + blocks.free[k, 3] * b + speed * blocks.load[k, 1]
+def _turn(
+    p: Any, speed: float, net: float, torque: float, z: Any
+) -> tuple[float, float, float, float, float]:
+    """Complete the last step, and let the string swing through the next in one pass.
+
+    Returns torque of the first element and speed of the top as the step begins; angle of the top,
+    angle and speed of the bit as it would end without torques.
+    """
+    pipe = fast = above = angle = turning = 0.0
+    for k in range(p.shape[0]):
+        a = z[k, 0] + p[k, 4] * net + p[k, 6] * torque
+        b = z[k, 1] + p[k, 5] * net + p[k, 7] * torque
+        fast += p[k, 12] * a + p[k, 13] * b
+        pipe += p[k, 18] * a + p[k, 19] * b
+        c = p[k, 0] * a + p[k, 1] * b + speed * p[k, 8]
+        d = p[k, 2] * a + p[k, 3] * b + speed * p[k, 9]
+        z[k, 0], z[k, 1] = c, d
+        above += p[k, 10] * c + p[k, 11] * d
+        angle += p[k, 14] * c + p[k, 15] * d
+        turning += p[k, 16] * c + p[k, 17] * d
+    return pipe, fast, above, angle, turning
+
+
+@compiled
+def _sink(p: Any, speed: float, push: float, y: Any) -> tuple[float, float]:
+    """The same of the axial string: depth and velocity of the bit as the step would end."""
+    depth = sinking = 0.0
+    for k in range(p.shape[0]):
+        a = y[k, 0] + p[k, 6] * push
+        b = y[k, 1] + p[k, 7] * push
+        c = p[k, 0] * a + p[k, 1] * b + speed * p[k, 8]
+        d = p[k, 2] * a + p[k, 3] * b + speed * p[k, 9]
+        y[k, 0], y[k, 1] = c, d
+        depth += p[k, 14] * c + p[k, 15] * d
+        sinking += p[k, 16] * c + p[k, 17] * d
+    return depth, sinking
 
 
 @compiled
 def _advance(
-    lane: Any, torsion: Any, axial: Any, clock: Any, table: Any, element: Any, z: Any, y: Any,
-    ring: Any, out: Any, trace: Any,
+    lane: Any, torsion: Any, axial: Any, clock: Any, table: Any, tied: Any, sunk: Any, z: Any,
+    y: Any, ring: Any, out: Any, trace: Any,
 ) -> None:  # fmt: skip
     """Advance one lane from time zero to the end; `z` and `y` are its states."""
     step, mask = clock.step, RING - 1
@@ -161,24 +205,25 @@ def _advance(
     force = lane.weight
     drive = lane.constant - lane.kp * (_sum(read, 1, z)) - lane.ki * top
     torque = lane.torque_per_depth * cut + lane.flat_torque
-    pipe = _pipe(read, element, z)
     sample = 0
+    net = held = push = 0.0  # torques and force of the last step, which the next pass puts in
     for n in range(clock.steps + 1):
+        pipe, fast, free_top, free_angle, free_speed = _turn(tied, lane.set_speed, net, held, z)
+        out[PEAK_PIPE] = max(out[PEAK_PIPE], abs(pipe))
         if clock.every > 0 and n == sample * clock.every:
-            row = trace[sample]
-            row[0], row[1] = _sum(read, 1, z) + lane.set_speed, speed
-            row[2], row[3] = top, turned - lane.set_speed * n * step
-            row[4], row[5], row[6] = pipe, torque, 1.0 if stuck else 0.0
-            row[7], row[8], row[9], row[10] = drive, force, depth, sinking
+            trace[sample, 0], trace[sample, 1] = fast + lane.set_speed, speed
+            trace[sample, 2], trace[sample, 3] = top, turned - lane.set_speed * n * step
+            trace[sample, 4], trace[sample, 5] = pipe, torque
+            trace[sample, 6] = 1.0 if stuck else 0.0
+            trace[sample, 7], trace[sample, 8] = drive, force
+            trace[sample, 9], trace[sample, 10] = depth, sinking
             sample += 1
         if n == clock.steps:
             break
         end = (n + 1) * step
-        _swing(torsion, lane.set_speed, z)
-        _swing(axial, lane.steady, y)
-        free_top, free_angle = _sum(read, 0, z), _sum(read, 2, z) + lane.set_speed * end
-        free_speed = _sum(read, 3, z) + lane.set_speed
-        free_depth, free_sinking = _sum(seen, 2, y), _sum(seen, 3, y)
+        free_angle += lane.set_speed * end
+        free_speed += lane.set_speed
+        free_depth, free_sinking = _sink(sunk, lane.steady, push, y)
         level = shrink * (lane.constant - back * (free_top - top) - half * (free_top + top))
         free_speed += speed_top * level
         free_angle += angle_top * level
@@ -201,13 +246,13 @@ def _advance(
             )  # fmt: skip
             node = min(max(way / lane.spacing, 0.0), table.shape[1] - 2.0)
             k = int(node)
-            path = table[int(lane.path)]
-            value = path[k] + (node - k) * (path[k + 1] - path[k])
+            one = int(lane.path)
+            value = table[one, k] + (node - k) * (table[one, k + 1] - table[one, k])
             hard = math.exp(lane.spread * (value - 0.5 * lane.spread))
         k_half = stiff * hard
         was = cut if contact else 0.0
         # The axial inclusion.
-        new_depth, new_sinking, g, push = 0.0, 0.0, 0.0, 0.0
+        new_depth, new_sinking, g = 0.0, 0.0, 0.0
         contact_new = True
         if stuck and contact:
             push = -free_sinking / by_speed
@@ -261,13 +306,7 @@ def _advance(
         else:
             torque = most
             stuck = False
-        net = level + share * torque
-        for k in range(z.shape[0]):
-            z[k, 0] += torsion.top[k, 0] * net + torsion.bit[k, 0] * torque
-            z[k, 1] += torsion.top[k, 1] * net + torsion.bit[k, 1] * torque
-        for k in range(y.shape[0]):
-            y[k, 0] += axial.bit[k, 0] * push
-            y[k, 1] += axial.bit[k, 1] * push
+        net, held = level + share * torque, torque
         top = free_top + top_top * net + top_bit * torque
         new_turned = free_angle + angle_top * (net - level) + angle_bit * torque
         if (stuck and was_stuck) or new_turned < turned:
@@ -282,7 +321,6 @@ def _advance(
         # Measures.
         force = lane.weight - push
         drive = net
-        pipe = _pipe(read, element, z)
         rest = (1.0 - part if not was_stuck else 1.0) if stuck else 0.0
         counted = 0.0 if end <= clock.j1_from else min(step, end - clock.j1_from)
         x0, x1 = speed - lane.set_speed, new_speed - lane.set_speed
@@ -299,7 +337,6 @@ def _advance(
             out[LATE_HIGH] = max(out[LATE_HIGH], new_speed)
             out[LATE_ANGLE] += 0.5 * (speed + new_speed) * late
             out[LATE_STUCK] += rest * late
-        out[PEAK_PIPE] = max(out[PEAK_PIPE], abs(pipe))
         out[PEAK_TOP] = max(out[PEAK_TOP], abs(drive))
         if abs(x1) > 0.02 * lane.set_speed:
             out[OUTSIDE_NARROW] = end
@@ -330,6 +367,7 @@ def _run(
 ) -> None:  # fmt: skip
     """Advance some lanes; `lanes` has a row of `Lane` each, `starts` and `depths` their states."""
     ring = np.empty((RING, 2))
+    tied, sunk = pack(torsion, element[0], element[1]), pack(axial, 0.0, 0.0)
     z, y = np.empty(starts.shape[1:]), np.empty(depths.shape[1:])
     for one in range(begin, end):
         if watch[0] != 0:
@@ -340,7 +378,7 @@ def _run(
             x[13], x[14], x[15], x[16], x[17],
         )  # fmt: skip
         z[:], y[:] = starts[one], depths[one]
-        _advance(lane, torsion, axial, clock, table, element, z, y, ring, out[one], traces[one])
+        _advance(lane, torsion, axial, clock, table, tied, sunk, z, y, ring, out[one], traces[one])
 
 
 run = on_disk(_run, __file__)
