@@ -152,3 +152,32 @@ def test_what_it_does_not_go_with_is_refused(design):
     with pytest.raises(InputError, match="PI"):
         drillctl.simulate(design.replace({"controller.drive.torque_limit": "30 kN*m"}))
     assert steps.RING & (steps.RING - 1) == 0
+
+
+@pytest.mark.slow
+def test_engines_agree_over_random_sets_until_contact_is_lost(design):
+    """J1 at steps of 2.5e-4 of the torsional swing, within 1e-3."""
+    random, worst = np.random.default_rng(7), 0.0
+    for _ in range(40):
+        speed = random.uniform(1.5, 5.0) / UNIT
+        flat = random.uniform(1.0, 12.0)
+        one = design.replace({
+            "operating_point.speed": SI(speed),
+            "start.bit_speed": SI(speed * random.uniform(0.7, 0.95)),
+            "bit_rock.blades": int(random.integers(3, 8)),
+            "bit_rock.wear_flat_length": f"{flat} mm",
+            "bit_rock.intrinsic_energy": f"{random.uniform(40, 80)} MPa",
+            "simulation.duration": SI(40.0 * UNIT),
+        })  # fmt: skip
+        weight = one.bit_rock.flat_force + random.uniform(10e3, 50e3)
+        one = one.replace({"operating_point.weight_on_bit": SI(weight)})
+        lost = [e.time for e in drillctl.simulate(one).events if e.kind == "lost_contact"]
+        until = min(lost[0] if lost else math.inf, 40.0 * UNIT)
+        if until < 1.0 * UNIT:
+            continue
+        short = one.replace({
+            "simulation.duration": SI(until), "simulation.step": SI(2.5e-4 * UNIT),
+        })  # fmt: skip
+        exact, batch = drillctl.simulate(short), drillctl.simulate(short, "batch")
+        worst = max(worst, abs(batch.measures.j1 / exact.measures.j1 - 1.0))
+    assert worst < 1e-3
