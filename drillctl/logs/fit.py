@@ -188,6 +188,7 @@ class Fit:
     slowest: float
     # covariance of the numbers of the law that is left where a log says nothing of them
     unsaid: Array
+    excess: float  # root mean square of what the fit misses beyond noise (N m)
     signal: float  # variance of the wave that comes up over that of the noise of the log
     problem: Problem = field(repr=False)
 
@@ -297,7 +298,7 @@ def fit(
         family, x, y, value, size, explained, leave,
         tuple(m.time_at_rest > STICKING for m in motions),
         float(max(m.bit.max() for m in motions)), float(min(m.bit.min() for m in motions)),
-        unsaid, variance / max(noise, 1e-30), problem,
+        unsaid, float(np.sqrt(missed / count)), variance / max(noise, 1e-30), problem,
     )  # fmt: skip
 
 

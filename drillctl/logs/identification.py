@@ -55,14 +55,14 @@ def tracks_of(
     places = _runs(log)
     cycle = _cycle(log, places, period)
     own = length or min(max(CYCLES * cycle, CYCLES * period, SHORTEST), max(LONGEST, 3.2 * period))
-    found: list[tuple[float, float, float]] = []  # tonal share, begin, end
+    found: list[tuple[float, float, float, slice]] = []  # tonal share, begin, end, run
     for part in places:
         time = log.time[part]
         first, last = float(time[0]) + lag, float(time[-1]) - 3.0 * log.spacing
         count = int((last - first) // own)
         if count == 0 and last - first >= 0.6 * own and length is None:
             count, begin, end = 1, first, last
-            found.append((0.0, begin, end))
+            found.append((0.0, begin, end, part))
             continue
         for k in range(count):
             # The whole stretch is used: what is left over is divided among its windows.
@@ -73,9 +73,10 @@ def tracks_of(
             share, _ = tonal_share(
                 log.time[inside], _float(log, "top_torque", inside), (0.25 / period, 2.0 / period)
             )
-            found.append((share, begin, end))
-    chosen = sorted(sorted(found, reverse=True)[:most], key=lambda one: one[1])
-    return [_window(log, begin, end, lag, lags) for _, begin, end in chosen], own
+            found.append((share, begin, end, part))
+    chosen = sorted(found, key=lambda one: -one[0])[:most]
+    chosen = sorted(chosen, key=lambda one: one[1])
+    return [_window(log, begin, end, lag, lags, part) for _, begin, end, part in chosen], own
 
 
 def _float(log: Log, name: str, rows: slice) -> Array:
@@ -118,13 +119,13 @@ def _cycle(log: Log, places: Sequence[slice], period: float) -> float:
     return float(cycle) if np.isfinite(cycle) else period
 
 
-def _window(log: Log, begin: float, end: float, lag: float, lags: tuple[float, float]) -> Window:
+def _window(
+    log: Log, begin: float, end: float, lag: float, lags: tuple[float, float], part: slice
+) -> Window:
     """The track of a window with what goes before it."""
     first, last = np.searchsorted(log.time, (begin - lag, end + 3.0 * log.spacing))
     rows = slice(max(int(first) - 1, 0), int(last) + 1)
-    for stretch in log.stretches:
-        if stretch.start <= first < stretch.stop:
-            rows = slice(max(rows.start, stretch.start), min(rows.stop, stretch.stop))
+    rows = slice(max(rows.start, part.start), min(rows.stop, part.stop))
     names = ("weight_on_bit", "bit_speed")
     held = [_float(log, n, rows) if n in log.signals else None for n in names]
     held = [None if one is None or not np.isfinite(one).all() else one for one in held]

@@ -143,7 +143,9 @@ def _si(values: Any, one: Chosen) -> tuple[Any, int]:
         numbers = pd.to_numeric(pd.Series(values), errors="coerce").to_numpy(float)
         lost = int((np.isnan(numbers) & ~pd.isna(pd.Series(values)).to_numpy()).sum())
         values = numbers
-    result = values.astype(np.float64 if one.quantity == "time" else np.float32)
+    with np.errstate(over="ignore"):
+        result = values.astype(np.float64 if one.quantity == "time" else np.float32)
+    result[~np.isfinite(result)] = np.nan
     for absent in ABSENT:
         result[result == result.dtype.type(absent)] = np.nan
     result *= result.dtype.type(one.factor)

@@ -15,13 +15,23 @@ LENGTH, SPEED_OF_WAVES, ZETA = 3000.0, 3184.3572, 297.06112
 
 
 @numba.njit
+def _rock(low, high, decay, speed):
+    """Torque and slope: exponential, or with a negative decay straight down to the lower one."""
+    if decay >= 0.0:
+        fall = (high - low) * np.exp(-decay * speed)
+        return low + fall, -decay * fall
+    torque = high + decay * speed
+    return (torque, decay) if torque > low else (low, 0.0)
+
+
+@numba.njit
 def _run(count, step, delay, zeta, top, bit, kp, ki, target, low, high, decay, peak, start):
     down, up = np.zeros(count + 1), np.zeros(count + 1)
     w, torque, b = np.zeros(count + 1), np.zeros(count + 1), np.zeros(count + 1)
     w[0] = b[0] = start
     down[0], up[0] = zeta * start, -zeta * start
     torque[0] = kp * (target - start)
-    rock = low + (high - low) * np.exp(-decay * start)
+    rock = _rock(low, high, decay, start)[0]
     total = 0.0
     for i in range(count):
         q0 = up[i - delay] if i >= delay else -zeta * start
@@ -40,15 +50,19 @@ def _run(count, step, delay, zeta, top, bit, kp, ki, target, low, high, decay, p
             right = b[i] + g * (p0 - zeta * b[i] - rock + p1)
             if right > g * high:
                 v = b[i]
-                for _ in range(50):
-                    fall = (high - low) * np.exp(-decay * v)
-                    new = v - (rise * v + g * (low + fall) - right) / (rise - g * decay * fall)
+                if decay < 0.0:  # straight: on the falling piece, else on the level one
+                    v = (right - g * high) / (rise + g * decay)
+                    if high + decay * v < low:
+                        v = (right - g * low) / rise
+                for _ in range(50 if decay >= 0.0 else 0):
+                    there, slope = _rock(low, high, decay, v)
+                    new = v - (rise * v + g * there - right) / (rise + g * slope)
                     done = abs(new - v) < 1e-13
                     v = new
                     if done:
                         break
                 b[i + 1] = v
-                rock = low + (high - low) * np.exp(-decay * v)
+                rock = _rock(low, high, decay, v)[0]
             else:
                 b[i + 1], rock = 0.0, p1
         elif abs(p1) <= peak:
@@ -56,7 +70,7 @@ def _run(count, step, delay, zeta, top, bit, kp, ki, target, low, high, decay, p
         else:
             part = step * (p1 - peak) / max(p1 - p0, 1e-12)
             b[i + 1] = (p1 - high - 0.5 * (p1 - p0) * part / step) * part / bit
-            rock = low + (high - low) * np.exp(-decay * b[i + 1])
+            rock = _rock(low, high, decay, b[i + 1])[0]
         up[i + 1] = p1 - 2.0 * zeta * b[i + 1]
     return w, torque, b
 
@@ -91,7 +105,7 @@ class Rig:
 
     def curve(self, speed):
         """Torque of the rock (N m)."""
-        return self.a1 + (self.a2 - self.a1) * np.exp(-self.beta * np.asarray(speed))
+        return np.array([_rock(self.a1, self.a2, self.beta, w)[0] for w in np.atleast_1d(speed)])
 
 
 def sampled(motion, rate, first, last, noise=(0.0, 0.0), seed=0):

@@ -182,3 +182,16 @@ def test_the_command_writes_what_others_run(noisy, tmp_path, capsys, monkeypatch
     assert run(command) == 0  # shown again
     assert "already done" in capsys.readouterr().err
     assert drillctl.open("o").summary() == {k: v for k, v in found.items() if k != "warnings"}
+
+
+def test_a_report_of_a_design_that_names_its_log(noisy, tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        f'schema = 1\nmodel = "monteiro-trindade-140kn"\n[log]\nfiles = ["{noisy}"]\n'
+        "[identify]\ndraws = 20\n"
+    )
+    made = drillctl.report(drillctl.load(path), tmp_path / "r", sections=["log"])
+    assert made.content["sections"] == ["log"]
+    text = made.files["html"].read_text(encoding="utf-8")
+    assert "Friction from the log" in text
+    assert "computed from the waves alone" in text

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from drillctl import plots, units
 from drillctl.store.tables import Column, Quantity, Table, Told, Unit
-from drillctl.studies.base import Check, Option, Picture, Run, Study
+from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Section, Study
 
 if TYPE_CHECKING:
     from drillctl.design import Design
@@ -20,8 +20,9 @@ ENOUGH = 0.95  # share of the returning wave that a good fit explains
 def computed(design: Design, run: Run) -> Identification:
     """Fit the logs."""
     from drillctl.studies.identify.compute import identify
+    from drillctl.studies.log.compute import named_files
 
-    return identify(design, run.options["log"] or (), run.progress)
+    return identify(design, run.options.get("log") or named_files(design), run.progress)
 
 
 def tables(result: Identification) -> Iterator[Table]:
@@ -146,6 +147,11 @@ def files(result: Identification, folder: Path, system: units.System) -> None:
     write(result, folder)
 
 
+def without_log(request: Requested) -> str:
+    """Why there is nothing to fit to."""
+    return "" if request.design.tables.log.files else "the design names no log in [log] files"
+
+
 STUDY = Study(
     module=__name__,
     name="identify",
@@ -158,4 +164,11 @@ STUDY = Study(
         Option("weight", str, "Set the weight on bit", sets="operating_point.weight_on_bit"),
     ),
     python="identify",
+    recipes=(Recipe("identify", "the fit to the log", without_log, order=5),),
+    sections=(
+        Section(
+            "log", "Friction from the log", ("identify",), order=25,
+            absent=lambda design: "the design names no log in [log] files",
+        ),
+    ),
 )  # fmt: skip

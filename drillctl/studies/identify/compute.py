@@ -23,6 +23,8 @@ from drillctl.store.codec import label
 from drillctl.store.result import Result
 from drillctl.studies.log.compute import read_logs
 
+CLEARLY = 8.0  # difference of misfits that tells two laws apart
+FOREIGN = 0.05  # unexplained share of the returning wave from which units are doubted
 NEARLY = 1.1  # error of a prediction over the least one that counts as equal
 LEAST_TORQUE = 100.0  # (N m) of a string that drills
 DRAWN_POINTS = 4000  # of a portrait
@@ -222,9 +224,10 @@ def identify(
         score = ident.held_out(one.problem, one.family, one.x, one.begins)
         described.append(_described(one, at, score, settings.confidence, settings.floor))
         progress.advance(1)
+    described = _not_told_apart(described, fits)
     if any(n.off for n in numbers) and checked is not None:
         described = [_widened(d, f, checked) for d, f in zip(described, fits, strict=True)]
-    law = settings.law or _best(described)
+    law = settings.law or _best(described, fits)
     own = next(f for f in described if f.name == (law if settings.law else main.family.name))
     findings, identifiable = _findings(main, own, numbers, known, at)
     chosen = next(f for f in fits if f.family.name == law)
@@ -284,7 +287,7 @@ def _refuse_foreign(problem: Problem, main: Fit) -> None:
         return
     noise = 1.0 - own.explained
     best, words = noise, ""
-    if noise > 0.005:
+    if noise > FOREIGN:
         for factor, said in WRONG_UNITS:
             tracks = [replace(w.track, torque=w.track.torque / factor) for w in few.windows]
             scaled = replace(few, windows=tuple(
@@ -388,16 +391,37 @@ def _leading(fits: list[Fit]) -> Fit:
     return fits[0 if missed[0] <= 1.2 * missed[best] + 0.002 else best]
 
 
-def _best(described: list[FittedLaw]) -> str:
-    """The first law that predicts the next window nearly as well as the best."""
+def _misfits(fits: list[Fit]) -> Array:
+    """Misfits in units of the usual residual, neighbouring ones alike over about a second."""
+    size = min(one.size for one in fits)
+    alike = max(1.0, 1.0 / fits[0].problem.windows[0].track.spacing)
+    return np.array([2.0 * one.objective / size**2 / alike for one in fits])
+
+
+def _not_told_apart(described: list[FittedLaw], fits: list[Fit]) -> list[FittedLaw]:
+    """Bands that hold the curves of other laws, too, where the log does not tell them apart."""
+    misfits, results = _misfits(fits), []
+    for law, own in zip(described, misfits, strict=True):
+        apart = np.zeros(len(law.speed))
+        for other, misfit in zip(fits, misfits, strict=True):
+            if misfit <= own + CLEARLY:
+                apart = np.maximum(apart, np.abs(other.curve.torque(law.speed) - law.torque))
+        half = np.hypot(law.high - law.torque, apart)
+        results.append(replace(law, low=law.torque - half, high=law.torque + half))
+    return results
+
+
+def _best(described: list[FittedLaw], fits: list[Fit]) -> str:
+    """The first law that predicts the next windows, and fits all, nearly as well as the best.
+
+    Akaike's price of a number is two.
+    """
     scores = np.array([one.hold_out for one in described])
-    if not np.isfinite(scores).all():
-        scores = np.array([one.size for one in described])
-    return next(
-        one.name
-        for one, score in zip(described, scores, strict=True)
-        if score <= NEARLY * scores.min()
-    )
+    misfit = _misfits(fits) + np.array([2.0 * f.numbers for f in fits])
+    near = misfit <= misfit.min() + CLEARLY
+    if np.isfinite(scores).all():
+        near &= scores <= NEARLY * scores.min()
+    return described[int(np.argmax(near)) if near.any() else int(np.argmin(misfit))].name
 
 
 def _findings(

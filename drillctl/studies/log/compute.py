@@ -163,11 +163,16 @@ def read_logs(
 ) -> tuple[Log, ...]:
     """The logs of one well, with the columns that a design names."""
     if not files:
-        raise InputError("there is no log to read", "--log")
+        raise InputError("there is no log: name one, or [log] files in the design", "--log")
     return tuple(read_log(file, design.tables.log.given, progress) for file in files)
 
 
 PIPE = {"name": "pipe", "pipe": "5 in 19.5 lb/ft", "length": "3000 m"}
+
+
+def named_files(design: Design) -> list[Path]:
+    """Logs that a design names, relative to its own place."""
+    return [Path(design.origin).parent / file for file in design.tables.log.files]
 
 
 def stand_in(name: str = "log", values: Mapping[str, Any] = MappingProxyType({})) -> Design:

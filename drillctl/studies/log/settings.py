@@ -20,7 +20,8 @@ class Settings(Table):
 
     Columns are found by the usual names (`drillctl log` prints what was taken for what) with the
     unit in the name, in brackets or in a row of units; a unit that is not named is refused.
-    `window`: length of the windows that are ranked, by default 300 s, less in a short log.
+    `window`: length of the windows that are ranked, by default 300 s, less in a short log. `files`:
+    logs that `identify` and a report take where none is named, relative to the design.
     """
 
     time: LogColumnTable = LogColumnTable()
@@ -30,11 +31,10 @@ class Settings(Table):
     hook_load: LogColumnTable = LogColumnTable()
     bit_speed: LogColumnTable = LogColumnTable()
     window: q.Duration | None = None
+    files: tuple[str, ...] = ()
 
     @property
     def given(self) -> dict[str, tuple[str, str]]:
         """Column and unit by quantity, where either is named."""
-        held = {name: getattr(self, name) for name in type(self).model_fields if name != "window"}
-        return {
-            name: (one.column, one.unit) for name, one in held.items() if one != LogColumnTable()
-        }
+        held = {name: one for name, one in self if isinstance(one, LogColumnTable)}
+        return {name: (x.column, x.unit) for name, x in held.items() if x.column or x.unit}
