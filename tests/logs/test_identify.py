@@ -61,7 +61,7 @@ def test_a_noisy_log_gives_a_band_that_holds_the_curve(identified):
     one = identified.fitted
     truth = Rig().curve(one.speed)
     assert np.mean((one.low <= truth) & (truth <= one.high)) > 0.8
-    assert one.high - one.low == pytest.approx(0.01 * truth, rel=2.0)
+    assert 0.005 < np.mean((one.high - one.low) / (2.0 * truth)) < 0.03
     assert identified.identifiable["static_friction"]
     assert identified.downhole_difference < 0.01
     assert not any(number.off for number in identified.numbers)

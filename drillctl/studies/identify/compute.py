@@ -24,7 +24,7 @@ from drillctl.store.result import Result
 from drillctl.studies.log.compute import read_logs
 
 CLEARLY = 8.0  # difference of misfits that tells two laws apart
-FOREIGN = 0.05  # unexplained share of the returning wave from which units are doubted
+FOREIGN = 0.005  # unexplained share of the returning wave from which units are doubted
 NEARLY = 1.1  # error of a prediction over the least one that counts as equal
 LEAST_TORQUE = 100.0  # (N m) of a string that drills
 DRAWN_POINTS = 4000  # of a portrait
@@ -287,7 +287,7 @@ def _refuse_foreign(problem: Problem, main: Fit) -> None:
         return
     noise = 1.0 - own.explained
     best, words = noise, ""
-    if noise > FOREIGN:
+    if noise > FOREIGN and own.signal > ident.TELLING:
         for factor, said in WRONG_UNITS:
             tracks = [replace(w.track, torque=w.track.torque / factor) for w in few.windows]
             scaled = replace(few, windows=tuple(
