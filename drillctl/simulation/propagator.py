@@ -229,7 +229,7 @@ def _rubbed(
         "push": push[:, :, :2].reshape(count, 4),
         "wall_push": push[:, :, 2:].transpose(0, 2, 1).reshape(count, 2 * rubs),
         "read": rows[:5].transpose(1, 0, 2).reshape(count, 10),
-        "wall_read": rows[5:].transpose(1, 0, 2).reshape(count, 2 * rubs),
+        "wall_read": rows[5:].transpose(1, 2, 0).reshape(2 * count, rubs),
         "angle_by_wall": -by[0, 2:],
         "bit_by_wall": -by[1, 2:],
         "top_by_wall": -by[3, 2:],

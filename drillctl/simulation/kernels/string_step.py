@@ -116,7 +116,7 @@ class WallString(NamedTuple):
     wall_push: Any  # shape (blocks, 2 nodes): change of both states per torque on each node
     # shape (blocks, 10): top angle, bit speed, pipe torque, top speed and bit angle, per state
     read: Any
-    wall_read: Any  # shape (blocks, 2 nodes): speed of each node per state
+    wall_read: Any  # shape (2 blocks, nodes): speed of each node per state
     # shape (nodes,): fall of top angle, bit speed and top speed after a step per torque on each
     angle_by_wall: Any
     bit_by_wall: Any

@@ -17,6 +17,7 @@ step, as its last two speeds lead on, its friction is the mean over the step.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from drillctl.rig.bit_rock.law import Exp
@@ -32,8 +33,8 @@ SWEEPS = 6
 """Of Gauss-Seidel in a step; `tests/simulation/test_wall.py` holds what more would change."""
 
 # Rows of a node in the room that the string leaves, after those of the bit.
-TORQUE, SPEED, BEFORE, FRICTION, SLIDING, MOVED, CLOSED, STUCK, WORK = range(9)
-NODE_ROWS = 9
+TORQUE, SPEED, BEFORE, FRICTION, SLIDING, FREE, CLOSED, STUCK, GAIN, PER_GAIN = range(10)
+NODE_ROWS = 10
 BIT_FRICTION, BIT_LEVEL, WALL_WORK = range(3)
 BIT_ROWS = 3
 
@@ -162,13 +163,12 @@ def rub(
     string: Any, drive: Any, program: Any, weight: Any, law: Any, swing: Any, room: Any, work: Any,
     rate: Any,
 ) -> Any:  # fmt: skip
-    """Find the torques of the wall on all nodes: what the string does under them, and a guess.
+    """Find the torques of the wall on all nodes; returns what the string does under them.
 
-    `law`: that of the rock alone, without the wall at the bit. The guess: of the torques at both
-    ends, under which the nodes have the speeds in the room.
+    `law`: that of the rock alone, without the wall at the bit.
     """
     if not has_wall(string):
-        return swing, None
+        return swing
     count = _nodes(string)
     bit_speed, bit_before = at(work, r.BIT_SPEED), at(work, r.SPEED_BEFORE)
     put(room, BIT_LEVEL * WIDTH, _level(string, bit_speed, bit_before))
@@ -177,29 +177,24 @@ def rub(
     by_angle, by_speed = _closure(drive, reduced, work, rate)
     bit = Variable(at(work, r.BIT_TORQUE))
     top = Variable(fma(reduced.share, bit.get(), reduced.alone))
-    # Speeds of all nodes at the end of the step under the torques of the last one.
     with loop(count) as nodes:
         k = nodes.index
         speed = at(room, _row(k, SPEED))
         level = _level(string, speed, at(room, _row(k, BEFORE)))
         put(room, _row(k, SLIDING), at(room, _row(k, FRICTION)) * level)
         closed = string.angle_by_wall[k] * by_angle - string.top_by_wall[k] * by_speed
+        gain = string.by_wall[k, k] - string.by_top[k] * closed
         put(room, _row(k, CLOSED), closed)
-        moved = Variable(at(room, _row(k, MOVED)) + at(work, r.SET_SPEED))
-        moved.set(fma(string.by_top[k], top.get(), moved.get()))
-        moved.set(fma(-string.by_bit[k], bit.get(), moved.get()))
-        with loop(count) as others:
-            j = others.index
-            torque = at(room, _row(j, TORQUE))
-            moved.set(fma(-string.by_wall[k, j], torque, moved.get()))
-        put(room, _row(k, MOVED), moved.get())
-    at_bit = Variable(fma(-reduced.gain, bit.get(), reduced.free))
-    static, sliding = _rock_torques(string, law, weight, room, work)
+        put(room, _row(k, GAIN), gain)
+        put(room, _row(k, PER_GAIN), 1.0 / gain)
+        put(room, _row(k, FREE), at(room, _row(k, FREE)) + at(work, r.SET_SPEED))
+    at_rest, sliding = _rock_torques(string, law, weight, room, work)
+    free_bit = swing.bit_speed + at(work, r.SET_SPEED)
     with loop(SWEEPS):
         with loop(count) as nodes:
-            _slide(string, nodes.index, count, room, top, at_bit)
-        _slide_bit(string, count, reduced, static, sliding, room, top, bit, at_bit)
-    return _under_wall(string, swing, room), (top.get(), bit.get())
+            _slide(string, nodes.index, room, top, bit)
+        _slide_bit(string, free_bit, reduced, at_rest, sliding, room, top, bit)
+    return _under_wall(string, swing, room)
 
 
 def _rock_torques(string: Any, law: Any, weight: Any, room: Any, work: Any) -> tuple[Any, Any]:
@@ -216,57 +211,70 @@ def _rock_torques(string: Any, law: Any, weight: Any, room: Any, work: Any) -> t
     return whole.static_torque(at_rest), sliding
 
 
-def _slide(string: Any, k: Any, count: Any, room: Any, top: Any, at_bit: Any) -> None:
-    """One node: the torque that its set allows, and what it does to all others."""
-    torque, closed = at(room, _row(k, TORQUE)), at(room, _row(k, CLOSED))
-    gain = string.by_wall[k, k] - string.by_top[k] * closed
-    free = fma(gain, torque, at(room, _row(k, MOVED)))
+def _speed(string: Any, k: Any, room: Any, top: Any, bit: Any) -> Any:
+    """Speed of a node at the end of the step under the torques of all."""
+    begin = fma(string.by_top[k], top, at(room, _row(k, FREE)))
+    by_wall = string.by_wall[k]
+
+    def of(j: Any) -> tuple[Any, Any]:
+        return -by_wall[j], at(room, _row(j, TORQUE))
+
+    return _sum_of_products(fma(-string.by_bit[k], bit, begin), of, _nodes(string))
+
+
+def _sum_of_products(begin: Any, of: Callable[[Any], tuple[Any, Any]], count: Any) -> Any:
+    """A sum in four parts: no operation waits for the one before it."""
+    parts = [Variable(begin), *(Variable(each(0.0)) for _ in range(3))]
+    fours = count // 4
+    with loop(fours) as groups:
+        for place, part in enumerate(parts):
+            factor, row = of(4 * groups.index + place)
+            part.set(fma(factor, row, part.get()))
+    with loop(count - 4 * fours) as rest:
+        factor, row = of(4 * fours + rest.index)
+        parts[0].set(fma(factor, row, parts[0].get()))
+    a, b, c, d = (part.get() for part in parts)
+    return (a + b) + (c + d)
+
+
+def _slide(string: Any, k: Any, room: Any, top: Any, bit: Any) -> None:
+    """One node: the torque that its set allows, and what the drive makes of it."""
+    torque, gain = at(room, _row(k, TORQUE)), at(room, _row(k, GAIN))
+    free = fma(gain, torque, _speed(string, k, room, top.get(), bit.get()))
     sticks = abs(free) <= gain * at(room, _row(k, FRICTION))
-    new = pick(sticks, free / gain, signed(at(room, _row(k, SLIDING)), free))
-    change = new - torque
-    by_drive = closed * change
+    sliding = signed(at(room, _row(k, SLIDING)), free)
+    new = pick(sticks, free * at(room, _row(k, PER_GAIN)), sliding)
     put(room, _row(k, TORQUE), new)
     put(room, _row(k, STUCK), pick(sticks, 1.0, 0.0))
-    top.set(top.get() + by_drive)
-    _move_all(string, count, room, string.by_wall[k], change, by_drive)
-    moved = fma(string.speed_by_top, by_drive, at_bit.get())
-    at_bit.set(fma(-string.bit_by_wall[k], change, moved))
+    top.set(fma(at(room, _row(k, CLOSED)), new - torque, top.get()))
 
 
 def _slide_bit(
-    string: Any, count: Any, reduced: Any, static: Any, sliding: Any, room: Any, top: Any,
-    bit: Any, at_bit: Any,
+    string: Any, free_bit: Any, reduced: Any, at_rest: Any, sliding: Any, room: Any, top: Any,
+    bit: Any,
 ) -> None:  # fmt: skip
     """The bit, as a node like the others."""
-    free = fma(reduced.gain, bit.get(), at_bit.get())
-    sticks = abs(free) <= reduced.gain * static
+    speed = Variable(fma(string.speed_by_top, top.get(), free_bit))
+    with loop(_nodes(string)) as nodes:
+        k = nodes.index
+        speed.set(fma(-string.bit_by_wall[k], at(room, _row(k, TORQUE)), speed.get()))
+    # Its own torque acts by itself and through the drive: without both.
+    free = fma(reduced.gain - string.speed_by_bit, bit.get(), speed.get())
+    sticks = abs(free) <= reduced.gain * at_rest
     new = pick(sticks, free * reduced.per_gain, signed(sliding, free))
-    change = new - bit.get()
-    by_drive = reduced.share * change
+    top.set(fma(reduced.share, new - bit.get(), top.get()))
     bit.set(new)
-    top.set(top.get() + by_drive)
-    _move_all(string, count, room, string.by_bit, change, by_drive)
-    at_bit.set(fma(-reduced.gain, change, at_bit.get()))
 
 
-def _move_all(string: Any, count: Any, room: Any, by: Any, change: Any, by_drive: Any) -> None:
-    """Speeds of all nodes after a change of one torque and of the drive's."""
-    with loop(count) as nodes:
-        j = nodes.index
-        moved = fma(string.by_top[j], by_drive, at(room, _row(j, MOVED)))
-        put(room, _row(j, MOVED), fma(-by[j], change, moved))
-
-
-def follow_wall(string: Any, room: Any, work: Any, guess: Any, step: Any) -> None:
-    """Speeds of the nodes at the end of a step whose torques at both ends are known; the work."""
+def follow_wall(string: Any, room: Any, work: Any, step: Any) -> None:
+    """Speeds of the nodes at the end of a step whose torques are known; the work of the wall."""
     if not has_wall(string):
         return
-    top, bit = at(work, r.TOP_TORQUE) - guess[0], at(work, r.BIT_TORQUE) - guess[1]
+    top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
     total = Variable(at(room, WALL_WORK * WIDTH))
     with loop(_nodes(string)) as nodes:
         k = nodes.index
-        moved = fma(string.by_top[k], top, at(room, _row(k, MOVED)))
-        moved = fma(-string.by_bit[k], bit, moved)
+        moved = _speed(string, k, room, top, bit)
         new = pick(at(room, _row(k, STUCK)) > 0.0, 0.0, moved)
         last = at(room, _row(k, SPEED))
         put(room, _row(k, BEFORE), last)
@@ -309,14 +317,15 @@ def pass_with_wall(string: Any, drive: Any, observer: Any, room: Any, state: Any
         at_x = 2 * i * WIDTH
         at_y = at_x + WIDTH
         b11, b12, b21, b22 = (string.push[i, k] for k in range(4))
-        x = Variable(fma(b12, bit, fma(b11, top, at(state, at_x))))
-        y = Variable(fma(b22, bit, fma(b21, top, at(state, at_y))))
-        with loop(count) as nodes:
-            k = nodes.index
-            torque = at(room, _row(k, TORQUE))
-            x.set(fma(string.wall_push[i, 2 * k], torque, x.get()))
-            y.set(fma(string.wall_push[i, 2 * k + 1], torque, y.get()))
-        x_now, y_now = x.get(), y.get()
+        x = fma(b12, bit, fma(b11, top, at(state, at_x)))
+        y = fma(b22, bit, fma(b21, top, at(state, at_y)))
+        push = string.wall_push[i]
+
+        def of_state(which: int) -> Callable[[Any], tuple[Any, Any]]:
+            return lambda k: (push[2 * k + which], at(room, _row(k, TORQUE)))
+
+        x_now = _sum_of_products(x, of_state(0), count)
+        y_now = _sum_of_products(y, of_state(1), count)
         read = string.read[i]
         pipe.set(fma(read[5], y_now, fma(read[4], x_now, pipe.get())))
         a11, a12, a21, a22 = (string.free[i, k] for k in range(4))
@@ -330,13 +339,12 @@ def pass_with_wall(string: Any, drive: Any, observer: Any, room: Any, state: Any
             top_speed.set(fma(read[7], y_free, fma(read[6], x_free, top_speed.get())))
     with loop(count) as nodes:
         k = nodes.index
-        moved = Variable(each(0.0))
-        with loop(string.free.shape[0]) as blocks:
-            i = blocks.index
-            at_x = 2 * i * WIDTH
-            moved.set(fma(string.wall_read[i, 2 * k], at(state, at_x), moved.get()))
-            moved.set(fma(string.wall_read[i, 2 * k + 1], at(state, at_x + WIDTH), moved.get()))
-        put(room, _row(k, MOVED), moved.get())
+
+        def of_block(place: Any) -> tuple[Any, Any]:  # its states one after the other
+            return string.wall_read[place, k], at(state, place * WIDTH)
+
+        moved = _sum_of_products(each(0.0), of_block, 2 * string.free.shape[0])
+        put(room, _row(k, FREE), moved)
     return Swing(angle.get(), speed.get(), top_speed.get(), pipe.get())
 
 
