@@ -36,6 +36,7 @@ from drillctl.reporting.gather import (
     Gathered,
     NotThereError,
     Profile,
+    explained,
     gather,
 )
 from drillctl.reporting.pages import html_page, markdown_page, printed
@@ -120,7 +121,7 @@ def studies_of(sections: Iterable[str]) -> tuple[str, ...]:
 def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> Document:
     """The document of a design."""
     names = set(sections)
-    made, left_out = [], []
+    made, left_out, failed = [], [], []
     for kind in SECTIONS.values():
         if kind.name not in names:
             continue
@@ -128,13 +129,16 @@ def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> D
             made.append(Section(kind.name, kind.title, kind.build(gathered)))
         except NotThereError as reason:
             left_out.append((kind.title, reason.why))
+        except Exception as error:  # one section less, whatever it raises
+            left_out.append((kind.title, explained(error)))
+            failed.append(f"The section {kind.title!r} failed: {explained(error)}")
     design = gathered.requested
     made = [_with_own_files(one, _taken_twice(made)) for one in made]
     return Document(
         title=one_line(title or design.tables.title or design.name),
         subtitle=f"Torsional stick-slip of a drillstring: report of the design {design.name}",
         facts=_facts(gathered),
-        problems=gathered.problems,
+        problems=(*gathered.problems, *failed),
         sections=tuple(made),
         left_out=tuple(left_out),
     )
@@ -280,7 +284,7 @@ def _report(
     progress.begin("writing the report", 1)
     document = compose(gathered, wanted, title)
     files = FigureFiles(run.path / "figures", gathered)
-    problems = (*gathered.problems, *files.collect(document, helpers))
+    problems = (*document.problems, *files.collect(document, helpers))
     document = replace(document, problems=problems)
     written, unwritten = write(document, files, run.path, kinds)
     if not written:

@@ -156,6 +156,19 @@ def test_a_failed_study_is_told_first_and_the_rest_is_there(tmp_path, monkeypatc
     assert 'id="regions"' not in page
 
 
+def test_a_section_that_cannot_be_written_is_told_first(tmp_path, monkeypatch):
+    def fail(*args: object) -> None:
+        raise KeyError("kp")
+
+    monkeypatch.setattr("drillctl.reporting.sections.rig.rig_drawing", lambda *given: None)
+    monkeypatch.setattr("drillctl.reporting.sections.rig.section", fail)
+    made = drillctl.report(small_design(), tmp_path / "r", TINY, sections=["rig", "glossary"])
+    why = "an error of the program itself (KeyError, 'kp')"
+    assert made.problems == (f"The section 'The rig' failed: {why}",)
+    assert made.content["left_out"] == {"The rig": why}
+    assert made.content["sections"] == ["glossary"]
+
+
 def test_an_interrupted_report_is_written_and_goes_on(tmp_path, monkeypatch, capsys):
     def interrupted(*args: object, **kwargs: object) -> None:
         raise KeyboardInterrupt
