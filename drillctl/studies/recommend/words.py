@@ -30,8 +30,12 @@ SPOKEN = {
 
 def numbers_of(one: Assessed) -> str:
     """The numbers of a setting, in full."""
+
+    def unit(path: str) -> str:  # gains that a law has of the string are no keys of its design
+        return SI_OF.get(path.rpartition(".")[2]) or parameter(one.design, path).si_unit
+
     return ", ".join(
-        f"{SPOKEN.get(path, path)} {units.full(value, parameter(one.design, path).si_unit, 4)}"
+        f"{SPOKEN.get(path, path)} {units.full(value, unit(path), 4)}"
         for path, value in one.gains.items()
     )
 
