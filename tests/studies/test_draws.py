@@ -22,6 +22,7 @@ DEFAULT_PATHS = {
     "coulomb": ("bit_rock.a",),
     "tucker-wang": ("bit_rock.a",),
     "tabulated": (),
+    "richard-detournay": ("bit_rock.intrinsic_energy", "bit_rock.contact_stress"),
     "bit-aggressiveness": ("bit_rock.aggressiveness", "bit_rock.high_speed_ratio"),
 }
 

@@ -129,7 +129,7 @@ def limit_cycle(
 
 def _refuse_printed_law(design: Design) -> None:
     """A bit that creeps along an edge has more phases than cycles are followed through."""
-    if isinstance(design.bit_rock, PrintedThreeBranch):
+    if isinstance(design.bit_rock, PrintedThreeBranch) or design.axial is not None:
         raise InputError(
             f"cycles are not found under {design.tables.bit_rock.law!r}; use "
             "'navarro-lopez-suarez', or simulate it with the reference engine",
