@@ -314,7 +314,7 @@ def held_out(problem: Problem, family: Family, x: Array, begins: Array, last: in
     n = len(problem.windows)
     errors, swings = [], []
     for k in range(max(1, n - last), n):
-        before = fit(replace(problem, windows=problem.windows[:k]), family, x, begins[:k], rounds=4)
+        before = fit(replace(problem, windows=problem.windows[:k]), family, x, begins[:k], rounds=2)
         one = replace(problem, windows=problem.windows[k : k + 1])
         # Its own beginning is no part of the law: the torque is held, the beginning fitted.
         only = fit(one, family, before.x, begins[k : k + 1], rounds=0)
