@@ -66,7 +66,12 @@ def run(job: Job, modules: tuple[str, ...], rounds: int, lanes: int, told: Any) 
         "rows": [row_of(row, job, peaks.cores) for row in timed],
         "missing": [list(peer) for peer in missing],
         "roofline": pass_,
-        "scaling": {"lanes": over_lanes, "elements": elements, "horizon": horizon},
+        "scaling": {
+            "lanes": over_lanes,
+            "elements": elements,
+            "horizon": horizon,
+            "wall": scaling.over_wall(rounds),
+        },
         "provenance": provenance() | _libraries(),
     }
     return found | {"bars": table.bars(found)}

@@ -11,13 +11,19 @@ import numpy as np
 from benchmarks.job import Job
 from benchmarks.peers.engine import map_lanes
 from benchmarks.timing import Call, in_turn
-from drillctl.design import Design
+from drillctl.design import Design, load
 from drillctl.simulation.batch import prepare, run_batch, warm_up
-from drillctl.simulation.lanes import Lanes, lane_numbers, lanes_of
+from drillctl.simulation.lanes import Lanes, lane_numbers, lanes_of, single_lane
 
 LANES = (1_000, 3_162, 10_000, 31_623, 100_000, 316_228, 1_000_000)
 ELEMENTS = (30, 100, 300, 1_000)
 HORIZONS = (10.0, 31.6, 100.0, 316.0, 1_000.0)
+WALL_NODES = (1, 4, 12, 20)
+WALL_LANES = 1_600
+PLAIN_WALL: dict[str, Any] = {  # ideal drive, no program: what the wall alone costs is the largest
+    "scenario.speed.lag": "0 s", "scenario.speed.start": None, "simulation.duration": "4 s",
+    "simulation.step": "4 ms", "simulation.modes": 13,
+}  # fmt: skip
 WORK = 300_000
 """Lanes that are worth repeating: more of them are timed fewer times."""
 
@@ -66,6 +72,22 @@ def over_horizons(job: Job, rounds: int) -> dict[str, Any]:
         lanes, prepared = map_lanes(job, {"simulation.duration": f"{horizon} s"})
         runs[horizon] = lambda lanes=lanes, prepared=prepared: run_batch(lanes, prepared)
     return _summary(in_turn(runs, dict.fromkeys(runs, rounds)), None)
+
+
+def over_wall(rounds: int) -> dict[str, Any]:
+    """Seconds by number of nodes at which the wall rubs, the bit among them, at equal modes.
+
+    With one node there is the bit alone: a plain lane, with a friction law more.
+    """
+    runs, chosen = {}, {}
+    for nodes in WALL_NODES:
+        design = load("well-a-off-bottom", **PLAIN_WALL, **{"well.friction_nodes": nodes})
+        lanes = single_lane(design)[np.zeros(WALL_LANES, dtype=np.int64)]
+        prepared = prepare(lanes, design.tables.simulation)
+        warm_up(lanes, prepared)
+        runs[nodes] = lambda lanes=lanes, prepared=prepared: run_batch(lanes, prepared)
+        chosen[str(nodes)] = {"modes": prepared.scheme.modes, "step": prepared.scheme.step}
+    return _summary(in_turn(runs, dict.fromkeys(runs, rounds)), chosen)
 
 
 def _summary(calls: dict[Any, list[Call]], chosen: dict[str, Any] | None) -> dict[str, Any]:

@@ -112,6 +112,7 @@ _KNOWN: dict[str, dict[str, float]] = {
     "rad": {"rad": 1.0, "deg": 0.017453292519943295, "rev": 6.283185307179586},
     "m/s": {"m/s": 1.0, "m/min": 1.0 / 60.0, "m/h": 1.0 / 3600.0, "ft/h": 0.3048 / 3600.0},
     # shown alone
+    "N/m": {"lbf/ft": 14.593902937206364},
     "J": {"kJ": 1e3, "klbf*ft": 1355.8179483314004},
     "rad/(N*m*s)": {"rpm/(kN*m)": 0.00010471975511965977, "rpm/(klbf*ft)": 7.723732765784518e-05},
     "rad/s/(N*m)": {"rpm/(klbf*ft)": 7.723732765784518e-05},
@@ -367,6 +368,7 @@ _SHOWN: dict[str, dict[str, str]] = {
     },
     "field": {
         "rad/s": "rpm", "rad": "rev", "s/rad": "1/rpm", "N": "klbf", "N/s": "klbf/s",
+        "N/m": "lbf/ft",
         "N*s/rad": "klbf/rpm", "N*m": "klbf*ft", "N*m/s": "klbf*ft/s", "J": "klbf*ft",
         "N*m/rad": "klbf*ft/rev", "N*m*s/rad": "klbf*ft/rpm", "N*m/(rad/s)": "klbf*ft/rpm",
         "rad/(N*m*s)": "rpm/(klbf*ft)", "rad/s/(N*m)": "rpm/(klbf*ft)",
