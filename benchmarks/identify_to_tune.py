@@ -43,7 +43,12 @@ def case(number: int, folder: Path) -> tuple[bool, float, float]:
     found = drillctl.tune(drillctl.load(folder / "identified.toml", **TUNE))
     summary = found.summary()
     gains = {name: units.SI(value) for name, value in summary["gains"].items()}
-    truth = {"bit_rock.a1": a1, "bit_rock.a2": a2, "bit_rock.beta": beta}
+    truth = {
+        "bit_rock.law": "navarro-lopez-suarez",
+        "bit_rock.a1": a1,
+        "bit_rock.a2": a2,
+        "bit_rock.beta": beta,
+    }
     certificate = summary["certificate"]
     made = drillctl.load(folder / "identified.toml").replace({**truth, **gains})
     j1 = drillctl.simulate(made, "batch").measures.j1
