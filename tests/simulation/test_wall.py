@@ -138,3 +138,8 @@ def test_nodes_are_many_where_the_wall_rubs():
     )
     assert lighter.wall.nodes == nodes  # lanes of one string share them
     assert lighter.wall.total < design.wall.total
+
+
+def test_cycles_are_not_looked_for_where_the_wall_rubs():
+    with pytest.raises(InputError, match="cycles are not found where the wall rubs"):
+        drillctl.limit_cycle(drillctl.load(WELL_A))

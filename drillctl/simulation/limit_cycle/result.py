@@ -135,6 +135,10 @@ def _refuse_printed_law(design: Design) -> None:
             "'navarro-lopez-suarez', or simulate it with the reference engine",
             "bit_rock.law",
         )
+    if design.wall is not None:
+        raise InputError(
+            "cycles are not found where the wall rubs: simulate a long run", "well.friction_factor"
+        )
 
 
 def expected_period(design: Design, harmonic: tuple[HarmonicCycle, ...]) -> float:
