@@ -159,6 +159,22 @@ SLOW_KINDS = {
     "compare": ["pi-vs-dynamic-wob-140kn", *SMALL, "--realizations", "3"],
     "delay": ["pi-vs-delayed-wob-140kn", *SMALL, "--realizations", "3"],
     "tune": ["robust-gains-140kn", *SMALL, "--realizations", "8", "--certificate", "20"],
+    "recommend": [
+        "robust-gains-140kn",
+        *SMALL,
+        *settings(
+            "tune.realizations=8",
+            "tune.certificate.realizations=20",
+            "recommend.laws=['pi']",
+        ),
+    ],
+    "schedule": [
+        "monteiro-trindade-140kn",
+        *SMALL,
+        "--depth",
+        "2000 m:3000 m:2",
+        *settings("schedule.realizations=20"),
+    ],
     "advantage": [
         "pi-vs-pi-dynamic-wob",
         *SMALL,

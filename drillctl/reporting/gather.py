@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import drillctl
-from drillctl import store
+from drillctl import store, units
 from drillctl.design import Design, axis_tables
 from drillctl.errors import DrillctlError, InputError
 from drillctl.progress import SILENT, Progress
@@ -23,8 +23,6 @@ from drillctl.studies.base import Study as Kind
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from drillctl import units
 
 
 @dataclass(frozen=True)
@@ -216,7 +214,8 @@ class Gathered:
         ]
         made = [(one.name, block(one, system), one.shown) for one in kind.tables(result)]
         tables = [one for one in made if one[1].rows]
-        return Shown(said, tuple(kind.checks(result)), (*pictures, *tables))
+        checks = (c._replace(detail=units.told(c.detail, system)) for c in kind.checks(result))
+        return Shown(said, tuple(checks), (*pictures, *tables))
 
     def key(self, names: Iterable[str]) -> str:
         """Hash that identifies a figure of some studies."""

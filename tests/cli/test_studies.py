@@ -179,7 +179,8 @@ def test_in_field_units_nothing_is_in_si(ran):
     result, study, system = ran.result, ran.study, "field"
     said = [*study.remarks(result, system), *ran.drawn]
     said += [units.told(note, system) for note in study.notes(result)]
-    said += [f"{one.question} {one.detail}" for one in study.checks(result)]
+    checks = study.checks(result)
+    said += [f"{one.question} {units.told(one.detail, system)}" for one in checks]
     for table in study.tables(result):
         said += [table.said(system), *table.heads(system), *itertools.chain(*table.texts(system))]
     for picture in study.pictures(result):

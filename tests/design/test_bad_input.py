@@ -537,7 +537,7 @@ def test_sections_named_twice_in_the_model(tmp_path):
          "bit_rock.law: no law 'navarro-lopes-suarez'; did you mean 'navarro-lopez-suarez'? "
          "allowed: bit-aggressiveness, bit-radius-friction, coulomb, jansen-van-den-steen, "
          "navarro-lopez-suarez, "
-         "printed-three-branch, stribeck, tabulated, tucker-wang"),
+         "printed-three-branch, richard-detournay, stribeck, tabulated, tucker-wang"),
         (rig(controller="[controller]\nkp = 1\n"),
          "controller: law is missing; allowed: active-damping, constant-torque, pi, soft-torque, "
          "stiff-speed, torsional-rectification, z-torque"),
@@ -546,7 +546,8 @@ def test_sections_named_twice_in_the_model(tmp_path):
          "weight_on_bit.law: no law 'konstant'; did you mean 'constant'? "
          "allowed: constant, navarro-lopez-suarez, stick-slip-alarm, surface-observer"),
         (rig(more='[start]\nkind = "turn"\n'),
-         "start.kind: got 'turn'; did you mean 'turning'? allowed: rest, turning, wound_up"),
+         "start.kind: got 'turn'; did you mean 'turning'? "
+         "allowed: rest, steady, turning, wound_up"),
         (rig(more='[simulation]\naccuracy = "finer"\n'),
          "simulation.accuracy: got 'finer'; did you mean 'fine'? allowed: fast, fine, standard"),
         (rig(controller='[controller]\nlaw = "pi"\nkp = 1\n'), "controller.ki: is missing"),

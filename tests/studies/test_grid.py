@@ -53,7 +53,14 @@ def lane(lanes, index):
         for name, values in law._asdict().items()
     }
     held["rock_until"] = lanes.program.rock_until[index]
-    for name in ("set_speed", "turning_speed", "nominal_weight", "table_low", "table_high"):
+    for name in (
+        "set_speed",
+        "turning_speed",
+        "bit_speed",
+        "nominal_weight",
+        "table_low",
+        "table_high",
+    ):
         held[name] = getattr(lanes, name)[index]
     return held
 

@@ -170,8 +170,7 @@ def checks(result: Recommendation) -> Iterator[Check]:
     from drillctl.studies.recommend.words import detail, question
 
     for one in result.recommended.criteria:
-        said = units.told(detail(one), result.design.tables.units or "si")
-        yield Check(question(result.recommended, one), one.kept, said)
+        yield Check(question(result.recommended, one), one.kept, detail(one))
 
 
 def notes(result: Recommendation) -> Iterator[str]:
