@@ -188,8 +188,7 @@ def _fragile(one: Assessed) -> Iterable[str]:
             drift.high_at_bound
         )  # fmt: skip
         if off < asked.fragile_tolerance and not at_bound:
-            name = drift.path.removeprefix("controller.")
-            yield f"{name} may be off by {100 * off:.2g} % only"
+            yield f"{c.SPOKEN.get(drift.path, drift.path)} may be off by {100 * off:.2g} % only"
     if one.loop.aside:
         yield "modes grow that are too high for the elements to follow, and were not counted"
     whole = one.loop.whole

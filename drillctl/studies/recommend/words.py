@@ -9,7 +9,7 @@ from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.store.tables import percent
 from drillctl.studies.recommend.assess import FAILS, FRAGILE, Assessed
-from drillctl.studies.recommend.candidates import NAMES, PRESENT
+from drillctl.studies.recommend.candidates import NAMES, PRESENT, SPOKEN
 from drillctl.studies.recommend.criteria import Criterion, drive_of, mode_at
 
 if TYPE_CHECKING:
@@ -20,12 +20,6 @@ SI_OF = {
     "corner": "1/s",
 }  # fmt: skip
 """Units of the numbers that a drive has."""
-SPOKEN = {
-    "controller.kp": "Kp", "controller.ki": "Ki", "controller.absorption": "absorption",
-    "controller.high_pass": "high-pass", "controller.stiffness": "stiffness",
-    "controller.rate": "rate", "controller.spring": "spring", "controller.damper": "damper",
-    "controller.torque": "torque",
-}  # fmt: skip
 
 
 def numbers_of(one: Assessed) -> str:
