@@ -163,11 +163,16 @@ def to_tree(table: Table) -> Tree:
 
 @cache
 def _fields(table: type[Table]) -> tuple[tuple[str, str, units.Kind | None, Any, bool], ...]:
-    """Keys of a table: in Python and in a file, kind, type, whether there must be one."""
+    """Keys of a table: in Python and in a file, kind, type, whether it is written when empty.
+
+    It is where nothing else would be read in its place: a key that must be there, or whose default
+    is not empty.
+    """
     return tuple(
-        (key, info.alias or key, kind_of(info), info.annotation, info.is_required())
+        (key, info.alias or key, kind_of(info), info.annotation,
+         info.is_required() or (isinstance(info.default, (str, tuple)) and len(info.default) > 0))
         for key, info in table.model_fields.items()
-    )
+    )  # fmt: skip
 
 
 def _plain(value: Any, kind: units.Kind | None, annotation: Any = None) -> Any:

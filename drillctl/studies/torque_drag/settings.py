@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pydantic import field_validator
+
+from drillctl.errors import InputError
 from drillctl.rig import table as q
 from drillctl.rig.table import Table
 
@@ -22,3 +25,10 @@ class Settings(Table):
     friction_factors: tuple[q.FrictionFactor, ...] = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
     tripping_speed: q.Velocity = 0.5
     tripping_rotation: q.SpeedOrZero = 0.0
+
+    @field_validator("friction_factors")
+    @classmethod
+    def _some(cls, factors: tuple[float, ...]) -> tuple[float, ...]:
+        if not factors:
+            raise InputError("a sweep needs at least one friction factor")
+        return factors
