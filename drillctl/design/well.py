@@ -156,7 +156,8 @@ def _steel(table: SectionTable) -> tuple[float, float]:
         return table.linear_mass, table.linear_mass / STEEL
     outer, inner = table.diameters
     area = 0.25 * math.pi * (outer**2 - inner**2)
-    area += sum((one.area - area) * one.length for one in table.joint) / table.spacing
+    if table.joint:
+        area += sum((one.area - area) * one.length for one in table.joint) / table.spacing
     return (density * area if table.linear_mass is None else table.linear_mass), area
 
 

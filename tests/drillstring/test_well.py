@@ -159,6 +159,20 @@ def test_every_string_of_pipe_can_be_laid_into_a_vertical_well():
     assert cases["off_bottom"] == {"hook_load": pytest.approx(weight), "torque": 0, "bit_torque": 0}
     assert cases["rotating"]["hook_load"] == pytest.approx(weight - 140e3)
     assert cases["rotating"]["torque"] == pytest.approx(6599.9, abs=0.1)
+    assert "has no survey" in result.notes[0]
     lumped = drillctl.torque_drag(drillctl.load("navarro-lopez-2dof"))
     assert lumped.summary()["cases"]["off_bottom"]["hook_load"] == 0.0
     assert "of lumped springs" in lumped.notes[0]
+
+
+def test_sections_with_and_without_tool_joints_have_their_weight():
+    bare = {"name": "collar", "outer_diameter": "8 in", "inner_diameter": "3 in", "length": "100 m"}
+    jointed = bare | {
+        "joint_outer_diameter": "9 in", "joint_inner_diameter": "3 in", "joint_length": "1 m",
+        "joint_spacing": "10 m",
+    }  # fmt: skip
+    body, thick = (math.pi / 4 * ((od * 0.0254) ** 2 - (3 * 0.0254) ** 2) for od in (8.0, 9.0))
+    for section, area in ((bare, body), (jointed, 0.9 * body + 0.1 * thick)):
+        design = drillctl.load("navarro-lopez-2dof", **{"drillstring.sections": [section]})
+        found = drillctl.torque_drag(design).summary()["cases"]["off_bottom"]["hook_load"]
+        assert found == pytest.approx(9.81 * 7850 * 100 * area)

@@ -122,7 +122,12 @@ def torque_drag(design: Design, progress: Progress = SILENT) -> TorqueDrag:
         hook_loads={case: np.array([one[case].hook_load for one in swept]) for case in CASES},
         torques={case: np.array([one[case].torque[0] for one in swept]) for case in CASES},
         total_depth=(tvd, north, east),
-        notes=(*_lumped(made), *_bends(design), *_buckled(found, limit, placed)),
+        notes=(
+            *_lumped(made),
+            *_vertical(design),
+            *_bends(design),
+            *_buckled(found, limit, placed),
+        ),
     )
 
 
@@ -173,6 +178,13 @@ def _lumped(made: tuple[Run, ...]) -> list[str]:
     """A string without length."""
     none = made[-1].bottom == 1.0 and made[-1].mass == 0.0
     return ["the string is of lumped springs: it has no length, and no weight in the well"] * none
+
+
+def _vertical(design: Design) -> list[str]:
+    """A well of which nothing is known."""
+    if design.tables.well.survey:
+        return []
+    return ["the well has no survey and is taken as vertical, where nothing rubs: give well.survey"]
 
 
 def _bends(design: Design) -> list[str]:
