@@ -92,7 +92,8 @@ def _outcome(arguments: list[str]) -> tuple[int, str]:
             return 1, f"a file ends too early: {stop.__cause__} ({DEBUG})"
         return INTERRUPTED, "interrupted"
     except usage_error as error:
-        return 2, error.format_message()
+        # The words of the library that reads choices are not ours.
+        return 2, error.format_message().replace(": Value error, ", ": ")
     except BrokenPipeError:  # whoever reads the output has left; typer, too, answers with 1
         console.silence()
         return 1, ""

@@ -887,3 +887,9 @@ def test_a_request_to_terminate_says_how_to_resume(tmp_path):
     assert running.returncode == 143
     assert "to resume, repeat with --out" in said
     assert "drillctl: terminated" in said
+
+
+def test_a_choice_that_there_is_not_is_refused_in_plain_words(call):
+    code, out, err = call("show", DESIGN, "--units", "imperial")
+    assert (code, out) == (2, "")
+    assert "Invalid value for '--units': 'imperial' is not one of 'si', 'field'" in err
