@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from drillctl import plots, units
-from drillctl.simulation.measures import MEASURES
+from drillctl.simulation.measures import AXIAL_MEASURES, MEASURES
 from drillctl.store.tables import (
     Column,
     Quantity,
@@ -31,6 +31,11 @@ HIDDEN = (
     "time_outside_table",
 )  # measures that are in the summary alone
 OF_LIMITS = ("time_at_torque_limit", "time_at_power_limit", "time_over_continuous")
+TOLD_BY = dict.fromkeys((*OF_LIMITS, "peak_drive_power"), "peak_drive_power") | dict.fromkeys(
+    AXIAL_MEASURES, "rate_of_penetration"
+)
+"""Which measure tells, by being undefined, that others mean nothing: an ideal drive has no limits
+and no power of its own, most bits have no axial motion."""
 BALANCED = 1e-6  # largest relative residual of a balanced run
 FREE = 20.0  # interval (s) between the samples of a run that is kept for its measures alone
 FINE = 0.05  # and of one that is drawn (s)
@@ -50,9 +55,7 @@ def tables(result: Simulation) -> Iterator[Table]:
         for one in MEASURES.values()
         # Some are measured of compared cases alone.
         if hasattr(result.measures, one.name) and one.name not in HIDDEN
-        # An ideal drive has no limits and no power of its own.
-        if one.name not in (*OF_LIMITS, "peak_drive_power")
-        or result.measures.peak_drive_power is not None
+        if getattr(result.measures, TOLD_BY.get(one.name, "j1")) is not None
     ]
     if result.share_of_yield is not None:
         rows.append(["peak pipe torque over torsional yield", f"{result.share_of_yield:.1%}", ""])
