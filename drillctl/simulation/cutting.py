@@ -210,7 +210,7 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
 def _side(e: Any, system: System, speed: float, torque: bool) -> Any:
     """A system at its steady speed, with the power that its dampers take there."""
     sign = 1.0 if torque else -1.0
-    power = np.concatenate([-sign * system.drag * speed])
+    power = -sign * system.drag * speed
     return e.Side(
         system.a, system.by_top, -system.by_bit if torque else system.by_bit, system.drag * speed,
         np.vstack([system.read, power]), system.damping,
@@ -249,8 +249,8 @@ def _run(e: Any, task: Any, state: Array, stands: bool) -> Located:
     place = task.torsion.read[0] @ state[:n], task.axial.read[0] @ state[n : size - e.WORKS]
     memory = e.Memory(
         np.array([0.0, 1e-3 * task.rock.between / task.set_speed, *place, 0.0]),
-        np.array([phase, int(not stands), 0, 0, 0, 0]), np.zeros((room, 34)),
-        np.zeros((4096, 2)), np.zeros((1, 4)), state.copy(), np.zeros((9, size)),
+        np.array([phase, int(not stands), 0, 0]), np.zeros((room, 34)),
+        np.zeros((4096, 2)), state.copy(), np.zeros((8, size)),
     )  # fmt: skip
     while True:
         ended = e.advance(task, memory, 2000)

@@ -14,13 +14,16 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from numba.extending import register_jitable
 
 from drillctl.simulation.kernel_cache import on_disk
 
 compiled = numba.njit(fastmath={"contract"}, nogil=True, error_model="numpy")
 
 UP, STUCK, DOWN, OFF = -1, 0, 1, 2
-"""Axial phases: rising, at rest and sinking in contact with the rock; off bottom."""
+"""Axial phases: rising, at rest and sinking in contact with the rock; off bottom.
+
+A bit that does not turn is at rest or off bottom."""
 AXIAL_STICK, AXIAL_SLIP, STICK, RELEASE, LOST, REGAINED = range(6)
 """Events; `EVENTS` has their names."""
 EVENTS = (
@@ -85,22 +88,21 @@ class Task(NamedTuple):
     slope: float
     hold: Any  # shape (2,): axial mobility and torsional one of the bit (1/kg, 1/(kg m2))
     path: Any  # X of a rock that varies, at its nodes; and
-    vary: Any  # shape (4,): spread, spacing, way per time, per angle; way per depth
+    vary: Any  # shape (5,): spread, spacing, way per time, per angle, per depth
 
 
 class Memory(NamedTuple):
     """What a run has been through; arrays so that calls can go on."""
 
     now: Any  # shape (5,): time, next step; angle and depth at the start; energy of impacts (J)
-    count: Any  # shape (6,): axial phase, torsional one, steps, events, pieces, refused
+    count: Any  # shape (4,): axial phase, torsional one, steps, events
     # shape (room, 34): begin (s), length (s), 1 if in contact; value, slope and curvature at both
     # ends of bit angle, depth, top angle and angle of the node below; force on the bit and its
     # torque at both ends; phases; depth of cut at both ends
     tape: Any
     events: Any  # shape (room, 2): time, kind
-    pieces: Any  # shape (room, 4): begin, end, axial phase, torsional phase
     state: Any
-    work: Any  # shape (9, states)
+    work: Any  # shape (8, states): rates of the seven stages, the state at the end of the step
 
 
 @compiled
@@ -120,10 +122,10 @@ def _bit(task: Any, x: Any, time: float) -> tuple[float, float, float, float]:
     return angle, speed, _dot(task.axial.read[0], x, n), _dot(task.axial.read[1], x, n)
 
 
-@compiled
-def hermite(x: float, h: float, a: float, va: float, aa: float, b: float, vb: float,
-            ab: float) -> float:  # fmt: skip
-    """Polynomial of degree five through value, slope and curvature at both ends of a step."""
+@register_jitable(fastmath={"contract"}, error_model="numpy")  # called from plain Python too
+def _coefficients(h: float, a: float, va: float, aa: float, b: float, vb: float, ab: float
+                  ) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Of `hermite`, from the first power of the share to the fifth."""
     p, q = va * h, vb * h
     r, s = 0.5 * aa * h * h, 0.5 * ab * h * h
     d = b - a - p - r
@@ -132,6 +134,14 @@ def hermite(x: float, h: float, a: float, va: float, aa: float, b: float, vb: fl
     c3 = 10.0 * d - 4.0 * e + f
     c4 = -15.0 * d + 7.0 * e - 2.0 * f
     c5 = 6.0 * d - 3.0 * e + f
+    return p, r, c3, c4, c5
+
+
+@compiled
+def hermite(x: float, h: float, a: float, va: float, aa: float, b: float, vb: float,
+            ab: float) -> float:  # fmt: skip
+    """Polynomial of degree five through value, slope and curvature at both ends of a step."""
+    p, r, c3, c4, c5 = _coefficients(h, a, va, aa, b, vb, ab)
     return a + x * (p + x * (r + x * (c3 + x * (c4 + x * c5))))
 
 
@@ -139,14 +149,7 @@ def hermite(x: float, h: float, a: float, va: float, aa: float, b: float, vb: fl
 def hermite_slope(x: float, h: float, a: float, va: float, aa: float, b: float, vb: float,
                   ab: float) -> float:  # fmt: skip
     """Derivative of `hermite` with respect to the share."""
-    p, q = va * h, vb * h
-    r, s = 0.5 * aa * h * h, 0.5 * ab * h * h
-    d = b - a - p - r
-    e = q - p - 2.0 * r
-    f = s - r
-    c3 = 10.0 * d - 4.0 * e + f
-    c4 = -15.0 * d + 7.0 * e - 2.0 * f
-    c5 = 6.0 * d - 3.0 * e + f
+    p, r, c3, c4, c5 = _coefficients(h, a, va, aa, b, vb, ab)
     return p + x * (2.0 * r + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))
 
 
@@ -250,26 +253,17 @@ def _contact(task: Any, memory: Any, time: float, axial: int, turning: bool, x: 
         share = 1.0
     elif axial == STUCK:
         share = (task.weight + _free(other, x, n) / task.hold[0] - cut) / rock.flat
-    used = share if axial != STUCK else min(max(share, 0.0), 1.0) if not turning else share
+    used = min(max(share, 0.0), 1.0) if axial == STUCK and not turning else share
     force = cut + rock.flat * used
     torque = rock.torque_per_depth * hard * (depth if axial != OFF else 0.0)
     torque += rock.flat_torque * used
     spare = 0.0
     if not turning:
-        pull = (_free(torsion, x, 0) + _dot_two(torsion.read[1], torsion.by_top) * top) / (
-            task.hold[1]
-        )
+        by_top = _dot(torsion.read[1], torsion.by_top, 0)
+        pull = (_free(torsion, x, 0) + by_top * top) / task.hold[1]
         spare = torque - pull
         torque = pull
     return Contact(depth, force, torque, share, top, spare, cut)
-
-
-@compiled
-def _dot_two(a: Any, b: Any) -> float:
-    total = 0.0
-    for i in range(len(a)):
-        total += a[i] * b[i]
-    return total
 
 
 @compiled
@@ -294,8 +288,7 @@ def _rates(
     torsion, other = task.torsion, task.axial
     n, m = len(torsion.by_bit), len(other.by_bit)
     now = _contact(task, memory, time, axial, turning, x)
-    held = axial == STUCK or (not turning and axial != OFF)
-    force = now.force
+    held, force = axial == STUCK, now.force
     push = -_free(other, x, n) / task.hold[0] if held else task.weight - force
     for i in range(n):
         rate = torsion.load[i] + torsion.by_top[i] * now.top - torsion.by_bit[i] * now.torque
@@ -389,8 +382,11 @@ def _ends(task: Any, memory: Any, row: Any, column: int, time: float, x: Any, ra
 
 @compiled
 def _margins(task: Any, memory: Any, time: float, axial: int, turning: bool, x: Any, out: Any
-             ) -> None:  # fmt: skip
-    """What is left until a phase ends: of contact, of the axial phase twice, of turning."""
+             ) -> Contact:  # fmt: skip
+    """What is left until a phase ends: of contact, of the axial phase twice, of turning.
+
+    Returns what the rock does then.
+    """
     _, speed, _, sinking = _bit(task, x, time)
     now = _contact(task, memory, time, axial, turning, x)
     out[0] = -now.depth if axial == OFF else now.depth
@@ -399,19 +395,27 @@ def _margins(task: Any, memory: Any, time: float, axial: int, turning: bool, x: 
         out[1] = axial * sinking
     elif axial == STUCK and turning:
         out[1], out[2] = now.share, 1.0 - now.share
-    elif not turning:
-        out[0] = 1.0 if axial != OFF else out[0]
-    if axial == STUCK and not turning:
+    elif axial == STUCK:
         out[0] = 1.0
     out[3] = speed if turning else now.spare
+    return now
+
+
+@compiled
+def _used_up(margins: Any, fresh: bool) -> int:
+    """The last margin that a step has used up, or -1; none that a new phase begins without."""
+    found = -1
+    for k in range(4):
+        if margins[1, k] < 0.0 and (margins[0, k] > 0.0 or not fresh):
+            found = k
+    return found
 
 
 @compiled
 def _stop_bit(task: Any, memory: Any, side: Any, offset: int, wanted: float) -> None:
     """Give the bit a velocity by an impulse; notes the energy that is lost."""
-    x, speed, by = memory.state, _dot(side.read[1], memory.state, offset), 0.0
-    for i in range(len(side.by_bit)):
-        by += side.read[1, i] * side.by_bit[i]
+    x, by = memory.state, _dot(side.read[1], side.by_bit, 0)
+    speed = _dot(side.read[1], x, offset)
     change = wanted - speed
     full = speed + (task.set_speed if offset == 0 else 0.0)
     memory.now[4] += 0.5 * (full * full - (full + change) ** 2) / abs(by)
@@ -427,11 +431,9 @@ def _note(memory: Any, kind: int) -> None:
 
 
 @compiled
-def _axial_phase(task: Any, memory: Any, time: float, turning: bool) -> int:
-    """The phase of a bit in contact that neither rises nor sinks."""
-    share = _contact(task, memory, time, STUCK, turning, memory.state).share
-    if not turning:
-        return STUCK
+def _axial_phase(task: Any, memory: Any, time: float) -> int:
+    """The phase of a bit that turns in contact, and neither rises nor sinks."""
+    share = _contact(task, memory, time, STUCK, True, memory.state).share
     return DOWN if share > 1.0 else UP if share < 0.0 else STUCK
 
 
@@ -450,15 +452,13 @@ def _after(task: Any, memory: Any, which: int) -> None:
             count[0] = STUCK
         count[1] = 0
         _note(memory, STICK)
-        if _contact(task, memory, time, count[0], False, x).spare < 0.0:
-            which, turning = 3, False
-        else:
+        if not _contact(task, memory, time, count[0], False, x).spare < 0.0:
             return
     if which == 3:
         count[1] = 1
         _note(memory, RELEASE)
         if axial != OFF:
-            count[0] = _axial_phase(task, memory, time, True)
+            count[0] = _axial_phase(task, memory, time)
             if count[0] != STUCK:
                 _note(memory, AXIAL_SLIP)
         return
@@ -477,7 +477,7 @@ def _after(task: Any, memory: Any, which: int) -> None:
         return
     if axial in (UP, DOWN):
         _stop_bit(task, memory, task.axial, n, 0.0)
-        count[0] = _axial_phase(task, memory, time, turning)
+        count[0] = _axial_phase(task, memory, time)
         _note(memory, AXIAL_STICK)
         if count[0] != STUCK:
             _note(memory, AXIAL_SLIP)
@@ -500,8 +500,7 @@ def _advance(task: Any, memory: Any, most: int) -> int:
             return MORE
         axial, turning = count[0], count[1] != 0
         _rates(task, memory, time, axial, turning, memory.state, work[0])
-        _margins(task, memory, time, axial, turning, memory.state, margins[0])
-        begin = _contact(task, memory, time, axial, turning, memory.state)
+        begin = _margins(task, memory, time, axial, turning, memory.state, margins[0])
         _, speed, _, _ = _bit(task, memory.state, time)
         longest = REACH * task.rock.between / max(speed, task.set_speed)
         h = min(now[1], longest, task.duration - time)
@@ -511,16 +510,12 @@ def _advance(task: Any, memory: Any, most: int) -> int:
             error = _step(task, memory, time, h, axial, turning)
             if error <= 1.0:
                 break
-            count[5] += 1
             h *= max(0.2, 0.9 * error**-0.2) if error < 1e30 else 0.1
             if h < 1e-13 * max(time, task.duration * 1e-3):
                 return TOO_SHORT
         grown = min(5.0, 0.9 * max(error, 1e-12) ** -0.2)
-        _margins(task, memory, time + h, axial, turning, work[7], margins[1])
-        first = -1
-        for k in range(4):
-            if margins[1, k] < 0.0 and (margins[0, k] > 0.0 or not fresh):
-                first = k
+        end = _margins(task, memory, time + h, axial, turning, work[7], margins[1])
+        first = _used_up(margins, fresh)
         if first >= 0:
             # Bisection of the length of the step: each trial is a step of its own.
             low, high = 0.0, h
@@ -528,10 +523,7 @@ def _advance(task: Any, memory: Any, most: int) -> int:
                 trial = 0.5 * (low + high)
                 _step(task, memory, time, trial, axial, turning)
                 _margins(task, memory, time + trial, axial, turning, work[7], margins[1])
-                over = -1
-                for k in range(4):
-                    if margins[1, k] < 0.0 and (margins[0, k] > 0.0 or not fresh):
-                        over = k
+                over = _used_up(margins, fresh)
                 if over >= 0:
                     high, first = trial, over
                 else:
@@ -540,11 +532,11 @@ def _advance(task: Any, memory: Any, most: int) -> int:
                     break
             h = high
             _step(task, memory, time, h, axial, turning)
+            end = _contact(task, memory, time + h, axial, turning, work[7])
         row = memory.tape[count[2]]
         row[0], row[1], row[2] = time, h, 1.0 if axial != OFF else 0.0
         _ends(task, memory, row, 0, time, memory.state, work[0])
         _ends(task, memory, row, 3, time + h, work[7], work[6])
-        end = _contact(task, memory, time + h, axial, turning, work[7])
         row[LAST], row[LAST + 1] = begin.force, end.force
         row[LAST + 2], row[LAST + 3] = begin.torque, end.torque
         row[LAST + 5] = max(begin.depth, 0.0) * task.rock.blades

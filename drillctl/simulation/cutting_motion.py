@@ -163,9 +163,8 @@ class CuttingMotion:
         lengths, duration = self._tape[:, 1], self.design.tables.simulation.duration
         cut = 0.5 * (self._tape[:, e.LAST + 5] + self._tape[:, e.LAST + 6])
         drilled = float(self._tape[-1, e.FIRST + 9] - self._tape[0, e.FIRST + 6])
-        at_rest = (self.axial == e.STUCK) | ((self.directions == 0.0) & (self.axial != e.OFF))
         return cutting.axial_measures(
             self.design.bit_rock, duration, drilled,
-            float(cut @ lengths) / duration, float(lengths[at_rest].sum()),
+            float(cut @ lengths) / duration, float(lengths[self.axial == e.STUCK].sum()),
             float(lengths[self.axial == e.OFF].sum()), self.energy.bit,
         )  # fmt: skip
