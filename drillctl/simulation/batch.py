@@ -201,7 +201,8 @@ def _cut(
     lanes: Lanes, prepared: Prepared, every: int, give_up: float, watch: Watch | None
 ) -> tuple[Array, Array]:
     """The same of bits that cut their own wake: those rows, and behind them the axial ones."""
-    from drillctl.simulation import cutting, cutting_step
+    from drillctl.simulation import cutting
+    from drillctl.simulation import cutting_step as c
     from drillctl.simulation.kernels import rows as r
 
     duration = prepared.duration
@@ -212,10 +213,9 @@ def _cut(
         _in_threads,
     )  # fmt: skip
     raw = np.zeros((r.MEASURES + 4, len(lanes)))
-    for ours, theirs in cutting_step.ROWS.items():
+    for ours, theirs in c.ROWS.items():
         raw[(getattr(r, theirs) - r.FIRST_MEASURE) // r.WIDTH] = rows[ours]
-    c = cutting_step
-    raw[(r.WORK - r.FIRST_MEASURE) // r.WIDTH] += rows[cutting_step.AXIAL_WORK]
+    raw[(r.WORK - r.FIRST_MEASURE) // r.WIDTH] += rows[c.AXIAL_WORK]
     raw[r.MEASURES :] = rows[[c.DEPTH, c.CUT, c.AXIAL_STUCK, c.OFF_BOTTOM]]
     return raw, traces
 

@@ -23,7 +23,7 @@ FINEST = 3000.0  # most of them between two blades
 
 (J1, STUCK_TIME, STICKS, LATE_LOW, LATE_HIGH, LATE_ANGLE, LATE_STUCK, TURNED, LOW, HIGH, PEAK_PIPE,
  PEAK_TOP, OUTSIDE_NARROW, OUTSIDE_WIDE, WORK, WEIGHT, POWER, DEPTH, CUT, AXIAL_STUCK, OFF_BOTTOM,
- AXIAL_WORK, FIRST_LOST, BOUND, MEASURED) = range(25)  # fmt: skip
+ AXIAL_WORK, BOUND, MEASURED) = range(24)  # fmt: skip
 """What is measured of a lane: sums over time, extremes, the last moments outside the bands."""
 ROWS = {
     J1: "J1", STUCK_TIME: "STUCK_TIME", STICKS: "STICKS", LATE_LOW: "LATE_LOW",
@@ -169,7 +169,7 @@ def _advance(
     lane: Any, torsion: Any, axial: Any, clock: Any, table: Any, tied: Any, sunk: Any, z: Any,
     y: Any, ring: Any, out: Any, trace: Any,
 ) -> None:  # fmt: skip
-    """Advance one lane from time zero to the end; `z` and `y` are its states."""
+    """Advance one lane from time zero to the end; `z` and `y` are its states, `out` holds zeros."""
     step, mask = clock.step, RING - 1
     read, seen = torsion.read, axial.read
     # Answers at the end of a step to a torque, or a force, held over it.
@@ -194,12 +194,7 @@ def _advance(
     cut = lane.slope * lane.between  # per blade, at the begin of the step
     stuck, contact = speed == 0.0, True
     hard = 1.0
-    for k in range(MEASURED):
-        out[k] = 0.0
-    out[LOW] = out[LATE_LOW] = math.inf
-    out[HIGH] = out[LATE_HIGH] = -math.inf
-    out[FIRST_LOST] = math.inf
-    out[OUTSIDE_NARROW] = out[OUTSIDE_WIDE] = 0.0
+    out[LATE_LOW], out[LATE_HIGH] = math.inf, -math.inf
     out[STICKS] = 1.0 if stuck else 0.0
     out[LOW] = out[HIGH] = speed
     force = lane.weight
@@ -253,7 +248,6 @@ def _advance(
         was = cut if contact else 0.0
         # The axial inclusion.
         new_depth, new_sinking, g = 0.0, 0.0, 0.0
-        contact_new = True
         if stuck and contact:
             push = -free_sinking / by_speed
             new_depth, new_sinking = free_depth + by_depth * push, 0.0
@@ -352,7 +346,6 @@ def _advance(
             out[AXIAL_STUCK] += step
         if not contact_new:
             out[OFF_BOTTOM] += step
-            out[FIRST_LOST] = min(out[FIRST_LOST], end)
         speed, turned, depth, sinking = new_speed, new_turned, new_depth, new_sinking
         cut, contact = new_cut, contact_new
         if (n & 63) == 63 and out[J1] > clock.give_up * lane.set_speed:
