@@ -12,6 +12,8 @@ from collections import namedtuple
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 
 class Ramp(NamedTuple):
     """A value that moves along a straight line to zero and stays there.
@@ -136,8 +138,9 @@ class Program(NamedTuple):
 
     @property
     def moves(self) -> bool:
-        """Whether anything changes at all."""
-        return self != NONE
+        """Whether anything changes at all, in any lane where the numbers are arrays."""
+        ramps = (*self.speed.ramps, *self.weight.ramps)
+        return any(np.any(x != 0.0) for x in (self.rock_until, *(ramp.first for ramp in ramps)))
 
     def breaks(self) -> list[float]:
         """Times (s) at which something begins, ends or jumps."""

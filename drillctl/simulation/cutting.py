@@ -18,7 +18,7 @@ from drillctl.arrays import Array
 from drillctl.errors import InputError, SimulationError
 from drillctl.rig.axial import AxialString
 from drillctl.rig.bit_rock.richard_detournay import RichardDetournay
-from drillctl.rig.bit_rock.variation import NoVariation, Variation, path
+from drillctl.rig.bit_rock.variation import NoVariation, Variation, path, paths
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import PI, ConstantTorque
 from drillctl.rig.weight_on_bit import ConstantWeight
@@ -26,8 +26,6 @@ from drillctl.rig.weight_on_bit import ConstantWeight
 if TYPE_CHECKING:
     from drillctl.design import Design
     from drillctl.simulation.lanes import Lanes
-
-DEEPEST = 3.0  # a path over depth is this much longer than a run of steady drilling
 
 
 def refuse_others(drive: Any, weight: Any, moves: bool, wall: Any) -> None:
@@ -160,7 +158,7 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
     """Simulate a design with located events."""
     from drillctl.simulation import cutting_events as e
 
-    refuse_others(design.top_drive, design.weight_on_bit, _programmed(design), design.wall)
+    refuse_others(design.top_drive, design.weight_on_bit, design.program.moves, design.wall)
     assert design.axial is not None
     rock, speed = design.bit_rock, design.speed
     assert isinstance(rock, RichardDetournay)
@@ -223,23 +221,13 @@ def _size(modal: Array, displacement: float) -> float:
     return float(np.abs(modal).sum(axis=1).max() * displacement) + 1e-300
 
 
-def _programmed(design: Design) -> bool:
-    return bool(design.program.breaks()) or design.program.rock_until > 0.0
-
-
 def _varying(
     variation: Variation | NoVariation, duration: float, speed: float, velocity: float
 ) -> tuple[Array, Array]:
     if isinstance(variation, NoVariation):
         return np.zeros(2), np.array([0.0, 1.0, 0.0, 0.0, 0.0])
-    nodes = _nodes(variation, duration, speed, velocity)
-    one = variation
+    one, nodes = variation, int(variation.nodes(duration, speed, velocity))
     return path(one, nodes), np.array([one.spread, one.spacing, one.advance, one.turns, one.sinks])
-
-
-def _nodes(variation: Any, duration: float, speed: Any, velocity: Any) -> int:
-    way = duration * DEEPEST * (variation.turns * speed + variation.sinks * velocity)
-    return int(np.max(np.ceil((way + duration * variation.advance) / variation.spacing))) + 2
 
 
 def _run(e: Any, task: Any, state: Array, stands: bool) -> Located:
@@ -339,11 +327,7 @@ def run(
     """What was measured, shape (`MEASURED`, lanes), and traces, shape (samples, signals, lanes)."""
     from drillctl.simulation import cutting_step as c
 
-    program = lanes.program
-    moves = any(np.any(ramp.first != 0.0)
-                for ramp in (*program.speed.ramps, *program.weight.ramps))  # fmt: skip
-    moves = moves or bool(np.any(program.rock_until > 0.0))
-    refuse_others(lanes.drive, lanes.weight, moves, lanes.wall)
+    refuse_others(lanes.drive, lanes.weight, lanes.program.moves, lanes.wall)
     count, rock, weight = len(lanes), lanes.friction, lanes.weight[0]
     torsion, axial, (tied, into), (sunk, down) = _prepared(
         lanes.string, lanes.axial, scheme.step, scheme.modes, 1.0
@@ -396,11 +380,8 @@ def _tables(lanes: Lanes, duration: float, velocity: Array) -> tuple[Array, Arra
     one = lanes.variation
     if isinstance(one, NoVariation):
         return np.zeros((1, 2)), np.zeros(len(lanes))
-    nodes = _nodes(one, duration, lanes.set_speed, velocity)
-    columns = np.stack([np.broadcast_to(x, len(lanes)) for x in one]).T
-    unlike, which = np.unique(columns, axis=0, return_inverse=True)
-    table = np.stack([path(Variation(*row), nodes) for row in unlike])
-    return table, np.asarray(which.reshape(-1), dtype=float)
+    table, row = paths(one, int(np.max(one.nodes(duration, lanes.set_speed, velocity))))
+    return table, row.astype(float)
 
 
 def axial_measures(

@@ -175,8 +175,9 @@ def variation_step(variation: Any, duration: float, set_speed: Array) -> Any:
 
     if isinstance(variation, NoVariation):
         return SameRock(np.zeros(1))
-    table, begin = paths(variation, duration, set_speed)
-    last = table.shape[1] - 2.0 + np.array([0.0])
+    nodes = int(np.max(variation.nodes(duration, set_speed)))
+    table, row = paths(variation, nodes)
+    begin, last = row * float(nodes), np.array([nodes - 2.0])
     per_spacing = 1.0 / variation.spacing
     return VariationStep(
         table.ravel(), last, begin, variation.advance, variation.turns, per_spacing,
@@ -188,9 +189,7 @@ def program_step(program: Any) -> Any:
     """The kernel's form of the programs of all lanes; nothing where none moves."""
     from drillctl.simulation.kernels.program_step import LongPrograms, NoProgram, Programs
 
-    ramps = (*program.speed.ramps, *program.weight.ramps)
-    moves = any(np.any(ramp.first != 0.0) for ramp in ramps)
-    if not moves and not np.any(program.rock_until > 0.0):
+    if not program.moves:
         return NoProgram(np.zeros(1))
     kind: Any = LongPrograms if isinstance(program.speed, Path) else Programs
     return kind(*program.speed, *program.weight, program.rock_until)

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import model_validator
 
 from drillctl import units
-from drillctl.arrays import Array
+from drillctl.arrays import Array, Index
 from drillctl.errors import InputError
 from drillctl.rig import table as q
 from drillctl.rig.table import Table
@@ -28,7 +28,7 @@ FINEST = 10.0  # fewest nodes in a correlation length
 UNITS = {"depth": units.LENGTH, "angle": units.ANGLE, "time": units.TIME}
 ALONG = ("length", "spacing")  # keys whose unit follows from what they are over
 MOST_NODES = 10_000_000  # of a path: a run can mean no more
-AHEAD = 3.0  # a path over angle is this much longer than a run at set speed; then it stays
+AHEAD = 3.0  # a path over angle or depth is this much longer than steady drilling; then it stays
 HIGHEST = 4.5  # normal numbers beyond it do not matter: one in 300,000
 RATE_OF_PENETRATION = 20.0 / 3600.0  # m/s, where a design gives none
 
@@ -126,9 +126,9 @@ class Variation(NamedTuple):
         """Factor that the rock hardly ever exceeds."""
         return np.exp(HIGHEST * self.spread - 0.5 * self.spread**2)
 
-    def nodes(self, duration: float, set_speed: Any) -> Any:
-        """Number of nodes of the path of a run."""
-        way = duration * (self.advance + AHEAD * self.turns * set_speed)
+    def nodes(self, duration: float, set_speed: Any, rate: Any = 0.0) -> Any:
+        """Number of nodes of the path of a run, its bit sinking at `rate` (m/s) by itself."""
+        way = duration * (self.advance + AHEAD * (self.turns * set_speed + self.sinks * rate))
         return np.ceil(way / self.spacing).astype(int) + 2
 
     def longest_step(self, set_speed: Any) -> Any:
@@ -166,10 +166,8 @@ def path(variation: Variation, nodes: int) -> Array:
     return np.asarray(lfilter([1.0], [1.0, -kept], numbers))
 
 
-def paths(variation: Variation, duration: float, set_speed: Array) -> tuple[Array, Array]:
-    """Paths of many lanes, shape (paths, nodes), and where in it each lane's begins, (lanes,)."""
+def paths(variation: Variation, nodes: int) -> tuple[Array, Index]:
+    """Paths of many lanes, shape (paths, nodes), and the row of each lane's, (lanes,)."""
     columns = np.stack([*variation]).T
     unlike, which = np.unique(columns, axis=0, return_inverse=True)
-    count = int(np.max(variation.nodes(duration, set_speed)))
-    table = np.stack([path(Variation(*row), count) for row in unlike])
-    return table, np.asarray(which.reshape(-1) * float(count), dtype=float)
+    return np.stack([path(Variation(*row), nodes) for row in unlike]), which.reshape(-1)
