@@ -253,13 +253,11 @@ def _wall_margin(rig: Any, time: float, phase: int, state: Any) -> float:
 def _turn_wall(rig: Any, time: float, phase: int, state: Any) -> None:
     """Change the nodes whose margins are used up, at least the one that has the least left."""
     n, table = rig.nodes, f.wall_of(rig)
-    ratio, critical, count = rig.wall_ratio, rig.wall_critical, rig.wall_nodes
-    if count > 0:
-        f.rates_of(rig, time, phase, state, f.scratch_of(rig))
+    ratio, critical = rig.wall_ratio, rig.wall_critical
     # An event that was located to the last bit looks like the place that a node came from: the one
     # with the least left changes in any case.
     least = _wall_margin(rig, time, phase, state)
-    for k in range(count):
+    for k in range(rig.wall_nodes):
         i = n + int(table[wall.NODE, k])
         speed = state[i] + rig.set_speed
         margin = wall.margin_of(table, k, speed, ratio, critical)
