@@ -147,14 +147,19 @@ def cutting_loop(design: Design) -> CuttingLoop:
     """
     chi = Characteristic(design)
     limit, whole = frequency_limit(chi, design)
-    right = _right_edge(chi, limit)
-    count = count_roots(chi, complex(AXIS * chi.scale, -limit), complex(right, limit))
-    found = find_roots(chi, right, limit)
+    count, found = _roots(chi, limit)
     return CuttingLoop(
         unstable_roots=count, roots=found, limit_hz=limit / (2.0 * math.pi), whole=whole,
         boundary_speed=axial_boundary(design), depth_of_cut=chi.depth_of_cut,
         rate_of_penetration=chi.depth_of_cut / (2.0 * math.pi) * chi.speed,
     )  # fmt: skip
+
+
+def _roots(chi: Characteristic, limit: float) -> tuple[int, ComplexArray]:
+    """Number of roots on the right, and those found, up to a frequency (rad/s)."""
+    right = _right_edge(chi, limit)
+    count = count_roots(chi, complex(AXIS * chi.scale, -limit), complex(right, limit))
+    return count, find_roots(chi, right, limit)
 
 
 def frequency_limit(chi: Characteristic, design: Design) -> tuple[float, bool]:
@@ -288,10 +293,6 @@ def growth_map(design: Design, speeds: Array, weights: Array) -> tuple[Array, Ar
             })  # fmt: skip
             chi = Characteristic(one)
             limit, _ = frequency_limit(chi, one)
-            right = _right_edge(chi, limit)
-            counts[i, j] = count_roots(
-                chi, complex(AXIS * chi.scale, -limit), complex(right, limit)
-            )
-            found = find_roots(chi, right, limit)
+            counts[i, j], found = _roots(chi, limit)
             growth[i, j] = found[0].real if len(found) else math.nan
     return counts, growth
