@@ -85,6 +85,15 @@ class Line:
         )
         return np.sqrt(np.maximum(square, 0.0))
 
+    def side_forces(self, tension: Array) -> tuple[Array, Array]:
+        """The same in the middle and on the mean of every cell; of the tension at the ends (N)."""
+        above, below = tension[:-1], tension[1:]
+        top, middle, bottom = (
+            self.side_force(k, force)
+            for k, force in enumerate((above, 0.5 * (above + below), below))
+        )
+        return middle, (top + 4.0 * middle + bottom) / 6.0
+
 
 def lay(path: Path, runs: tuple[Run, ...], mud_density: float) -> Line:
     """A string cut into cells, each of one run and one arc."""
@@ -170,13 +179,10 @@ def drag(
     # Against a string that goes down the friction acts upwards: tension grows less.
     shares = np.array([motion.shares(float(r)) for r in line.radius])
     along = tension(line, -weight_on_bit, -friction * shares[:, 0], coupled)
-    middle = 0.5 * (along[:-1] + along[1:])
-    scale = 1.0 if coupled else 0.0
-    sides = [line.side_force(k, scale * f) for k, f in enumerate((along[:-1], middle, along[1:]))]
-    each = (sides[0] + 4.0 * sides[1] + sides[2]) / 6.0 * line.length
-    each = each * friction * shares[:, 1] * line.radius
+    middle, mean = line.side_forces(along if coupled else 0.0 * along)
+    each = mean * line.length * friction * shares[:, 1] * line.radius
     torque = bit_torque + np.concatenate([np.cumsum(each[::-1])[::-1], [0.0]])
-    return Drag(line.depth, along, torque, sides[1])
+    return Drag(line.depth, along, torque, middle)
 
 
 def sinusoidal_limit(line: Line, runs: tuple[Run, ...]) -> Array:

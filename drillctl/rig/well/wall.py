@@ -48,11 +48,7 @@ def edges_of(wall: Wall, depth: Array) -> Array:
 def cell_torque(line: Line, factor: Array, weight_on_bit: float, coupled: bool) -> Array:
     """Largest torque of the wall on each cell of a string that turns (N m)."""
     along = tension(line, -weight_on_bit, 0.0 * factor)
-    if not coupled:
-        along = 0.0 * along
-    ends = (along[:-1], 0.5 * (along[:-1] + along[1:]), along[1:])
-    sides = [line.side_force(k, force) for k, force in enumerate(ends)]
-    mean = (sides[0] + 4.0 * sides[1] + sides[2]) / 6.0
+    _, mean = line.side_forces(along if coupled else 0.0 * along)
     return np.asarray(mean * factor * line.radius * line.length)
 
 
