@@ -364,7 +364,7 @@ DIAMETERS = "m across"  # for `displayed`: a length that is read in mm or in
 _SHOWN: dict[str, dict[str, str]] = {
     "si": {
         "rad/s": "rpm", "N": "kN", "N*m": "kN*m", "N*s/rad": "kN*s/rad", "J": "kJ",
-        "rad/(N*m*s)": "rpm/(kN*m)", "m/s": "m/h", DIAMETERS: "mm",
+        "rad/(N*m*s)": "rpm/(kN*m)", "m/s": "m/h", "W": "kW", "Pa": "MPa", DIAMETERS: "mm",
     },
     "field": {
         "rad/s": "rpm", "rad": "rev", "s/rad": "1/rpm", "N": "klbf", "N/s": "klbf/s",
