@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from drillctl.simulation.lanes import Lanes
 
 
-def refuse_others(drive: Any, weight: Any, moves: bool, wall: Any) -> None:
+def refuse_others(drive: Any, weight: Any, moves: bool) -> None:
     """Refuse (`InputError`) what this law does not go with yet."""
     if not isinstance(drive, (PI, ConstantTorque)):
         raise InputError(
@@ -42,8 +42,6 @@ def refuse_others(drive: Any, weight: Any, moves: bool, wall: Any) -> None:
             "motion, and the hook's law is 'constant'",
             "weight_on_bit.law",
         )
-    if wall is not None:
-        raise InputError("'richard-detournay' goes with no friction of the wall yet", "well")
     if moves:
         raise InputError("'richard-detournay' goes with no program yet", "scenario")
 
@@ -158,7 +156,7 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
     """Simulate a design with located events."""
     from drillctl.simulation import cutting_events as e
 
-    refuse_others(design.top_drive, design.weight_on_bit, design.program.moves, design.wall)
+    refuse_others(design.top_drive, design.weight_on_bit, design.program.moves)
     assert design.axial is not None
     rock, speed = design.bit_rock, design.speed
     assert isinstance(rock, RichardDetournay)
@@ -327,7 +325,7 @@ def run(
     """What was measured, shape (`MEASURED`, lanes), and traces, shape (samples, signals, lanes)."""
     from drillctl.simulation import cutting_step as c
 
-    refuse_others(lanes.drive, lanes.weight, lanes.program.moves, lanes.wall)
+    refuse_others(lanes.drive, lanes.weight, lanes.program.moves)
     count, rock, weight = len(lanes), lanes.friction, lanes.weight[0]
     torsion, axial, (tied, into), (sunk, down) = _prepared(
         lanes.string, lanes.axial, scheme.step, scheme.modes, 1.0

@@ -151,6 +151,14 @@ def test_what_it_does_not_go_with_is_refused(design):
         )
     with pytest.raises(InputError, match="PI"):
         drillctl.simulate(design.replace({"controller.drive.torque_limit": "30 kN*m"}))
+    starts = {"scenario.speed": {"start": "40 rpm", "begin": "1 s", "end": "2 s"}}
+    for engine, value in (("reference", starts), ("batch", starts),
+                          ("batch", {"scenario.bit_rock": {"until": "1 s"}})):  # fmt: skip
+        with pytest.raises(InputError, match="no program yet"):
+            drillctl.simulate(design.replace(value), engine)
+    well = {"survey": [["0 m", "0 deg", "0 deg"], ["100 m", "60 deg", "0 deg"]]}
+    with pytest.raises(InputError, match="no solver has both"):
+        design.replace({"well": well | {"friction_factor": 0.3}})
     assert steps.RING & (steps.RING - 1) == 0
 
 
