@@ -70,6 +70,7 @@ def test_parts_that_stick_are_shown(runs, engine):
     # The front of slip runs down the string: upper nodes break loose first.
     first = [int(np.argmax(run.wall_stuck[:, node] == 0.0)) for node in range(12)]
     assert first == sorted(first)
+    assert first[0] > 0  # all of them do
     assert len(drillctl.plots.sticking(run).axes) == 2
 
 
@@ -123,7 +124,7 @@ def test_more_sweeps_change_little(runs):
         free = free + 0.1 * random.standard_normal(len(friction))
         exact, found = (solve(free, before, n) for n in (400, wall_step.SWEEPS))
         slid = np.abs(matrix @ (found - exact))
-        assert slid.max() < 5e-3  # rad/s
+        assert slid.max() < 1e-5  # rad/s; five sweeps leave twice that
 
 
 def test_nodes_are_many_where_the_wall_rubs():
