@@ -264,6 +264,8 @@ def _longer(table: Array, used: int) -> Array:
 
 # The batch engine.
 
+AXIAL_PHASE = 1.0  # axial modes that turn more than this (rad) in a step are left out
+
 
 def blocks(system: System, step: float) -> Any:
     """The exact step of a system in 2 x 2 blocks; refused where it does not fall into any."""
@@ -310,10 +312,8 @@ def _pairs(system: System, n: int) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _prepared(
-    string: Drillstring, axial: AxialString, step: float, modes: int, phase: float
-) -> Any:
-    carried = max(1, int((axial.modes[0] * step <= phase).sum()))
+def _prepared(string: Drillstring, axial: AxialString, step: float, modes: int) -> Any:
+    carried = max(1, int((axial.modes[0] * step <= AXIAL_PHASE).sum()))
     one, two = torsional(string, modes), along(axial, carried)
     return one, two, blocks(one, step), blocks(two, step)
 
@@ -328,7 +328,7 @@ def run(
     refuse_others(lanes.drive, lanes.weight, lanes.program.moves)
     count, rock, weight = len(lanes), lanes.friction, lanes.weight[0]
     torsion, axial, (tied, into), (sunk, down) = _prepared(
-        lanes.string, lanes.axial, scheme.step, scheme.modes, 1.0
+        lanes.string, lanes.axial, scheme.step, scheme.modes
     )
     point = steady(rock, weight, lanes.set_speed)
     angles, speeds = begin(

@@ -157,7 +157,7 @@ class Lanes:
 
     def _weights(self) -> Any:
         """Weights (N) that a law which does not act at once may ask for."""
-        # Ramps of both signs: not more than what all that fall make of it.
+        # Ramps that rise from below take from it: those that fall bound it alone.
         over = 1.0 + sum(np.maximum(ramp.first, 0.0) for ramp in self.program.weight.ramps)
         if not hasattr(self.weight, "gain"):
             return self.weight[0] * over
