@@ -1,6 +1,7 @@
 """What a log says of the rock, and what it does not; logs are made by characteristics."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ import drillctl
 from drillctl.cli import run
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
-from drillctl.studies.identify.compute import identify
+from drillctl.logs.laws import EXPONENTIAL_LAW
+from drillctl.studies.identify.compute import _findings, identify
 from drillctl.studies.identify.written import write as write_design
 from tests.logs.synthetic import WEIGHT, Rig, sampled, write
 
@@ -148,6 +150,18 @@ def test_a_constant_torque_is_flat(tmp_path):
     result = identify(design(), [path])
     assert result.law == "jansen-van-den-steen"
     assert result.fitted.values * WEIGHT == pytest.approx([5000.0, 14000.0], rel=0.03)
+
+
+def test_a_straight_fall_leaves_beta_open():
+    x = np.array([2000.0, 6000.0, np.log(0.01)])
+    main = SimpleNamespace(
+        sticks=(True, True), quiet=False, slowest=0.0, fastest=12.0, x=x, family=EXPONENTIAL_LAW,
+        curve=EXPONENTIAL_LAW.curve(x),
+    )  # fmt: skip
+    law = SimpleNamespace(names=("a1", "a2", "beta"), values=np.ones(3), half=np.zeros(3))
+    (said,), known = _findings(main, law, [], True, WEIGHT)
+    assert said.startswith("the torque falls along a straight line over the speeds seen: beta is")
+    assert known == {"a1": False, "a2": True, "beta": False, "static_friction": True}
 
 
 def test_several_damped_sections(tmp_path):

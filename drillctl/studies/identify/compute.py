@@ -461,8 +461,8 @@ def _findings(
     ):
         said["beta"] = said["a1"] = False
         findings.append(
-            "the torque falls straight over the speeds seen "
-            "N m s/rad): beta is not identified, use the tabulated law"
+            "the torque falls along a straight line over the speeds seen: beta is not identified, "
+            "use the tabulated law"
         )
     for name, value, half in zip(law.names, law.values, law.half, strict=True):
         if said[name] and half > ident.LOOSE * abs(value) * 1.645:
