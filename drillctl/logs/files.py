@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from drillctl.errors import InputError
-from drillctl.logs.quantities import QUANTITIES, Head, spelt
-from drillctl.progress import Progress
+from drillctl.logs.quantities import QUANTITIES, Head, spelt, words
+from drillctl.progress import SILENT, Progress
 
 PIECE = 262_144  # rows at a time
 ABSENT = (-999.25, -9999.0, -999.0, -9999.25)
-"""What stands for no value in files of this trade."""
+"""Numbers that stand for a missing value in well logs."""
 _WORDS = ["NULL", "null", "NaN", "nan", "NA", "N/A", "--", "-", "", "None"]
 EXTRAS = {"pyarrow": "parquet", "h5py": "mat", "lasio": "las"}
 
@@ -85,7 +85,7 @@ class _Text:
 
 def _csv(path: Path) -> Source:
     layout = _layout(path)
-    first = next(_csv_pieces(path, layout, range(len(layout.heads)), _Unheard(), rows=50), [])
+    first = next(_csv_pieces(path, layout, range(len(layout.heads)), SILENT, rows=50), [])
     named = [k for k, head in enumerate(layout.heads) if _is_time(head.name)]
     dated = any(_is_text(first[k]) for k in named) if first else False
 
@@ -96,20 +96,12 @@ def _csv(path: Path) -> Source:
 
 
 def _is_time(name: str) -> bool:
-    from drillctl.logs.quantities import words
-
     return bool(re.search(r"\b(time|date|t|stamp)\b|timestamp|datetime", words(name)))
 
 
 def _is_text(values: Any) -> bool:
     values = np.asarray(values)
     return values.dtype.kind in "OUM" and len(values) > 0
-
-
-class _Unheard:
-    def begin(self, task: str, total: int) -> None: ...
-
-    def advance(self, done: int) -> None: ...
 
 
 def _layout(path: Path) -> _Text:

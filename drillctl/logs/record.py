@@ -6,7 +6,7 @@ Outliers of one or two samples are replaced by the line between their neighbours
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -253,7 +253,7 @@ def _mend(
                   _places(absent, time)))  # fmt: skip
         if name in NEEDED:
             usable &= ~absent
-    if name in ("hook_load",):
+    if name == "hook_load":
         return
     spikes = _spikes(values)
     if len(spikes):
@@ -340,11 +340,3 @@ def _clipped(values: Any, turning: Any) -> float | None:
     if levels < 50 or at.mean() < CLIPPED or runs.sum() < 0.5 * at.sum():
         return None
     return float(top)
-
-
-def stretch_of(logs: Iterable[Log]) -> Sequence[Log]:
-    """Logs of one well as a sequence; refused if there is none."""
-    result = tuple(logs)
-    if not result:
-        raise InputError("there is no log", "--log")
-    return result

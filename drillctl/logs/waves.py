@@ -19,7 +19,7 @@ import scipy.linalg
 from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
-from drillctl.arrays import Array, ComplexArray, Index
+from drillctl.arrays import Array, ComplexArray
 from drillctl.rig.drillstring import Parts
 
 FINEST = 0.025  # step of the bit (s) at most: the falling friction stays on one branch
@@ -213,8 +213,3 @@ def split(one: Track, inertia: float, damping: float, zeta: float) -> tuple[Arra
     """The waves that go down and come up (N m), of a drive with an inertia and a damper."""
     torque = one.torque - inertia * one.rise - damping * one.speed
     return torque + zeta * one.speed, torque - zeta * one.speed
-
-
-def rows_between(time: Array, begin: float, end: float) -> Index:
-    """Numbers of the samples in an interval."""
-    return np.flatnonzero((time >= begin) & (time <= end))

@@ -33,12 +33,13 @@ NUMBERS = {
     "bit_inertia": ("inertia at the bit", "kg*m^2"),
     "drive_inertia": ("drive inertia at the pipe", "kg*m^2"),
 }  # fmt: skip
+FOOT_POUND = units.factor("lbf*ft", units.TORQUE)
 WRONG_UNITS = (
-    (units._KNOWN["N*m"]["lbf*ft"], "N m read as ft lbf"),
-    (1.0 / units._KNOWN["N*m"]["lbf*ft"], "ft lbf read as N m"),
+    (FOOT_POUND, "N m read as ft lbf"),
+    (1.0 / FOOT_POUND, "ft lbf read as N m"),
     (1e3, "N m read as kN m"), (1e-3, "kN m read as N m"), (10.0, "daN m mistaken"),
-    (1e3 * units._KNOWN["N*m"]["lbf*ft"], "N m read as klbf ft"),
-    (1e-3 / units._KNOWN["N*m"]["lbf*ft"], "klbf ft read as N m"),
+    (1e3 * FOOT_POUND, "N m read as klbf ft"),
+    (1e-3 / FOOT_POUND, "klbf ft read as N m"),
     (9.80665, "N m read as kgf m"), (1.0 / 9.80665, "kgf m read as N m"),
 )  # fmt: skip
 

@@ -167,9 +167,6 @@ def read_logs(
     return tuple(read_log(file, design.tables.log.given, progress) for file in files)
 
 
-PIPE = {"name": "pipe", "pipe": "5 in 19.5 lb/ft", "length": "3000 m"}
-
-
 def named_files(design: Design) -> list[Path]:
     """Logs that a design names, relative to its own place."""
     return [Path(design.origin).parent / file for file in design.tables.log.files]
