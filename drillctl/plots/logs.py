@@ -25,14 +25,11 @@ ROWS = (
 
 @style.picture()
 def log_overview(
-    result: LogOverview, ax: Axes | Sequence[Axes] | None = None, system: units.System = "si"
+    result: LogOverview, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
     """Least and largest torque, speed and weight over time; the strongest oscillations shaded."""
     held = [row for row in ROWS if any(row[0] in one.least for one in result.outlines)]
-    given = [ax] if isinstance(ax, Axes) else ax
-    figure, panels = style.grid_or_new(
-        given, len(held), 1, 9.0, 1.9 * len(held) + 1.2, share_x=True
-    )
+    figure, panels = style.grid_or_new(ax, len(held), 1, 9.0, 1.9 * len(held) + 1.2, share_x=True)
     scale, unit = (3600.0, "h") if result.duration > 7200.0 else (1.0, "s")
     for panel, (name, text, si, colour) in zip(panels, held, strict=True):
         shown = ""
@@ -80,7 +77,8 @@ def log_spectrum(result: LogOverview, ax: Axes | None = None) -> Figure:
             frequency, color=style.BLACK, linewidth=0.8, linestyle=":",
             label="string, top held" if number == 0 else None,
         )  # fmt: skip
-    last = 2.0 if not len(result.frequencies) else 1.15 * float(result.frequencies[min(2, len(result.frequencies) - 1)])  # fmt: skip  # noqa: E501
+    first = result.frequencies[:3]
+    last = 1.15 * float(first[-1]) if len(first) else 2.0
     axes.set_xlim(0.0, min(last, float(result.spectra[0].frequency[-1])))
     axes.set_ylim(0.0, None)
     style.dress(axes, "frequency (Hz)", "share of variance", "Spectrum of the surface torque")
@@ -102,7 +100,7 @@ def identified_curve(
     )  # fmt: skip
     axes.fill_between(
         one.speed / units.RPM, factor * one.low, factor * one.high, color=style.BLUE, alpha=0.3,
-        linewidth=0.0, label="band of 90 %",
+        linewidth=0.0, label=f"band of {100 * result.design.tables.identify.confidence:g} %",
     )  # fmt: skip
     for number, law in enumerate((one, *(f for f in result.fits if f is not one))):
         axes.plot(
@@ -124,12 +122,10 @@ def identified_curve(
 
 @style.picture()
 def identified_window(
-    result: Identification, ax: Axes | Sequence[Axes] | None = None, system: units.System = "si"
+    result: Identification, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
     """A window of the log beside the fit: the wave that comes up, its residual, the bit speed."""
-    figure, panels = style.grid_or_new(
-        [ax] if isinstance(ax, Axes) else ax, 3, 1, 8.0, 6.4, share_x=True
-    )
+    figure, panels = style.grid_or_new(ax, 3, 1, 8.0, 6.4, share_x=True)
     factor, unit = units.displayed(1.0, "N*m", system)
     one = result.trace
     panels[0].plot(one.time, factor * one.measured, label="log", **style.look(0, 1.4))
@@ -149,12 +145,10 @@ def identified_window(
 
 
 @style.picture()
-def identified_profile(result: Identification, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+def identified_profile(result: Identification, ax: Sequence[Axes] | None = None) -> Figure:
     """Rise of the misfit over each coefficient, the others fitted anew."""
     count = len(result.profile)
-    figure, panels = style.grid_or_new(
-        [ax] if isinstance(ax, Axes) else ax, 1, count, 3.0 * count + 0.8, 3.0, share_y=True
-    )
+    figure, panels = style.grid_or_new(ax, 1, count, 3.0 * count + 0.8, 3.0, share_y=True)
     for panel, (name, (values, rises)) in zip(panels, result.profile.items(), strict=True):
         panel.plot(values, np.maximum(rises, 0.0), marker="o", markersize=3.5, **style.look(0, 1.2))
         unit = "s/rad" if name == "beta" else "m"

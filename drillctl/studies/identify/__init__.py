@@ -61,8 +61,10 @@ def tables(result: Identification) -> Iterator[Table]:
         Column("speed", "bit speed", "rad/s"), Column("torque", unit="N*m"),
         Column("low", unit="N*m"), Column("high", unit="N*m"),
     )  # fmt: skip
-    curve = list(map(list, zip(*(x.tolist() for x in (one.speed, one.torque, one.low, one.high)), strict=True)))  # fmt: skip  # noqa: E501
-    yield Table("curve", "torque at the bit with its 90 % band", points, curve, shown=False)
+    lines = (x.tolist() for x in (one.speed, one.torque, one.low, one.high))
+    curve = list(map(list, zip(*lines, strict=True)))
+    band = f"{100 * result.design.tables.identify.confidence:g} % band"
+    yield Table("curve", f"torque at the bit with its {band}", points, curve, shown=False)
     spans = (
         Column("begin", unit="s", digits=6),
         Column("end", unit="s", digits=6),
