@@ -1,4 +1,4 @@
-"""The law of a drive for the drive itself: the computation, which is none but the writing."""
+"""The result of an export, and `export`, which makes it."""
 
 from __future__ import annotations
 
