@@ -201,10 +201,10 @@ def _fragile(one: Assessed) -> Iterable[str]:
     low, high = one.window.lowest_speed, one.window.highest_weight
     speed, weight = one.design.speed, one.design.tables.operating_point.weight_on_bit
     if low is None or low > speed * (1.0 - asked.fragile_window):
-        at = "at the highest speed that was run" if low is None else f"under {units.full(low, 'rad/s', 7)}"
+        at = "at the highest speed run" if low is None else f"under {units.full(low, 'rad/s', 7)}"
         yield f"the bit sticks {at}"
     if high is None or (
         high < weight * (1.0 + asked.fragile_window) and not one.window.weight_open
     ):
-        at = "at the lowest weight that was run" if high is None else f"above {units.full(high, 'N', 4)}"
+        at = "at the lowest weight run" if high is None else f"above {units.full(high, 'N', 4)}"
         yield f"the bit sticks {at}"
