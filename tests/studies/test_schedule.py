@@ -117,6 +117,7 @@ def test_searched_gains_begin_with_those_of_the_depth_before():
     first, last = result.rows
     along = Along(result.design)
     assert last.gains == searched(along.by_rule(3000.0), first.gains)
+    assert last.gains != searched(along.by_rule(3000.0), None)
     tuned = tuned_parameters(along.by_rule(3000.0).replace({"tune.realizations": 12}))
     problem = search_problem(along.by_rule(3000.0).replace({"tune.realizations": 12}), tuned)
     both = np.array([list(one.gains.values()) for one in (first, last)])
