@@ -20,6 +20,14 @@ from drillctl.units import Kind
 if TYPE_CHECKING:
     from drillctl.design.design import Design
 
+USUAL_NAMES = {
+    "controller.kp": "Kp", "controller.ki": "Ki", "controller.absorption": "absorption",
+    "controller.high_pass": "high-pass", "controller.stiffness": "stiffness",
+    "controller.rate": "rate", "controller.spring": "spring", "controller.damper": "damper",
+    "controller.torque": "torque", "operating_point.speed": "set speed",
+    "operating_point.weight_on_bit": "weight on bit",
+}  # fmt: skip
+"""What the usual parameters are called in pictures and sentences; others keep their path."""
 _HIDDEN = (
     "title", "author", "source", "status", "notes", "schema_version", "map", "uncertain",
     "uncertainty",

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.arrays import Array
+from drillctl.design.paths import USUAL_NAMES
 from drillctl.plots import style
 
 if TYPE_CHECKING:
@@ -36,8 +37,8 @@ def schedule(
             for each in ([one.gains for one in rows], [one.stale_gains for one in rows])
         ]
         _pair(panel, x, values, share)
-        name = units.unit_name(si, system)
-        style.dress(panel, "", f"{key} ({name})" if name else key)
+        name, spoken = units.unit_name(si, system), USUAL_NAMES.get(path, key)
+        style.dress(panel, "", f"{spoken} ({name})" if name else spoken)
         panel.set_ylim(bottom=0.0)
     seen, chance, speed, weight = panels[2:]
 

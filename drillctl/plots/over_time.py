@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.design import parameter
+from drillctl.design.paths import USUAL_NAMES
 from drillctl.plots import style
 
 if TYPE_CHECKING:
@@ -81,7 +82,10 @@ def _title(run: Simulation, paths: Sequence[str], system: units.System) -> str:
     elif run.design.simple_drive:
         law = run.design.linear_drive._asdict()  # type: ignore[attr-defined]
         shown = (units.displayed(v, LAW_UNITS.get(k, "N*m"), system) for k, v in law.items())
-        numbers = ", ".join(f"{k} {v:g} {unit}" for k, (v, unit) in zip(law, shown, strict=True))
+        numbers = ", ".join(
+            f"{USUAL_NAMES.get(f'controller.{k}', k)} {v:g} {unit}"
+            for k, (v, unit) in zip(law, shown, strict=True)
+        )
     else:
         numbers = run.design.tables.controller.law
     j1 = run.measures.j1
@@ -93,7 +97,7 @@ def _named(run: Simulation, path: str, system: units.System) -> str:
     """A parameter of the run's design by its usual name, in the units people read."""
     result = parameter(run.design, path)
     value, unit = units.displayed(result.value, result.si_unit, system)
-    return f"{style.NAMES.get(path, path.rpartition('.')[2])} {value:g} {unit}".rstrip()
+    return f"{USUAL_NAMES.get(path, path.rpartition('.')[2])} {value:g} {unit}".rstrip()
 
 
 @style.picture(

@@ -26,6 +26,7 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from drillctl import units
 from drillctl.arrays import Array
+from drillctl.design.paths import USUAL_NAMES
 from drillctl.errors import InputError
 
 if TYPE_CHECKING:
@@ -233,15 +234,6 @@ def colour_bar(
     return bar
 
 
-NAMES = {
-    "controller.kp": "Kp",
-    "controller.ki": "Ki",
-    "operating_point.speed": "set speed",
-    "operating_point.weight_on_bit": "weight on bit",
-}
-"""What the usual parameters are called on an axis; others keep their path."""
-
-
 class Plane(NamedTuple):
     """Axes of a picture over two parameters."""
 
@@ -276,7 +268,7 @@ def legend_under(
 def axis_label(axis: Axis, system: units.System) -> tuple[np.ndarray, str]:
     """Values of an axis in the units people read, and its label."""
     values, unit = units.displayed(axis.values, axis.unit, system)
-    name = NAMES.get(axis.path, axis.path)
+    name = USUAL_NAMES.get(axis.path, axis.path)
     return values, f"{name} ({unit})" if unit else name
 
 

@@ -18,6 +18,7 @@ from matplotlib.patches import Patch
 
 from drillctl import units
 from drillctl.arrays import Array
+from drillctl.design.paths import USUAL_NAMES
 from drillctl.ensemble.envelopes import ENVELOPED
 from drillctl.ensemble.probability import INNER, MEDIAN, OUTER, needed
 from drillctl.errors import InputError
@@ -111,7 +112,7 @@ def response_envelope(
         style.dress(panel, "time (s)", f"{name.replace('_', ' ')} ({unit})", title)
         panel.label_outer()
     panels[0].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
-    text = f"{band.count} draws, each moment by itself: the curves are no runs"
+    text = f"{band.count} draws, at each moment apart: no curve is a single run"
     figure.supxlabel(text, fontsize=style.SMALL)
     return figure
 
@@ -131,7 +132,7 @@ def _named(result: Uncertainty) -> dict[int, str]:
 
 def _shown(result: Uncertainty, cell: int, axis: Axis, system: units.System) -> str:
     value, unit = units.displayed(result.at(cell)[axis.path], axis.unit, system)
-    return f"{style.NAMES.get(axis.path, axis.path)} {f'{value:g} {unit}'.rstrip()}"
+    return f"{USUAL_NAMES.get(axis.path, axis.path)} {f'{value:g} {unit}'.rstrip()}"
 
 
 @style.picture(result="With indices.", raises="The result has no indices.")
@@ -174,7 +175,7 @@ def sensitivity_bars(
 
 def _short(of: str) -> str:
     """What is explained, by the usual names."""
-    for path, name in style.NAMES.items():
+    for path, name in USUAL_NAMES.items():
         of = of.replace(path, name)
     return of
 

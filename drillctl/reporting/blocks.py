@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from drillctl.design import Design, parameter
-from drillctl.plots.style import NAMES
+from drillctl.design.paths import USUAL_NAMES
 from drillctl.simulation.measures import Measure
 from drillctl.store.tables import Table as Results
 from drillctl.store.tables import quantity
@@ -166,4 +166,4 @@ class Words:
 
 def name_of(path: str) -> str:
     """The usual name of a parameter, else its path."""
-    return NAMES.get(path, path)
+    return USUAL_NAMES.get(path, path)

@@ -482,7 +482,7 @@ def test_root_locus_in_the_units_of_the_rig(bistable):
     figure = plots.root_locus(result)
     assert drawn(figure)
     ax, bar = figure.axes
-    assert bar.get_ylabel() == "controller.torque (kN m)"
+    assert bar.get_ylabel() == "torque (kN m)"
     assert ax.collections[0].get_clim() == pytest.approx((9.3, 12.0))
     assert plots.root_locus(result, system="field").axes[1].get_ylabel().endswith("(klbf ft)")
     empty = dataclasses.replace(result, poles=np.full((20, 2), complex(np.nan, np.nan)))

@@ -247,7 +247,7 @@ def test_one_response(runs):
         named(ax, "bit").get_ydata(), runs[0].signals["bit_speed"] * 30.0 / np.pi
     )
     np.testing.assert_allclose(named(ax, "set speed").get_ydata(), 100.0)
-    assert ax.get_title(loc="left").startswith(f"J1 {runs[0].measures.j1:.1f} s: kp 100")
+    assert ax.get_title(loc="left").startswith(f"J1 {runs[0].measures.j1:.1f} s: Kp 100")
     assert ax.get_xlim() == (0.0, 10.0)
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words == ["bit stuck", "bit", "top drive", "set speed"]

@@ -101,7 +101,8 @@ def _limits(result: Recommendation) -> Table:
 
 def _numbers(result: Recommendation) -> Table:
     """What stands in the drive, in its units, with how far each number may be off."""
-    from drillctl.studies.recommend.words import SI_OF, SPOKEN, in_drive_units
+    from drillctl.design.paths import USUAL_NAMES
+    from drillctl.studies.recommend.words import SI_OF, in_drive_units
 
     best = result.recommended
     told = in_drive_units(best)
@@ -114,7 +115,7 @@ def _numbers(result: Recommendation) -> Table:
         per = next((v for k, v in each.items() if k.startswith("per unit")), None)
         drift = drifts.get(f"controller.{name}")
         ends = (None, None) if drift is None else (drift.low, drift.high)
-        label = SPOKEN.get(f"controller.{name}", name.replace("_", " "))
+        label = USUAL_NAMES.get(f"controller.{name}", name.replace("_", " "))
         cells = [Quantity(one, si) for one in (value, *ends)]
         rows.append([label, name, Unit(si), cells[0], field, per, *cells[1:]])
     columns = (

@@ -12,6 +12,7 @@ import numpy as np
 from drillctl import units
 from drillctl.arrays import Array
 from drillctl.design import Design
+from drillctl.design.paths import USUAL_NAMES
 from drillctl.ensemble.cases import Interval, share_interval
 from drillctl.progress import SILENT
 from drillctl.simulation import simulate
@@ -188,7 +189,7 @@ def _fragile(one: Assessed) -> Iterable[str]:
             drift.high_at_bound
         )  # fmt: skip
         if off < asked.fragile_tolerance and not at_bound:
-            yield f"{c.SPOKEN.get(drift.path, drift.path)} may be off by {100 * off:.2g} % only"
+            yield f"{USUAL_NAMES.get(drift.path, drift.path)} may be off by {100 * off:.2g} % only"
     if one.loop.aside:
         yield "modes grow that are too high for the elements to follow, and were not counted"
     whole = one.loop.whole

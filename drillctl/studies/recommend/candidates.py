@@ -37,13 +37,6 @@ MATCHED_BY = (
 )  # fmt: skip
 """Numbers of Z-torque that are searched where nothing passes."""
 
-SPOKEN = {
-    "controller.kp": "Kp", "controller.ki": "Ki", "controller.absorption": "absorption",
-    "controller.high_pass": "high-pass", "controller.stiffness": "stiffness",
-    "controller.rate": "rate", "controller.spring": "spring", "controller.damper": "damper",
-    "controller.torque": "torque",
-}  # fmt: skip
-
 
 @dataclass(frozen=True, eq=False)
 class Candidate:

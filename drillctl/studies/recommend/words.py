@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import units
 from drillctl.design import Design, parameter
+from drillctl.design.paths import USUAL_NAMES
 from drillctl.store.tables import percent
 from drillctl.studies.recommend.assess import FAILS, FRAGILE, Assessed
-from drillctl.studies.recommend.candidates import NAMES, PRESENT, SPOKEN
+from drillctl.studies.recommend.candidates import NAMES, PRESENT
 from drillctl.studies.recommend.criteria import Criterion, drive_of, mode_at
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def numbers_of(one: Assessed) -> str:
         return SI_OF.get(path.rpartition(".")[2]) or parameter(one.design, path).si_unit
 
     return ", ".join(
-        f"{SPOKEN.get(path, path)} {units.full(value, unit(path), 4)}"
+        f"{USUAL_NAMES.get(path, path)} {units.full(value, unit(path), 4)}"
         for path, value in one.gains.items()
     )
 
