@@ -13,6 +13,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
+from unicodedata import normalize
 
 from drillctl.errors import InputError, shown
 from drillctl.text import clean
@@ -156,6 +157,10 @@ _TEXT = re.compile(
     r"^\s*(?:(?:(?P<whole>[-+]?\d+)[\s-]+)?(?P<over>\d+)\s*/\s*(?P<under>\d+)"
     rf"|(?P<number>{_NUMBER}))\s*(?P<unit>.*?)\s*$"
 )
+_VULGAR = re.compile("[\u00bc-\u00be\u2150-\u215e]")  # fractions in one character
+_FEET_AND_INCHES = re.compile(
+    r"""^\s*(\d+)\s*(?:ft|'|\u2032|\u2019)[\s-]*(\d[\d\s./-]*?)\s*(?:in|"|\u2033|\u201d|'')\s*$"""
+)
 _POWER = re.compile(r"\b((?:[kcmd]?m)|in|ft|s)([234])\b")
 
 
@@ -264,7 +269,11 @@ def parse(value: object, kind: Kind) -> float:
         raise _no_quantity(value, kind)
     if not isinstance(value, str):
         return _bare(value, kind)
-    match = _TEXT.match(value)
+    feet = _FEET_AND_INCHES.match(value) if kind.si == "m" else None
+    if feet is not None:
+        inches = parse(f"{feet[2]} in", kind)
+        return float(feet[1]) * factor("ft", kind) + inches
+    match = _TEXT.match(_parted(value))
     if match is None:
         raise _no_quantity(value, kind)
     number = _magnitude(match, value)
@@ -278,8 +287,13 @@ def parse(value: object, kind: Kind) -> float:
 
 def bare(text: str) -> bool:
     """Whether a text is a number without a unit."""
-    match = _TEXT.match(text)
+    match = _TEXT.match(_parted(text))
     return match is not None and not match["unit"]
+
+
+def _parted(text: str) -> str:
+    """A text with `½` and the like as `1/2`, apart from the number before."""
+    return _VULGAR.sub(lambda one: f" {normalize('NFKC', one[0]).replace(chr(0x2044), '/')}", text)
 
 
 def _no_quantity(value: object, kind: Kind) -> InputError:

@@ -8,7 +8,6 @@ and what was read how is reported.
 from __future__ import annotations
 
 import csv
-import io
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -18,51 +17,32 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from drillctl import catalog, units
+from drillctl import units
 from drillctl.design.tables import SectionTable
+from drillctl.design.tally_heads import (
+    FIELDS,
+    NOTHING,
+    Head,
+    columns_of,
+    heads_of,
+    problem_of,
+    rows_of,
+    text_of,
+    with_units_row,
+)
 from drillctl.errors import InputError, shown
 from drillctl.rig.drillstring import GRADES, PIPES
-from drillctl.rig.drillstring.catalogue import drill_pipe, find, kind_in
+from drillctl.rig.drillstring.catalogue import drill_pipe, find, kind_in, sizes_in, typical_bore
 
 STEEL = 7850.0  # density (kg/m3) by which a bore follows from a weight
 ENDS = ("top", "bit")
+LONGEST_PIECE = 50.0  # length (m) that no piece has: a stand of four joints has some 40
+SHORTEST_STAND = 15.0  # length (m) of a stand: two short joints
+SAME_BORE = 1e-3  # by how much (m) a bore may differ from that of the catalogue's pipe
 
 
-class Field(NamedTuple):
-    """What a column may hold."""
-
-    key: str  # of a section; empty where it only helps to find others
-    kind: units.Kind | None
-    heads: str  # pattern of the heads, in lower case, without unit
-
-
-_JOINT = r"(?=.*\b(tj|tool ?joints?|joint|connection|conn)\b).*"
-_OUTER, _INNER = r"\b(od|o d|outer|outside|external)\b", r"\b(id|i d|inner|inside|internal|bore)\b"
-_UNUSED = r"\b(cum\w*|accum\w*|running|depth|from|to|max|blade|gauge|neck|drift|remarks?)\b"
-_EACH = r"length (per|of (a|each)) |each length|avg length"
-_COUNT = r"\b(count|qty|quantity|number|no|nos|nr|joints|jts|pieces|pcs)\b|^#$"
-_NAME = r"\b(name|component|item|description|tool|element|section|type|bha)\b"
-_LENGTH = r"\b(length|len)\b"
-_TOTAL = r"\b(total|sum|section) (length|len)\b|\blength total\b"
-FIELDS = {
-    "not used": Field("", None, _UNUSED),
-    "joint od": Field("joint_outer_diameter", units.DIAMETER, _JOINT + _OUTER),
-    "joint id": Field("joint_inner_diameter", units.DIAMETER, _JOINT + _INNER),
-    "joint spacing": Field("joint_spacing", units.LENGTH, _JOINT + r"\b(spacing|pitch)\b"),
-    "length of a piece": Field("length", units.LENGTH, _EACH),
-    "joint length": Field("joint_length", units.LENGTH, _JOINT + _LENGTH),
-    "total length": Field("", units.LENGTH, _TOTAL),
-    "weight": Field("", units.LINEAR_MASS, r"\b(weight|wt|ppf|mass|lb ft|kg m)\b"),
-    "grade": Field("grade", None, r"\bgrade\b"),
-    "inertia": Field("inertia", units.INERTIA, r"\binertia\b"),
-    "od": Field("outer_diameter", units.DIAMETER, _OUTER + r"|^(diameter|dia|size)\b"),
-    "id": Field("inner_diameter", units.DIAMETER, _INNER),
-    "count": Field("repeat", None, _COUNT),
-    "length": Field("length", units.LENGTH, _LENGTH),
-    "name": Field("name", None, _NAME),
-}
-"""What a head is read as: the first whose pattern it holds."""
-NOTHING = ("", "-", "--", "–", "—", "n/a", "na", "none")  # cells that hold nothing
+_SUM = re.compile(r"\b(sub-?)?(total|sum)s?\b")
+_PIPE = re.compile(r"\bd\.?p\b|\bpipe|hw|heavy")
 
 
 @dataclass(frozen=True)
@@ -79,12 +59,6 @@ class Tally:
 class _Cell(NamedTuple):
     text: str
     where: str  # file, line and column
-
-
-class _Head(NamedTuple):
-    text: str
-    field: str
-    unit: str
 
 
 def with_tally(tree: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -121,7 +95,7 @@ def read(source: object, begins: object, folder: Path, where: str = "drillstring
         place, text = where, source.lstrip("\n")
     else:
         path = folder / Path(source).expanduser()
-        place, text = str(path), _text_of(path, where)
+        place, text = str(path), text_of(path, where)
     try:
         rows = [(n, row) for n, row in enumerate(rows_of(text), 1) if any(row)]
     except csv.Error as error:
@@ -129,73 +103,34 @@ def read(source: object, begins: object, folder: Path, where: str = "drillstring
     return _read(place, text, rows, str(begins))
 
 
-def _text_of(path: Path, where: str) -> str:
-    """Lines of a file; the first sheet of a workbook as CSV."""
-    if path.suffix.lower() in (".xlsx", ".xlsm"):
-        stream = io.StringIO()
-        content = catalog.read_bytes(path, f"{where}: {path}")
-        csv.writer(stream, lineterminator="\n").writerows(_of_workbook(path, content))
-        return stream.getvalue()
-    return catalog.read(path, f"{where}: {path}").rstrip("\n") + "\n"
-
-
-def _of_workbook(path: Path, content: bytes) -> list[list[str]]:
-    """The first sheet of a workbook."""
-    try:
-        import openpyxl
-    except ImportError:
-        raise InputError(
-            f"{path}: a workbook needs openpyxl (pip install 'drillctl[xlsx]'), or save it as CSV"
-        ) from None
-    try:
-        book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
-        sheet = book.worksheets[0]
-    except Exception as error:  # what is no workbook fails in many ways
-        raise InputError(f"{path} is no workbook: {error}") from None
-    return [[_written(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]
-
-
-def _written(value: object) -> str:
-    if value is None:
-        return ""
-    return f"{value:.15g}" if isinstance(value, float) else str(value).strip()
-
-
-def rows_of(text: str) -> list[list[str]]:
-    """Rows of cells; the delimiter is the one that a line has most of, heads or not."""
-    lines = text.splitlines()
-    delimiter = max(",;\t|", key=lambda one: max(line.count(one) for line in lines[:10]))
-    rows = [
-        [cell.strip() for cell in row] if row and not row[0].startswith("# ") else []
-        for row in csv.reader(lines, delimiter=delimiter)
-    ]
-    if delimiter == ";":  # where a comma stands in numbers
-        rows = [[re.sub(r"(?<=\d),(?=\d)", ".", cell) for cell in row] for row in rows]
-    return rows
-
-
 def _read(place: str, text: str, rows: list[tuple[int, list[str]]], begins: str) -> Tally:
-    while len(rows) > 2 and len(_fields(rows[0][1])) < len(_NEEDED) and _heads_below(rows):
-        rows = rows[1:]  # a title
     if len(rows) < 2:
         raise InputError("holds no lines below its heads", place)
-    (_, heads), *rest = rows
-    columns = _columns(heads, [row for _, row in rest], f"{place}: line {rows[0][0]}")
-    columns, rest = _with_units_row(columns, rest)
+    last, heads = heads_of(rows) or (0, rows[0][1])
+    rest = rows[last + 1 :]
+    columns = columns_of(heads, [row for _, row in rest], f"{place}: line {rows[last][0]}")
+    if not rest:
+        raise InputError("holds no lines below its heads", place)
+    columns, rest = with_units_row(columns, rest)
+    lines = [_Line(place, number, columns, row) for number, row in rest]
     notes: list[str] = []
+    if "total length" not in {column.field for column in columns} and any(
+        line.longer_than_a_piece for line in lines
+    ):
+        notes.append("the length of a line counts as that of all its pieces: no piece is so long")
+        for line in lines:
+            line.of_all_pieces()
     sections: list[dict[str, Any]] = []
-    for number, row in rest:
-        cells = {
-            column.field: _Cell(text.strip(), f"{place}: line {number}, column {column.text!r}")
-            for column, text in zip(columns, row, strict=False)
-            if column.field and text.strip().lower() not in NOTHING
-        }
-        line = _Line(f"{place}: line {number}", {c.field: c for c in columns}, cells)
-        if line.adds_up:
-            notes.append(f"line {number}: {line.name!r} left out, a sum")
-        elif cells:
+    for line in lines:
+        if line.adds_up or line.is_sum_of(sections):
+            notes.append(
+                f"line {line.number}: {line.name or 'a line without name'!r} left out, a sum"
+            )
+        elif line.cells:
             sections.append(line.section())
-            notes += [f"line {number}, {line.name}: {note}" for note in line.notes]
+            notes += [f"line {line.number}, {line.name}: {note}" for note in line.notes]
+    if not sections:
+        raise InputError("holds no lines below its heads", place)
     _refuse_upside_down(sections, begins == "bit", place)
     sections = sections[::-1] if begins == "bit" else sections
     return Tally(
@@ -207,112 +142,17 @@ def _read(place: str, text: str, rows: list[tuple[int, list[str]]], begins: str)
     )
 
 
-_NEEDED = ({"od"}, {"length", "total length"})  # columns without which there is no string
-
-
-def _fields(row: list[str]) -> list[set[str]]:
-    """Which of the columns that are needed a row of heads has."""
-    fields = {_head(text).field for text in row}
-    return [one for one in _NEEDED if one & fields]
-
-
-def _heads_below(rows: list[tuple[int, list[str]]]) -> bool:
-    return any(len(_fields(row)) == len(_NEEDED) for _, row in rows[1:10])
-
-
-def _columns(heads: list[str], rows: list[list[str]], where: str) -> list[_Head]:
-    columns = [_head(text) for text in heads]
-    for place, column in enumerate(columns):
-        values = [row[place].strip() for row in rows if place < len(row) and row[place].strip()]
-        numbered = values == [str(n) for n in range(1, len(rows) + 1)]
-        if column.field in ("count", "name") and numbered:
-            columns[place] = column._replace(field="")  # it counts the lines
-        of_pipe = column.field == "joint length" and not re.search("tool|tj", column.text.lower())
-        if of_pipe and not {"length", "total length"} & {one.field for one in columns}:
-            columns[place] = column._replace(field="length")
-    for field in ("od", "length"):
-        others = ("total length", "length of a piece") if field == "length" else ()
-        if not any(c.field in (field, *others) for c in columns):
-            names = ", ".join(repr(c.text) for c in columns if c.text)
-            raise InputError(f"no column is the {field} of a component; there are {names}", where)
-    found: list[_Head] = []
-    for column in columns:
-        if column.field and any(one.field == column.field for one in found):
-            first = next(one.text for one in found if one.field == column.field)
-            if column.field != "name":
-                raise InputError(
-                    f"columns {first!r} and {column.text!r} both read as {column.field}", where
-                )
-            column = column._replace(field="")
-        found.append(column)
-    return found
-
-
-def _head(text: str) -> _Head:
-    """A head: its words, and the unit in brackets, behind a comma or as its last word."""
-    words, unit = text.strip(), ""
-    bracket = re.search(r"[\[(]([^\])]*)[\])]\s*$", words)
-    if bracket:
-        words, unit = words[: bracket.start()], bracket[1].strip()
-    else:
-        last = re.search(r"(?<=[\w.\"])[\s,_/]+([^\s,_]+)$", words)
-        if last and _is_unit(last[1]):
-            words, unit = words[: last.start()], last[1]
-    plain = re.sub(r"[\s._\-/]+", " ", words.lower()).strip()
-    for field, about in FIELDS.items():
-        if re.search(about.heads, plain):
-            if field == "weight" and (not unit) and plain in ("ppf", "lb ft"):
-                unit = "lb/ft"
-            used = field if field != "not used" and _fits(unit, about.kind) else ""
-            return _Head(text.strip(), {"length of a piece": "length"}.get(used, used), unit)
-    return _Head(text.strip(), "", unit)
-
-
-def _is_unit(text: str) -> bool:
-    kinds = (units.DIAMETER, units.LINEAR_MASS, units.INERTIA, units.FORCE)
-    return text in ("kg", "lb", "lbs") or any(text in units.spellings(kind) for kind in kinds)
-
-
-def is_unit_of(unit: str, kind: units.Kind) -> bool:
-    """Whether a text is a unit of this kind."""
-    return bool(unit) and not _problem(f"1 {unit}", kind)
-
-
-def _fits(unit: str, kind: units.Kind | None) -> bool:
-    """Whether a column in this unit can be of this kind: a total mass is no mass per length."""
-    return not unit or kind is None or not _problem(f"1 {unit}", kind)
-
-
-def _problem(text: str, kind: units.Kind) -> str:
-    try:
-        units.parse(text, kind)
-    except InputError as error:
-        return error.problem
-    return ""
-
-
-def _with_units_row(
-    columns: list[_Head], rows: list[tuple[int, list[str]]]
-) -> tuple[list[_Head], list[tuple[int, list[str]]]]:
-    """Units that stand in the row under the heads, if that is what this row holds."""
-    row = [cell.strip().strip("[]()") for cell in rows[0][1]]
-    row += [""] * (len(columns) - len(row))
-    pairs = list(zip(columns, row, strict=False))
-    measured = [(c, cell) for c, cell in pairs if c.field and FIELDS[c.field].kind is not None]
-    given = [(c, cell) for c, cell in measured if cell.lower() not in NOTHING]
-    if not given or not all(_fits(cell, FIELDS[c.field].kind) for c, cell in given):
-        return columns, rows
-    made = [c._replace(unit=cell) if (c, cell) in given else c for c, cell in pairs]
-    return made, rows[1:]
-
-
 class _Line:
     """A line of a tally on its way to a section."""
 
-    def __init__(
-        self, where: str, columns: Mapping[str, _Head], cells: Mapping[str, _Cell]
-    ) -> None:
-        self.where, self.columns, self.cells = where, columns, cells
+    def __init__(self, place: str, number: int, columns: list[Head], row: list[str]) -> None:
+        self.number, self.where = number, f"{place}: line {number}"
+        self.columns = {column.field: column for column in columns}
+        self.cells = {
+            column.field: _Cell(text.strip(), f"{self.where}, column {column.text!r}")
+            for column, text in zip(columns, row, strict=False)
+            if column.field and text.strip().lower() not in NOTHING
+        }
         self.notes: list[str] = []
 
     @property
@@ -322,18 +162,39 @@ class _Line:
 
     @property
     def adds_up(self) -> bool:
-        """Whether it is the sum under the others."""
-        return "od" not in self.cells and bool(re.match(r"(total|sum)\b", self.name.lower()))
+        """Whether it is called the sum of others."""
+        return "od" not in self.cells and bool(_SUM.search(self.name.lower()))
+
+    def is_sum_of(self, sections: list[dict[str, Any]]) -> bool:
+        """Whether it has no name and no more than the length of those before."""
+        own = {"length", "total length"} & set(self.cells)
+        if self.name or "od" in self.cells or not own or not sections:
+            return False
+        whole = sum(_span(section) for section in sections)
+        return abs(self._value(own.pop()) / whole - 1.0) < 0.01
+
+    @property
+    def longer_than_a_piece(self) -> bool:
+        """Whether its length must be that of all its pieces."""
+        if "length" not in self.cells or self.adds_up or self._count() == 1:
+            return False
+        return self._value("length") > LONGEST_PIECE
+
+    def of_all_pieces(self) -> None:
+        """Let its length be that of all its pieces."""
+        self.columns["total length"] = self.columns["length"]
+        if "length" in self.cells:
+            self.cells["total length"] = self.cells.pop("length")
 
     def section(self) -> dict[str, Any]:
         """Keys of a section as in a design file."""
-        if not self.name:
-            raise InputError("the component has no name", self.where)
-        section: dict[str, Any] = {"name": self.name}
+        section: dict[str, Any] = {"name": self.name or f"component of line {self.number}"}
         section |= self._lengths()
-        section |= self._diameters()
+        section |= self._grade()
+        section |= self._diameters(section.get("grade"))
         section |= self._joints(section)
-        section |= self._grade(section)
+        if "pipe" in section:
+            section = {k: v for k, v in section.items() if not k.endswith("er_diameter")}
         if "inertia" in self.cells:
             section["inertia"] = self._quantity("inertia")
         self._check(section)
@@ -343,7 +204,7 @@ class _Line:
         """Text with a unit, its own or that of its column."""
         cell, kind = self.cells[field], FIELDS[field].kind
         assert kind is not None
-        text = cell.text
+        text = re.sub(r"^(\d{1,3})((?:[ \u00a0\u202f]\d{3})+)\b(?!/)", _closed, cell.text)
         if re.search(r"^\D*\d+,(\d{1,2}|\d{4,})(?!\d|,)", text):
             text = text.replace(",", ".")  # no group of thousands
         elif re.search(r"\d,\d", text):
@@ -357,7 +218,7 @@ class _Line:
         unit = self.columns[field].unit
         if units.bare(text) and unit:
             text = f"{text} {unit}"
-        problem = _problem(text, kind)
+        problem = problem_of(text, kind)
         if problem:
             hint = "" if unit or not units.bare(text) else "; the column gives no unit either"
             raise InputError(problem + hint, cell.where)
@@ -387,54 +248,76 @@ class _Line:
         return {**keys, "length": f"{total / count!r} m"}
 
     def _count(self) -> int:
-        if "count" not in self.cells:
+        cell = self.cells.get("count") or self.cells.get("stands")
+        if cell is None:
             return 1
-        cell = self.cells["count"]
         found = re.fullmatch(
-            r"(\d+)(?:\.0*)?\s*(?:x|jts?|joints?|pcs?|pieces?|stands?)?", cell.text, re.I
+            r"(\d+)(?:\.0*)?\s*(?:x|jts?\.?|joints?|pcs?\.?|pieces?|(stands?))?", cell.text, re.I
         )
-        if found is None or int(found[1]) == 0:
+        count = int(found[1]) if found is not None and len(found[1]) < 9 else 0
+        if found is None or count == 0:
             raise InputError(f"{cell.text!r} is not a number of pieces", cell.where)
-        return int(found[1])
+        stands = bool(found[2]) or "count" not in self.cells
+        short = "length" in self.cells and self._value("length") < SHORTEST_STAND
+        if stands and short and count > 1:
+            raise InputError(
+                f"{self._quantity('length')} is the length of a joint, not of a stand: give that "
+                "of a stand, or the number of joints",
+                self.cells["length"].where,
+            )
+        return count
 
-    def _diameters(self) -> dict[str, Any]:
+    def _diameters(self, grade: str | None) -> dict[str, Any]:
         if "od" not in self.cells:
-            known = find(self.name)
-            if known is None:
-                raise InputError("the component has no outer diameter", self.where)
-            self.notes.append(f"no diameters: {known} of the catalogue")
-            return {"pipe": known}
+            return self._by_name(grade)
         outer = self._quantity("od")
         if "id" in self.cells:
             return {"outer_diameter": outer, "inner_diameter": self._quantity("id")}
-        diameter = self._value("od")
+        bore, how = self._bore()
+        self.notes.append(f"no inner diameter: {how}")
+        return {"outer_diameter": outer, "inner_diameter": f"{bore * 1e3:.6g} mm"}
+
+    def _by_name(self, grade: str | None) -> dict[str, Any]:
+        """What the catalogue has under the name of the line; the size of a bit."""
+        known, sizes = find(self.name), sizes_in(self.name)
+        if known is not None:
+            thick = bool(PIPES[known].thick(grade))
+            joints = " with its tool joints" if thick else ""
+            self.notes.append(f"no diameters: {known} of the catalogue{joints}")
+            return {"pipe": known, **({"tool_joints": True} if thick else {})}
+        if _is_bit(self.name) and sizes:
+            self.notes.append("no diameters: the size in its name, taken as solid")
+            return {"outer_diameter": f"{sizes[0]:g} in", "inner_diameter": "0 mm"}
+        raise InputError("the component has no outer diameter", self.where)
+
+    def _bore(self) -> tuple[float, str]:
+        """An inner diameter (m) that no cell gives, and where it is from."""
+        outer = self._value("od")
         if "weight" in self.cells:
             weight, heavy = self._value("weight"), kind_in(self.name) == "HWDP"
-            known = drill_pipe(diameter, weight, heavy)
+            known = drill_pipe(outer, weight, heavy)
             if known is not None:
-                self.notes.append(f"no inner diameter: that of {known}")
-                bore = PIPES[known].inner_diameter
-            else:
-                square = diameter**2 - 4.0 * weight / (math.pi * STEEL)
-                if square < 0.0:
-                    raise InputError(
-                        "is more than a solid bar of steel weighs", self.cells["weight"].where
-                    )
-                bore = math.sqrt(square)
-                self.notes.append(f"no inner diameter: {bore * 1e3:.1f} mm by its weight")
-            return {"outer_diameter": outer, "inner_diameter": f"{bore * 1e3:.6g} mm"}
-        if not _is_bit(self.name):
+                return PIPES[known].inner_diameter, f"that of {known}"
+            square = outer**2 - 4.0 * weight / (math.pi * STEEL)
+            if square < 0.0:
+                raise InputError(
+                    "is more than a solid bar of steel weighs", self.cells["weight"].where
+                )
+            return math.sqrt(square), f"{math.sqrt(square) * 1e3:.1f} mm by its weight"
+        if _is_bit(self.name):
+            return 0.0, "taken as solid"
+        typical = typical_bore(self.name, outer)
+        if typical is None:
             raise InputError(
                 'the component has no inner diameter ("0 mm" if it is solid)', self.where
             )
-        self.notes.append("no inner diameter: taken as solid")
-        return {"outer_diameter": outer, "inner_diameter": "0 mm"}
+        return typical, f"{typical * 1e3:.1f} mm, typical of its kind and size"
 
     def _joints(self, section: dict[str, Any]) -> dict[str, Any]:
         fields = ("joint od", "joint id", "joint length")
         given = [field for field in fields if field in self.cells]
         if not given:
-            return {}
+            return self._joints_of_catalogue(section)
         if "pipe" in section or "joint length" not in given or "joint od" not in given:
             self.notes.append("tool joint left out: it has no outer diameter and length of its own")
             return {}
@@ -448,18 +331,41 @@ class _Line:
             self.notes.append("a tool joint every 31 ft (a typical joint of pipe), or one in all")
         return keys
 
-    def _grade(self, section: dict[str, Any]) -> dict[str, Any]:
-        if "grade" not in self.cells:
+    def _joints_of_catalogue(self, section: dict[str, Any]) -> dict[str, Any]:
+        """Tool joints of a pipe that gives none: of its size, weight or bore, and grade."""
+        if "pipe" in section or not _PIPE.search(self.name.lower()):
             return {}
-        text = self.cells["grade"].text.upper()
-        plain = re.sub(r"[^A-Z0-9]", "", text)
+        outer, bore = self._value("od"), units.parse(section["inner_diameter"], units.DIAMETER)
+        weight = self._value("weight") if "weight" in self.cells else None
+        known = drill_pipe(outer, weight, kind_in(self.name) == "HWDP", bore)
+        if known is None or abs(PIPES[known].inner_diameter - bore) > SAME_BORE:
+            self.notes.append("no tool joints: no pipe of the catalogue has its size and bore")
+            return {}
+        grade, pipe = section.get("grade", ""), PIPES[known]
+        length, keys = units.parse(section["length"], units.LENGTH), {}
+        if "joint spacing" in self.cells:
+            keys["joint_spacing"] = self._quantity("joint spacing")
+        elif length > SHORTEST_STAND and "repeat" in section:  # stands
+            each = length / round(length / pipe.joint_spacing)
+            keys["joint_spacing"] = f"{each:.6g} m"
+        lowest = (
+            "" if kind_in(known) == "HWDP" else f" of the lowest grade, {next(iter(pipe.joints))}"
+        )
+        said = f" of {grade}" if grade in pipe.joints else lowest
+        self.notes.append(f"tool joints: those of {known}{said} in the catalogue")
+        return {"pipe": known, "tool_joints": True, **keys}
+
+    def _grade(self) -> dict[str, Any]:
+        named = re.search(r"\b(E-?75|X-?95|G-?105|S-?135)\b", self.name.upper())
+        if "grade" not in self.cells and named is None:
+            return {}
+        text = self.cells["grade"].text if "grade" in self.cells else named[1] if named else ""
+        plain = re.sub(r"[^A-Z0-9]", "", text.upper())
         for grade in GRADES:
             letter, number = grade.split("-")
             if plain in (letter + number, letter, number):
                 return {"grade": grade}
-        self.notes.append(
-            f"grade {self.cells['grade'].text!r} is of no drill pipe: no torsional yield"
-        )
+        self.notes.append(f"grade {text!r} is none of {', '.join(GRADES)}: no torsional yield")
         return {}
 
     def _check(self, section: dict[str, Any]) -> None:
@@ -473,6 +379,16 @@ class _Line:
             where = self.cells[field].where if field in self.cells else self.where
             text = str(problem.get("ctx", {}).get("error", problem["msg"]))
             raise InputError(text, where) from None
+
+
+def _closed(match: re.Match[str]) -> str:
+    """A number without the spaces between its thousands."""
+    return re.sub(r"\s", "", match[0])
+
+
+def _span(section: Mapping[str, Any]) -> float:
+    """Length of a section (m)."""
+    return units.parse(section["length"], units.LENGTH) * int(section.get("repeat", 1))
 
 
 def _is_bit(name: str) -> bool:

@@ -16,7 +16,7 @@ from drillctl import catalog, units
 from drillctl.arrays import Array
 from drillctl.design import parts
 from drillctl.design.tables import DesignTables, SectionTable
-from drillctl.design.tally import is_unit_of, rows_of
+from drillctl.design.tally_heads import is_unit_of, rows_of
 from drillctl.errors import InputError, shown
 from drillctl.rig.drillstring import PIPES, Drillstring, polar_moment
 from drillctl.rig.drillstring.catalogue import STEEL

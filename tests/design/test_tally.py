@@ -218,6 +218,102 @@ def test_a_new_rig_like_a_typical_one(name, tmp_path, monkeypatch):
     assert not model.warnings
 
 
+PIPE = {"name": "Drill pipe", "pipe": "5 in 19.5 lb/ft", "tool_joints": True}
+
+
+@pytest.mark.parametrize(
+    ("lines", "first"),
+    [
+        (  # heads in two rows, of merged cells
+            "BHA 7,,,,,,,\nComponent,Body,,,Tool joint,,,Count\n"
+            ",OD (in),ID (in),Length (ft),OD (in),ID (in),Length (in),\n"
+            "Drill pipe,5,4.276,31.0,6.625,2.75,21,300\nBit,8.5,,1,,,,1\n",
+            {"name": "Drill pipe", "repeat": 300, "length": "31.0 ft", "outer_diameter": "5 in",
+             "inner_diameter": "4.276 in", "joint_outer_diameter": "6.625 in",
+             "joint_inner_diameter": "2.75 in", "joint_length": "21 in"},
+        ),
+        (  # units under the heads, lines counted, blank lines, a length of all pieces, a sum
+            "BHA #7,,,,,,\n,,,,,,\nItem,Description,Qty,OD,ID,Length,Weight\n,,(jts),(in),(in),"
+            '(m),(lb/ft)\n1,Drill pipe,100,5,4.276,950,19.5\n\n2,"8-1/2"" PDC bit",1,8½,-,0.28,\n'
+            ",Total,,,,950.28,\n",
+            {**PIPE, "repeat": 100, "length": "9.5 m"},
+        ),
+        (  # stands
+            "Name,Stands,Length (m),OD,ID\nDrill pipe,100,28.5,5″,4.276\"\nBit,1,0.3,8.5 in,\n",
+            {**PIPE, "repeat": 100, "length": "28.5 m", "joint_spacing": "9.5 m"},
+        ),
+        (  # diameters by name alone, the grade in it
+            "Description,Joints,Total length (m)\nDrill pipe 5 in 19.5# G-105,300,2850\n"
+            "Bit 8 1/2 in,1,0.3\n",
+            {**PIPE, "name": "Drill pipe 5 in 19.5# G-105", "repeat": 300, "length": "9.5 m",
+             "grade": "G-105"},
+        ),
+        (  # a comma as the decimal point, points between thousands
+            "Name;OD (mm);ID (mm);Length (ft)\nDrill pipe;127,0;108,6;9.350,5\nBit;216;;1\n",
+            {**PIPE, "length": "9350.5 ft"},
+        ),
+        (  # feet and inches; a total without a name; the same length twice
+            "Name,OD,ID,Length (ft),Length (m)\nDrill pipe,5 in,4.276 in,31' 6\",9.6\n"
+            "Bit,8.5 in,,1,0.3\n,,,32.5,9.9\n",
+            {**PIPE, "length": "31' 6\""},
+        ),
+        (  # lines of a table in a text
+            "| Name | OD (in) | ID (in) | Length (m) |\n|---|:--|---|---|\n"
+            "| Drill pipe | 5 | 4.276 | 2 850 |\n| Bit | 8.5 | | 0.3 |\n",
+            {**PIPE, "length": "2850 m"},
+        ),
+        (  # an average length of joints beside that of all
+            "Section Type,Length (m),Length To (m),OD (in),ID (in),Average Joint Length (m)\n"
+            "Drill pipe,3500,3500,5,4.276,9.14\nBit,0.3,3500.3,8.5,,\n",
+            {**PIPE, "length": "3500 m", "joint_spacing": "9.14 m"},
+        ),
+    ],
+    ids=["merged", "counted", "stands", "names", "comma", "feet", "text", "average"],
+)  # fmt: skip
+def test_tallies_as_they_are_found(tmp_path, lines, first):
+    made = read(lines, "top", tmp_path)
+    assert made.sections[0] == first
+    assert len(made.sections) == 2
+    assert made.sections[1]["inner_diameter"] == "0 mm"
+
+
+@pytest.mark.parametrize("code", ["utf-8-sig", "utf-16", "cp1252"])
+def test_files_as_spreadsheets_save_them(tmp_path, code):
+    path = tmp_path / "tally.csv"
+    path.write_bytes("Name,OD,ID,Length\nDrill pipe ½,5 in,4.276 in,9 m\n".encode(code))
+    assert read("tally.csv", "top", tmp_path).sections[0]["name"] == "Drill pipe ½"
+
+
+def test_a_workbook_with_a_cover_is_read_at_its_tally(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["Rig tally"])
+    sheet = book.create_sheet("BHA")
+    for row in (["BHA 7"], [], ["Component", "Body"], ["", "OD (in)", "ID (in)", "Length (m)"]):
+        sheet.append(row)
+    sheet.merge_cells("B3:D3")
+    sheet.append(["Drill pipe", 5, 4.276, 2850])
+    book.save(tmp_path / "tally.xlsx")
+    assert read("tally.xlsx", "top", tmp_path).sections == ({**PIPE, "length": "2850 m"},)
+
+
+def test_pipe_without_columns_for_it_has_the_joints_of_its_grade(tmp_path):
+    text = "name,length [m],OD [in],ID [in],grade\nDrill pipe,950,5,4.276,S-135\n"
+    made = read(text, "top", tmp_path)
+    said = "tool joints: those of 5 in 19.5 lb/ft of S-135 in the catalogue"
+    assert made.notes == (f"line 2, Drill pipe: {said}",)
+    string = {"drillstring.tally": text, "drillstring.tally_from": "top"}
+    with_joints = drillctl.load("monteiro-trindade-2012", **string).string.parts.sections[0]
+    body = 7850.0 * 950.0 * np.pi / 32 * (0.127**4 - (4.276 * INCH) ** 4)
+    assert with_joints.inertia == pytest.approx(1.31 * body, rel=0.01)
+
+
+def test_stands_of_the_length_of_a_joint_are_refused(tmp_path):
+    text = "name,stands,length [m],OD [in],ID [in]\np,100,9.5,5,4.276\n"
+    with pytest.raises(InputError, match=r"line 2, column 'length \[m\]'.*not of a stand"):
+        read(text, "top", tmp_path)
+
+
 def test_a_column_that_counts_the_lines_names_nothing(tmp_path):
     text = "Item,Description,Length (m),OD (mm),ID (mm)\n1,Bit,0.3,216,\n2,Pipe,900,127,108.6\n"
     made = read(text, "bit", tmp_path)

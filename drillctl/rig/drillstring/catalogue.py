@@ -202,15 +202,35 @@ def find(text: str) -> str | None:
     return None
 
 
-def drill_pipe(outer_diameter: float, weight: float, heavy: bool = False) -> str | None:
-    """The pipe of an outer diameter (m) and a nominal mass per length (kg/m), or None."""
+def drill_pipe(
+    outer_diameter: float, weight: float | None, heavy: bool = False, bore: float = 0.0
+) -> str | None:
+    """The pipe of an outer diameter (m) and a nominal mass per length (kg/m) or a bore (m)."""
     for name, pipe in PIPES.items():
+        of_weight = weight is not None and abs(pipe.weight - weight) < 0.012 * pipe.weight
         if pipe.kind == ("HWDP" if heavy else "drill pipe") and (
             abs(pipe.outer_diameter - outer_diameter) < 3e-4
-            and (heavy or abs(pipe.weight - weight) < 0.012 * pipe.weight)
+            and (heavy or of_weight or abs(pipe.inner_diameter - bore) < 6e-4)
         ):
             return name
     return None
+
+
+_THICK = re.compile(
+    r"\bsub\b|\bx-?/?o\b|cross-? ?over|reamer|filter|float|\bl?rss\b|rotary steer|shock|saver|"
+    r"circulat|hang"
+)
+
+
+def typical_bore(name: str, outer_diameter: float) -> float | None:
+    """Bore (m) of the next collar or tool in size, of what is one by its name."""
+    kind = kind_in(name)
+    if kind in ("drill pipe", "HWDP") and not _THICK.search(name.lower()):
+        return None
+    collars = [pipe for pipe in PIPES.values() if pipe.kind == "collar"]
+    # Of two bores of one size the larger.
+    nearest = min(reversed(collars), key=lambda pipe: abs(pipe.outer_diameter - outer_diameter))
+    return nearest.inner_diameter if nearest.inner_diameter < 0.6 * outer_diameter else None
 
 
 def summary(pipe: Pipe) -> dict[str, Any]:

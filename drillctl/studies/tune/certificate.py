@@ -33,6 +33,7 @@ from drillctl.ensemble.grid import Axis
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.progress import SILENT, Progress
+from drillctl.simulation.scheme import ACCURACIES
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.studies.tune.problem import GainProblem, GainRuns, Point, rank_weights, weighted
@@ -51,6 +52,10 @@ HALVINGS = 8  # of the step in which it falls
 POINTS = 21  # along each axis of the neighbourhood
 LINE_POINTS = 81  # of the neighbourhood of a single parameter
 FEW = 500  # draws of the neighbourhood, the first ones: its probabilities are for the eye
+DEAR = 0.5
+"""Share of the usual step below which a light bit makes every run dear: the tolerances are then
+`fast`, of the first `FEW` draws, and the neighbourhood is coarser."""
+DEAR_POINTS, DEAR_FEW = 11, 200  # of that neighbourhood
 AROUND = 0.6  # how far the neighbourhood goes on behind the tolerance, over the tolerance's width
 LEAST_HALF = 0.02  # its least half width, over that of the bounds
 
@@ -118,11 +123,25 @@ class FreshDraws:
         self.count = len(self.problem.runs.draws)  # those that no rig has included
         self.drawn = self.problem.runs.draws.values  # by path (SI), shape (draws,)
         self._others = 0
+        simulation = self.design.tables.simulation
+        usual = DEAR * ACCURACIES[simulation.accuracy].step
+        schemes = [ready.prepared.scheme for ready in self.problem.runs.groups]
+        self.dear = simulation.step is None and any(one.step < usual for one in schemes)
+
+    @cached_property
+    def _around(self) -> GainRuns:
+        """Runs of other gains than those that are certified."""
+        if not self.dear:
+            return self.problem.runs
+        table = self.problem.table
+        faster = self.design.replace({"simulation.accuracy": "fast"})
+        return GainRuns(faster, self.problem.tuned, table.realizations, table.seed)
 
     @property
     def trajectories(self) -> int:
         """Runs so far."""
-        return self.problem.trajectories + self._others
+        around = self._around.trajectories if self.dear else 0
+        return self.problem.trajectories + self._others + around
 
     def of_gains(self, values: Array) -> tuple[Point, FreshRuns]:
         """Tuned values (SI), shape (parameters,), as they are judged, and their J1."""
@@ -140,11 +159,12 @@ class FreshDraws:
         return self._spread(runs, measures["j1"][0], value)
 
     def shares(self, points: Array, realizations: int | None = None) -> Array:
-        """Share of the first draws, all by default, with J1 at or under the level."""
-        level, problem = self.problem.table.level, self.problem
-        count = self.count if realizations is None else min(realizations, self.count)
-        possible = int(np.searchsorted(problem.runs.numbers, count))
-        j1 = problem.runs.measures(points, ("j1",), 0, possible, give_up=level)["j1"]
+        """Share of the first draws, all by default or `FEW` dear ones, at or under the level."""
+        level, runs = self.problem.table.level, self._around
+        most = FEW if self.dear else self.count
+        count = min(most if realizations is None else realizations, self.count)
+        possible = int(np.searchsorted(runs.numbers, count))
+        j1 = runs.measures(points, ("j1",), 0, possible, give_up=level)["j1"]
         return np.asarray((j1 <= level).sum(axis=1) / count)
 
     def _spread(self, runs: GainRuns, j1: Array, value: float) -> FreshRuns:
@@ -264,7 +284,7 @@ def _moved(values: Array, k: int, others: Array) -> Array:
 def neighbourhood(fresh: FreshDraws, values: Array, ends: tuple[Tolerance, ...]) -> Neighbourhood:
     """Probability over the first two parameters, or the only one, about the optimum."""
     some = min(2, len(values))
-    points = POINTS if some == 2 else LINE_POINTS
+    points = LINE_POINTS if some == 1 else DEAR_POINTS if fresh.dear else POINTS
     axes = []
     for tuned, one in zip(fresh.problem.tuned[:some], ends[:some], strict=True):
         wide = AROUND * (one.high - one.low) + LEAST_HALF * (tuned.high - tuned.low)
@@ -274,7 +294,7 @@ def neighbourhood(fresh: FreshDraws, values: Array, ends: tuple[Tolerance, ...])
     cells = np.tile(values, (grid[0].size, 1))
     for k, column in enumerate(grid):
         cells[:, k] = column.ravel()
-    count = min(FEW, fresh.count)
+    count = min(DEAR_FEW if fresh.dear else FEW, fresh.count)
     shares = fresh.shares(cells, count)
     return Neighbourhood(tuple(axes), shares.reshape(grid[0].shape), count)
 

@@ -82,7 +82,9 @@ def optimum(
     population = _evolved(problem, points)
     note("population", population[0])
     starts = [problem.at_all(point) for point in _apart(problem, population, ends)]
-    best = min((polished(problem, start) for start in starts), key=_merit)
+    least = min(start.merit for start in starts)
+    near_starts = [start for start in starts if start.merit <= NEAR * least]
+    best = min((polished(problem, start) for start in near_starts), key=_merit)
     inside = [problem.values(problem.shares(np.asarray(one, dtype=float))) for one in known]
     if inside:
         other = min(problem.points(np.stack(inside), len(problem)), key=_merit)
