@@ -6,8 +6,11 @@ computes a damaged block again.
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import itertools
 import os
+import resource
 import shutil
 import signal
 import socket
@@ -412,6 +415,41 @@ def test_a_failure_leaves_no_folder(monkeypatch, tmp_path, capsys):
     assert run(["map", *KINDS["map"], "--out", str(tmp_path / "new/run")]) == 1
     assert "overflow" in capsys.readouterr().err
     assert not list((tmp_path / "new").iterdir())
+
+
+@contextlib.contextmanager
+def files_of_at_most(size):
+    """What a full disk does, to files alone that grow beyond some bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize(("size", "verb", "file"), [
+    (100, "map", "journal.jsonl"), (2_000, "map", "design.toml"), (5_000, "map", "blocks"),
+    (5_000, "simulate", "data.zarr"),
+])  # fmt: skip
+def test_a_full_disk_is_named_and_leaves_no_folder(size, verb, file, tmp_path, no_pictures, capsys):
+    arguments = [verb, *KINDS[verb], "--out", str(tmp_path / "run")]
+    with files_of_at_most(size):
+        assert run(arguments) == 1
+    output = capsys.readouterr()
+    assert f"{tmp_path}/run/{file}" in output.err
+    assert "cannot be written: File too large" in output.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_that_is_full_at_the_end_costs_no_blocks(tmp_path, no_pictures, monkeypatch):
+    def full(*given):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    arguments = ["map", *KINDS["map"], "--out", str(tmp_path / "run")]
+    with monkeypatch.context() as patch:
+        patch.setattr("drillctl.store.folder.write_json", full)
+        assert run(arguments) == 1
+    monkeypatch.setattr("drillctl.ensemble.running.run_batch", pytest.fail)
+    assert run(arguments) == 0
 
 
 SLOWLY = """

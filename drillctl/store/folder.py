@@ -26,7 +26,7 @@ from drillctl.design import Design, to_toml
 from drillctl.design.reading import to_tree
 from drillctl.errors import InputError, StoreError, shown
 from drillctl.provenance import merged, provenance
-from drillctl.store.journal import NAME, Journal, reading
+from drillctl.store.journal import NAME, Journal, reading, writing
 from drillctl.store.json_files import PART, as_json, write_json
 from drillctl.store.lock import ENDING, FolderLock
 
@@ -156,7 +156,8 @@ def identity(verb: str, design: Design, **settings: Any) -> str:
 
 
 RUN, DESIGN, SUMMARY, BLOCKS = "run.json", "design.toml", "summary.json", "blocks"
-DATA = (DESIGN, SUMMARY, "result.json", "cells.json", "data.zarr")
+TREE, ARRAYS = "result.json", "data.zarr"
+DATA = (DESIGN, SUMMARY, TREE, "cells.json", ARRAYS)
 """Files of a finished run without which it is not what it says, beside `run.json`."""
 KEPT = ("blocks/sensitivity/", "blocks/realizations/string")
 """Blocks that a run needs again when draws are added to it."""
@@ -229,7 +230,7 @@ def finished_run(path: Path) -> Path:
     if not here.finished:
         raise InputError("holds an unfinished run; run the command again", str(path))
     here.journal.verify(filter(_is_data, here.journal.held))
-    if "result.json" not in here.journal.held:
+    if TREE not in here.journal.held:
         verb = here.about.get("verb")
         raise InputError(f"holds a run of {verb!r}, which is not opened from Python", str(path))
     return path
@@ -237,7 +238,7 @@ def finished_run(path: Path) -> Path:
 
 def finished_data(path: Path, journal: Journal) -> Any:
     """The result that a run ended with before it was begun again; None if it never ended."""
-    if "result.json" not in journal.held:
+    if TREE not in journal.held:
         return None
     from drillctl.store.codec import read
 
@@ -306,6 +307,10 @@ class RunFolder:
         summary : dict
             Strict JSON values.
         """
+        with writing(self.path):
+            self._conclude(result, summary)
+
+    def _conclude(self, result: Any, summary: dict[str, Any]) -> None:
         about = dict(self.about)
         if hasattr(result, "write"):
             own = getattr(result, "provenance", None)
@@ -359,11 +364,16 @@ class RunFolder:
         names = [n for n in journal.held if not (n == RUN or _is_data(n) or n.startswith(BLOCKS))]
         return journal.changed(names) if names else None
 
+    def _has_work(self) -> bool:
+        """Whether there are finished blocks, or a result that is to be extended."""
+        return TREE in Journal(self.path).held or any(map(_is_block, self._files()))
+
     def discard(self) -> None:
         """Remove what `claim` wrote, for a run that failed; finished blocks are kept."""
-        if not self.finished and not any(map(_is_work, self._files())):
-            shutil.rmtree(self.path / BLOCKS, ignore_errors=True)
-            for name in (DESIGN, RUN, NAME):
+        if not self.finished and not self._has_work():
+            for name in (BLOCKS, ARRAYS):
+                shutil.rmtree(self.path / name, ignore_errors=True)
+            for name in (DESIGN, RUN, SUMMARY, TREE, NAME):
                 (self.path / name).unlink(missing_ok=True)
             if self.made:
                 with suppress(OSError):  # something else was added meanwhile
@@ -376,10 +386,9 @@ def _is_old(name: str, names: set[str]) -> bool:
     return name not in (RUN, DESIGN) and not name.startswith(BLOCKS) and name not in names
 
 
-def _is_work(name: str) -> bool:
-    """Whether a file holds what was computed."""
-    block = name.startswith(f"{BLOCKS}/") and not Path(name).name.startswith("string")
-    return block or name.startswith("data.zarr/")
+def _is_block(name: str) -> bool:
+    """Whether a file holds what was computed of an unfinished run."""
+    return name.startswith(f"{BLOCKS}/") and not Path(name).name.startswith("string")
 
 
 def claim(
@@ -473,11 +482,15 @@ def _claimed(
 
 def _begun(run: RunFolder, design: Design) -> RunFolder:
     """The folder with what the run is; remains of writes that were killed are removed."""
-    for path in list(run.path.rglob(f".*{PART}")):
-        shutil.rmtree(path) if path.is_dir() else path.unlink()
-    journal = Journal(run.path)
-    journal.announce(RUN, as_json(run.about))
-    journal.write(DESIGN, to_toml(design).encode())
+    try:
+        for path in list(run.path.rglob(f".*{PART}")):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        journal = Journal(run.path)
+        journal.announce(RUN, as_json(run.about))
+        journal.write(DESIGN, to_toml(design).encode())
+    except BaseException:
+        run.discard()
+        raise
     return run
 
 
