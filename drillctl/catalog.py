@@ -67,7 +67,7 @@ def find(name_or_path: str, shelves: tuple[Shelf, ...] = ("designs", "models")) 
     Parameters
     ----------
     name_or_path : str
-        A shipped name, or a path (anything with a slash or ending in `.toml`).
+        A shipped name, or a path (anything with a slash or a dot).
     shelves : tuple of {'models', 'designs'}
         Which shipped files to search, in this order.
 
@@ -76,11 +76,14 @@ def find(name_or_path: str, shelves: tuple[Shelf, ...] = ("designs", "models")) 
     InputError
         No such file, or no such name; the message lists the nearest.
     """
-    if name_or_path.endswith(".toml") or "/" in name_or_path or "\\" in name_or_path:
-        return _file(name_or_path)
+    if any(mark in name_or_path for mark in "./\\"):
+        return regular_file(name_or_path)
     for shelf in shelves:
         if name_or_path in names(shelf):
             return _folder(shelf) / f"{name_or_path}.toml"
+    with suppress(OSError):  # too long a name
+        if name_or_path and Path(name_or_path).exists():
+            return regular_file(name_or_path)
     if Path(f"{name_or_path[:200]}.toml").is_file():
         raise InputError(f"not a shipped name; did you mean '{name_or_path}.toml'?", name_or_path)
     known = [name for shelf in shelves for name in names(shelf)]
@@ -112,18 +115,19 @@ def find_model(model: str, design: Path) -> Path:
     return find(model, ("models", "designs")).resolve()
 
 
-def _file(text: str) -> Path:
-    """The file at a path, or the reason why there is none."""
+def regular_file(text: str) -> Path:
+    """The file at a path (`InputError` says why there is none)."""
     with _reasons(shown(text)):  # unreadable, ~nobody, null byte
         path = Path(text).expanduser()
         if path.is_file():
             return path
         mode = path.stat().st_mode if path.exists() else None
-        beside = [p.stem for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        others = path.parent.iterdir() if path.parent.is_dir() else ()
+        beside = [p.name for p in others if p.suffix in (path.suffix, ".toml")]
     if mode is not None:
         raise InputError(_not_regular(mode), text)
-    close = difflib.get_close_matches(path.stem, beside, n=1)
-    hint = f"; did you mean '{close[0]}.toml'?" if close else ""
+    close = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.7)
+    hint = f"; did you mean '{close[0]}'?" if close else ""
     raise InputError(f"no such file{hint}", text)
 
 

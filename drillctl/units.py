@@ -46,6 +46,11 @@ class Kind:
     examples: tuple[str, ...]
     usual: tuple[float, float] = (0.0, math.inf)
 
+    @property
+    def one(self) -> str:
+        """The word with its article."""
+        return f"{'an' if self.name[0] in 'aeiou' else 'a'} {self.name}"
+
 
 SPEED = Kind("speed", "rad/s", ("rpm", "rev/min", "rad/s", "deg/s"), (0.0, 400 * RPM))
 FORCE = Kind("force", "N", ("kN", "N", "klbf", "tf"), (0.0, 1e6))
@@ -297,9 +302,7 @@ def _parted(text: str) -> str:
 
 
 def _no_quantity(value: object, kind: Kind) -> InputError:
-    return InputError(
-        f'{shown(value)} is not a {kind.name}; write it like "100 {kind.examples[0]}"'
-    )
+    return InputError(f'{shown(value)} is not {kind.one}; write it like "100 {kind.examples[0]}"')
 
 
 def _magnitude(match: re.Match[str], value: str) -> float:

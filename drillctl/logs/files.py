@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from drillctl import catalog
 from drillctl.errors import InputError
 from drillctl.logs.quantities import QUANTITIES, Head, spelt, words
 from drillctl.progress import SILENT, Progress
@@ -38,8 +39,7 @@ class Source:
 
 def open_source(path: Path) -> Source:
     """Open a file by its ending (`InputError` if it cannot be read)."""
-    if not path.is_file():
-        raise InputError("there is no such file", str(path))
+    catalog.regular_file(str(path))
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         known = ", ".join(_READERS)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import copy
 import datetime
 import math
+import os
 import re
 import tomllib
+from pathlib import Path
 
 import pytest
 import tomli_w
@@ -105,6 +107,18 @@ def test_a_folder_is_no_design(tmp_path):
     (tmp_path / "folder.toml").mkdir()
     with pytest.raises(InputError, match=r"folder\.toml: is a folder, not a file"):
         drillctl.load(tmp_path / "folder.toml")
+
+
+def test_what_is_there_but_no_file_is_named_as_what_it_is(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    Path("folder").mkdir()
+    Path("rig.toml").write_text(rig())
+    for name, kind in (("pipe", "a pipe or a device"), ("folder", "a folder")):
+        with pytest.raises(InputError, match=f"^{name}: is {kind}, not a file"):
+            drillctl.load(name)
+    with pytest.raises(InputError, match=r"rig\.tml: no such file; did you mean 'rig\.toml'"):
+        drillctl.load("rig.tml")
 
 
 def test_unknown_shipped_name():
