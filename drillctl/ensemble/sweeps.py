@@ -156,6 +156,11 @@ class Sweep(Result, kind="map"):
     provenance: dict[str, str] = label(
         means="versions and processor it came from", default_factory=provenance
     )
+    section_torque: dict[str, float] = label(
+        unit="N*m", default_factory=dict,
+        means="largest in each section whose torsional yield is known, at the cells of the largest "
+        "torque of the uppermost pipe",
+    )  # fmt: skip
 
     @property
     def j1(self) -> Array:
@@ -177,22 +182,25 @@ class Sweep(Result, kind="map"):
 
     @property
     def over_yield(self) -> dict[str, dict[str, float]]:
-        """Sections whose yield is known: it (N m), and cells whose peak pipe torque is above it.
+        """Sections whose yield is known: it (N m), the largest share of it, and cells above it.
 
-        The peak is that of the uppermost element; where no such peaks are kept, none is counted.
+        A cell counts by the peak of its uppermost pipe, times what the section has over that at
+        the cells of the largest peaks; where no such peaks are kept, no section is named.
         """
         peaks = self.measures.get("peak_pipe_torque")
+        largest = 0.0 if peaks is None else float(np.nanmax(peaks, initial=0.0))
         known = (one for one in self.design.string.parts.sections if one.yield_torque < math.inf)
-        if peaks is None:
+        if peaks is None or largest == 0.0:
             return {}
-        return {
-            one.name: {
+        result = {}
+        for one in known:
+            ratio = self.section_torque.get(one.name, largest) / largest
+            result[one.name] = {
                 "torsional_yield": one.yield_torque,
-                "largest_share": float(np.nanmax(peaks, initial=0.0)) / one.yield_torque,
-                "cells": int((np.nan_to_num(peaks) > one.yield_torque).sum()),
+                "largest_share": ratio * largest / one.yield_torque,
+                "cells": int((ratio * np.nan_to_num(peaks) > one.yield_torque).sum()),
             }
-            for one in known
-        }
+        return result
 
     def summary(self) -> dict[str, Any]:
         """Axes, minimum, regions, audit, failures, times; SI units, parameters by path."""
@@ -283,9 +291,31 @@ def sweep(
         audit=_audit(design, axes, result, status, count, progress),
         step=step,
         modes=modes,
+        section_torque=_section_torque(design, axes, result),
         seconds=times.lanes,
         total_seconds=time.perf_counter() - begin,
     )
+
+
+STRAINED = (
+    3  # cells of the largest torque of the uppermost pipe, whose other sections are looked at
+)
+
+
+def _section_torque(
+    design: Design, axes: tuple[Axis, ...], measures: dict[str, Array]
+) -> dict[str, float]:
+    """Largest torque (N m) by section at some cells; nothing where only one has a known yield."""
+    peaks = measures.get("peak_pipe_torque")
+    known = [one for one in design.string.parts.sections if one.yield_torque < math.inf]
+    if peaks is None or not any(one is not design.string.parts.sections[0] for one in known):
+        return {}
+    from drillctl.simulation import simulate  # a map without yields waits for no integrator
+
+    cells = [int(cell) for cell in np.argsort(-peaks, axis=None) if np.isfinite(peaks.flat[cell])]
+    runs = [simulate(cell_design(design, axes, cell), "batch") for cell in cells[:STRAINED]]
+    names = {name for run in runs for name in run.section_torque}
+    return {name: max(run.section_torque[name] for run in runs) for name in sorted(names)}
 
 
 def _audit(

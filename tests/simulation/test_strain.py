@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -64,6 +66,27 @@ def test_shares_are_of_each_section_s_own_yield(run):
     shares = {name: one["share"] for name, one in run.yields.items()}
     assert shares["light"] > 2.0 * shares["pipe"] > 0.0
     assert run.summary()["yield"]["light"]["torsional_yield"] == pytest.approx(25.5e3, rel=0.01)
+
+
+def test_a_map_compares_each_section_with_its_own_yield(run):
+    axis = [{"path": "controller.kp", "min": 200.0, "max": 600.0, "points": 2}]
+    design = run.design.replace({"map.axes": axis, "simulation.duration": "6 s"})
+    made = drillctl.sweep(design, audit_cells=0)
+    peaks = {
+        name: max(
+            drillctl.simulate(design.replace({"controller.kp": kp}), "batch").section_torque[name]
+            for kp in (200.0, 600.0)
+        )
+        for name in ("pipe", "light")
+    }
+    assert made.section_torque == pytest.approx(peaks, rel=1e-9)
+    light = made.over_yield["light"]
+    assert light["largest_share"] == pytest.approx(peaks["light"] / light["torsional_yield"])
+    assert list(made.over_yield) == ["pipe", "light"]
+    assert light["cells"] == 0
+    twice = made.section_torque | {"light": 10.0 * light["torsional_yield"]}
+    over = dataclasses.replace(made, section_torque=twice).over_yield
+    assert (over["light"]["cells"], over["pipe"]["cells"]) == (2, 0)
 
 
 def test_nothing_is_computed_where_no_yield_is_known():

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from drillctl import units
 from drillctl.store.tables import Column, Quantity, Table, Unit
-from drillctl.studies.base import Option, Study
+from drillctl.studies.base import Option, Recipe, Requested, Section, Study
 
 if TYPE_CHECKING:
+    from drillctl.design import Design
     from drillctl.studies.export.compute import Export
 
 
@@ -31,11 +32,11 @@ def remarks(result: Export, system: units.System) -> Iterator[str]:
     """What a reader of the text must know."""
     for sentence in result.sentences():
         yield units.told(sentence, system)
-    yield f"Written as {file_name(result)}."
 
 
 def notes(result: Export) -> Iterator[str]:
-    """A sampling period that the design does not give."""
+    """The name of the text, and a sampling period that the design does not give."""
+    yield f"written as {file_name(result)}"
     if result.assumed is not None:
         yield (
             f"the drive is in continuous time: written for a sampling period of "
@@ -58,6 +59,12 @@ def files(result: Export, folder: Path, system: units.System) -> None:
     write_text(folder / file_name(result), result.text(system))
 
 
+def of_recommended(request: Requested) -> Design:
+    """The recommended design, where the report has one, else its own."""
+    done = request.done["recommend"]
+    return done.result.recommended.design if done.state == "done" else request.design
+
+
 STUDY = Study(
     module=__name__,
     name="export",
@@ -71,4 +78,13 @@ STUDY = Study(
         Option("per_unit", bool, "Write in shares of rated torque and speed", False),
     ),
     python="export",
+    recipes=(Recipe("export", "the law for the drive", variant=of_recommended, order=6),),
+    sections=(
+        Section(
+            "export", "For the drive", ("export",), order=97,
+            text="The numbers are those of the recommended setting, and the design's own where the "
+            "report has no recommendation. drillctl export writes the law with them as IEC 61131-3 "
+            "text, PLCopen XML or C.",
+        ),
+    ),
 )  # fmt: skip

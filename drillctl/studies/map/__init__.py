@@ -108,8 +108,8 @@ def remarks(result: Sweep, system: units.System) -> Iterator[str]:
         yield f"minimum J1 {value:.3f} s at {units.told(where, system)}"
     for name, one in result.over_yield.items():
         yield (
-            f"peak torque of the uppermost pipe: up to {one['largest_share']:.0%} of the torsional "
-            f"yield of {name}, above it in {one['cells']} cells"
+            f"peak torque in {name}: up to {one['largest_share']:.0%} of its torsional yield, "
+            f"above it in {one['cells']} cells"
         )
     yield result.audit.sentence("cells")
     yield (

@@ -20,6 +20,7 @@ from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
+from drillctl.rig.top_drive.law import drive_laws
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
@@ -197,7 +198,7 @@ class Baseline:
     """Gains or a law beside the tuned ones."""
 
     name: str  # what it is
-    gains: dict[str, Any]  # by path (SI); of another law its name alone
+    gains: dict[str, Any]  # by path (SI); of another law its name, and those that it has too
     runs: FreshRuns | None  # at the fresh draws; None where it does not apply
     reason: str  # why it does not
     # of a search of its own: value (s) where it searched, trajectories, seconds
@@ -263,7 +264,10 @@ def _paper(design: Design, fresh: FreshDraws) -> Made:
 def _law(design: Design, law: str, fresh: FreshDraws) -> Made:
     """A law at its default tuning; the drive around it stays."""
     other = design.replace({"controller.law": ANY_OTHER[law]}).replace({"controller.law": law})
-    return {"law": law}, fresh.of_design(other), {}
+    numbers = drive_laws()[law].controller(other.tables.controller, other.string)._asdict()
+    paths = {f"controller.{key}": float(value) for key, value in numbers.items()}
+    gains = {t.path: paths[t.path] for t in fresh.problem.tuned if t.path in paths}
+    return {"law": law, **gains}, fresh.of_design(other), {}
 
 
 def _linear(design: Design, fresh: FreshDraws) -> Made:
