@@ -77,17 +77,24 @@ def over_horizons(job: Job, rounds: int) -> dict[str, Any]:
 def over_wall(rounds: int) -> dict[str, Any]:
     """Seconds by number of nodes at which the wall rubs, the bit among them, at equal modes.
 
-    With one node there is the bit alone: a plain lane, with a friction law more.
+    With one node there is the bit alone. Beside them a plain lane, on which no wall rubs:
+    `of_plain` is what one with 12 nodes costs over that, `lane_step_s` its processor time a lane
+    and step.
     """
     runs, chosen = {}, {}
-    for nodes in WALL_NODES:
-        design = load("well-a-off-bottom", **PLAIN_WALL, **{"well.friction_nodes": nodes})
+    for nodes in (0, *WALL_NODES):
+        friction = {"well.friction_nodes": nodes} if nodes else {"well.friction_factor": None}
+        design = load("well-a-off-bottom", **PLAIN_WALL, **friction)
         lanes = single_lane(design)[np.zeros(WALL_LANES, dtype=np.int64)]
         prepared = prepare(lanes, design.tables.simulation)
         warm_up(lanes, prepared)
         runs[nodes] = lambda lanes=lanes, prepared=prepared: run_batch(lanes, prepared)
         chosen[str(nodes)] = {"modes": prepared.scheme.modes, "step": prepared.scheme.step}
-    return _summary(in_turn(runs, dict.fromkeys(runs, rounds)), chosen)
+    calls = in_turn(runs, dict.fromkeys(runs, rounds))
+    plain, rubbed = (statistics.median(c.core_seconds for c in calls[n]) for n in (0, 12))
+    del calls[0]
+    lane_step = rubbed / WALL_LANES / prepared.scheme.steps
+    return _summary(calls, chosen) | {"of_plain": rubbed / plain, "lane_step_s": lane_step}
 
 
 def _summary(calls: dict[Any, list[Call]], chosen: dict[str, Any] | None) -> dict[str, Any]:

@@ -13,6 +13,8 @@ from benchmarks.peers.scipy_events import LSODA
 LSODA_BAR, CVODE_BAR, REFERENCE_BAR = 20_000.0, 1_000.0, 60.0
 LANES_BAR, ELEMENTS_BAR = 0.03, 1.25
 """Largest distance of the slope over lanes from 1, and largest ratio of costs over elements."""
+WALL_BAR, WALL_STEP_BAR = 12.0, 200e-9
+"""Cost of 12 nodes on the wall over a plain lane, or of a lane and step (s): the larger counts."""
 
 
 def duration(seconds: float) -> str:
@@ -92,6 +94,16 @@ def bars(found: dict[str, Any]) -> list[dict[str, Any]]:
         ratio = f"largest over smallest {time}, 30 to 1,000 elements"
         value = elements[f"{prefix}largest_over_smallest"]
         result.append(_bar(ratio, value, f"<= {ELEMENTS_BAR}", lambda v: v <= ELEMENTS_BAR))
+    wall = found["scaling"]["wall"]
+    cheap = wall["lane_step_s"] <= WALL_STEP_BAR
+    result.append(
+        _bar(
+            f"times a plain lane, 12 nodes on the wall ({1e9 * wall['lane_step_s']:.0f} ns a step)",
+            wall["of_plain"],
+            f"<= {WALL_BAR:g}",
+            lambda v: cheap or v <= WALL_BAR,
+        )
+    )
     return result
 
 

@@ -20,6 +20,7 @@ from drillctl.rig.axial import AxialString
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.variation import NoVariation, Variation
 from drillctl.rig.drillstring import Drillstring
+from drillctl.rig.drillstring.assembly import with_dampers
 from drillctl.rig.drillstring.mesh import MeshedSection
 from drillctl.rig.program import Program
 from drillctl.rig.top_drive import PI, ConstantTorque, TopDriveLaw
@@ -105,6 +106,18 @@ class Design:
     def wall(self) -> Wall | None:
         """Friction of the wall on the string; None without any."""
         return well.wall(self.tables, self.string)
+
+    @cached_property
+    def sliding_string(self) -> Drillstring:
+        """The string as linear analysis takes it: a wall that it slides along damps it.
+
+        That is the string itself, unless it moves along the well: the torque of the wall then
+        grows with the speed, by the slope at the set speed.
+        """
+        wall = self.wall
+        if wall is None or not wall.drifts:
+            return self.string
+        return with_dampers(self.string, wall.nodes, wall.slopes(self.speed))
 
     @property
     def mesh(self) -> tuple[MeshedSection, ...]:

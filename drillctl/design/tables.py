@@ -392,7 +392,8 @@ class WellTable(Table):
     `friction_factor` times the side force of a soft string is the dry friction of the wall, at
     rest up to that, and beyond `critical_speed` a `friction_ratio` of it. It acts at
     `friction_nodes` nodes, the bit among them. `tension = false` leaves the tension out of the side
-    force. `axial_speed`: downwards while drilling ahead, which turns part of the friction upwards.
+    force. `axial_speed`: downwards while drilling ahead or running in, negative while pulled out;
+    it turns part of the friction along the well, and no node sticks.
     """
 
     survey: tuple[tuple[q.Depth, q.Angle, q.Angle], ...] = ()

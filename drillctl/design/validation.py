@@ -78,7 +78,7 @@ def _refuse_impossible_drive(tables: DesignTables) -> None:
     if not parts.drive_of(tables).ideal:
         string, torque = parts.drillstring(tables), parts.torque_at_set_speed(tables)
         rubbing = wall(tables, string)
-        sliding = 0.0 if rubbing is None else rubbing.ratio * rubbing.total
+        sliding = 0.0 if rubbing is None else float(rubbing.at_speed(tables.operating_point.speed))
         parts.refuse_weak_drive(tables, string, torque, sliding)
 
 

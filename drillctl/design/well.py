@@ -205,7 +205,8 @@ def wall(tables: DesignTables, string: Drillstring) -> Wall | None:
     bare = laid(path(tables), made, 0.0)
     nodes = choose_nodes(bare, tuple(string.depth), well.friction_nodes, well.tension)
     factor = friction_factors(tables, made, 0.0)[placed.run]
-    return lumped(placed, string.depth, nodes, factor, tables.operating_point.weight_on_bit, well)
+    point = tables.operating_point
+    return lumped(placed, string.depth, nodes, factor, point.weight_on_bit, point.speed, well)
 
 
 def refuse_impossible_well(tables: DesignTables) -> None:

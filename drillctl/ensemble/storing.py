@@ -251,7 +251,7 @@ def _string_arrays(prepared: Prepared) -> dict[str, Any]:
 def _string_from(held: dict[str, Any]) -> Prepared:
     from drillctl.simulation.kernels import string_step as s
 
-    forms = (s.UndampedString, s.BlockString, s.DenseString, s.WallString)
+    forms = (s.UndampedString, s.BlockString, s.DenseString, s.WallString, s.DriftString)
     kinds = {kind.__name__: kind for kind in forms}
     kind = kinds[str(held["kind"])]
     string = kind(**{name: _number(held[f"kernel.{name}"]) for name in kind._fields})

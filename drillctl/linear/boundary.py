@@ -126,7 +126,7 @@ def gain_boundary(
         slope = at_speed(design, design.speed).slope
     if not math.isfinite(slope):
         raise InputError(f"must be a number, got {slope:g}", "slope")
-    ends = ends_of(design.string, model)
+    ends = ends_of(design.sliding_string, model)
     if slope <= 0.0:  # a torque that does not fall with speed only takes energy
         import shapely
 
@@ -278,7 +278,7 @@ def root_locus(design: Design, path: str, values: ArrayLike, count: int = 12) ->
 def _lowest(design: Design, count: int) -> ComplexArray:
     point = operating_point(design)
     if design.simple_loop:
-        return loop_poles(design.string, *design.linear_drive.gains(), point.slope)[:count]
+        return loop_poles(design.sliding_string, *design.linear_drive.gains(), point.slope)[:count]
     return model_poles(design, bit_side(design, point.slope, point.speed))[:count]
 
 

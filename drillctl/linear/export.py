@@ -50,7 +50,7 @@ def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearI
         )
     if not (0.0 < width < np.inf):
         raise InputError(f"must be more than 0 rad/s, got {width:g}", "width")
-    matrices = plant_matrices(design.string)
+    matrices = plant_matrices(design.sliding_string)
     drive, friction = design.linear_drive, design.bit_rock
     strings = len(matrices.a)
     top, bit = matrices.c[0], matrices.c[1]
@@ -102,7 +102,7 @@ def write_matrices(design: Design, path: str | Path) -> Path:
 
 
 def _content(design: Design) -> dict[str, Any]:
-    string = design.string
+    string = design.sliding_string
     slope = operating_point(design).slope
     plant_states = state_names(string.nodes, 0.0)
     rows: dict[str, Row] = {
@@ -139,8 +139,8 @@ def _of_gains(design: Design) -> dict[str, Row]:
     """Loops of a drive that two gains tell."""
     kp, ki = design.linear_drive.gains()
     states = state_names(design.string.nodes, ki)
-    opened = open_loop_matrices(design.string, kp, ki)
-    closed = closed_loop_matrices(design.string, kp, ki)
+    opened = open_loop_matrices(design.sliding_string, kp, ki)
+    closed = closed_loop_matrices(design.sliding_string, kp, ki)
     return {
         "open_loop": (opened, states, ("speed_error", "bit_torque"), LOOP_OUTPUTS),
         "closed_loop": (closed, states, ("set_speed", "bit_torque"), LOOP_OUTPUTS),

@@ -141,12 +141,13 @@ def loop(design: Design) -> LoopAnalysis:
         There is no steady drilling: the drive cannot turn the bit.
     """
     point = operating_point(design)
-    ends, bit = ends_of(design.string), bit_side(design, point.slope, point.speed)
+    string = design.sliding_string
+    ends, bit = ends_of(string), bit_side(design, point.slope, point.speed)
     tolerated, omega = tolerated_slope(design, point.speed)
     # Two gains describe the drive, and a weight that acts at once is in the slope already.
     simple = design.simple_loop
     gains = design.linear_drive.gains()
-    poles = loop_poles(design.string, *gains, point.slope) if simple else model_poles(design, bit)
+    poles = loop_poles(string, *gains, point.slope) if simple else model_poles(design, bit)
     stable = bool(point.slope < tolerated)
     cutting = None if design.axial is None else cutting_loop(design)
     at_top = margins(ends, design.linear_drive, bit, poles) if stable else None
@@ -176,7 +177,7 @@ def loop(design: Design) -> LoopAnalysis:
 
 def tolerated_slope(design: Design, speed: float) -> tuple[float, float]:
     """Slope margin of any loop about steady drilling at a speed (rad/s)."""
-    ends = ends_of(design.string)
+    ends = ends_of(design.sliding_string)
     if design.simple_loop:
         return slope_margin(ends, *design.linear_drive.gains())
     bit = bit_side(design, 0.0, speed)
@@ -204,7 +205,7 @@ def _moving(design: Design, point: OperatingPoint) -> BitSide | None:
 def _continuum(design: Design, kp: float, ki: float) -> float | None:
     if design.string.parts.modal_damping > 0.0:
         return None
-    return slope_margin(ends_of(design.string, "wave"), kp, ki)[0]
+    return slope_margin(ends_of(design.sliding_string, "wave"), kp, ki)[0]
 
 
 def critical_speed(design: Design, tolerated: float | None = None) -> float | None:
@@ -267,7 +268,7 @@ def _weights(design: Design, nominal: float) -> Array:
 
 
 def _margin(design: Design) -> float:
-    return slope_margin(ends_of(design.string), *design.linear_drive.gains())[0]
+    return slope_margin(ends_of(design.sliding_string), *design.linear_drive.gains())[0]
 
 
 def _nearest_zero(function: Callable[[float], float], points: Array, about: float) -> float | None:

@@ -160,7 +160,7 @@ class _Weight:
 
 def loop_model(design: Design, bit: BitSide) -> StateMatrices:
     """The loop of a design in state space."""
-    plant = plant_matrices(design.string)
+    plant = plant_matrices(design.sliding_string)
     size = len(plant.a)
     top, bit_row = plant.c[0], plant.c[1]
     drive = _Drive(design.linear_drive, float(top @ plant.b[:, 0]))
@@ -226,7 +226,7 @@ def closed_loop(design: Design) -> control.StateSpace:
         return _whole_loop(design)
     kp, ki = design.linear_drive.gains()
     return named(
-        closed_loop_matrices(design.string, kp, ki),
+        closed_loop_matrices(design.sliding_string, kp, ki),
         "closed_loop",
         inputs,
         LOOP_OUTPUTS,

@@ -72,7 +72,7 @@ def _of_the_line(
     poles: ComplexArray,
 ) -> Figures:
     """The same figures of the exact string; None where they do not converge."""
-    ends, drive = ends_of(design.string, "wave"), design.linear_drive
+    ends, drive = ends_of(design.sliding_string, "wave"), design.linear_drive
     last = float(natural_frequencies(ends.parts, "wave", WAVE_MODES)[-1])
     wanted = set(asked)
     found: list[dict[str, float]] = []

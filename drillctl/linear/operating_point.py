@@ -74,7 +74,10 @@ def equilibria(design: Design) -> tuple[OperatingPoint, ...]:
     changes = np.flatnonzero(signs[1:] != signs[:-1])
     brackets = [(float(speeds[i]), float(speeds[i + 1])) for i in changes]
     brackets += _folds(design, speeds, surplus)
-    return tuple(at_speed(design, speed) for speed in sorted(_zero(design, *b) for b in brackets))
+    found = sorted(_zero(design, *b) for b in brackets)
+    if design.wall is not None:  # at its critical speed the torque of the wall jumps over a balance
+        found = [x for x in found if abs(_surplus(design, x)) < 1e-6 * design.wall.total]
+    return tuple(at_speed(design, speed) for speed in found)
 
 
 def _speeds(design: Design) -> Array:
@@ -145,9 +148,11 @@ def rock_at(friction: Any, weight: Any, speed: Any) -> tuple[Any, Any]:
 
 
 def _surplus(design: Design, speed: float | Array) -> Any:
-    """Torque (N m) that drive gives beyond what rock and drag take at a steady speed."""
+    """Torque (N m) that drive gives beyond what rock, drag and wall take at a steady speed."""
     drag = float(design.string.ground_damping.sum()) * speed
     rock, _ = rock_at(design.bit_rock, design.weight_on_bit, speed)
+    if design.wall is not None:
+        drag = drag + design.wall.at_speed(speed)
     return design.linear_drive.torque(0.0, speed - design.speed) - drag - rock
 
 

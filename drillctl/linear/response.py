@@ -185,7 +185,7 @@ def frequency_response(
         raise InputError(f"no loop {loop!r}; {nearest(loop, LOOPS)}", "loop")
     if not math.isfinite(slope):
         raise InputError(f"must be a number, got {slope:g}", "slope")
-    string = subject if isinstance(subject, Drillstring) else subject.string
+    string = subject if isinstance(subject, Drillstring) else subject.sliding_string
     s = 2j * math.pi * frequency
     drive = np.zeros_like(s)
     if loop != "plant":

@@ -140,7 +140,8 @@ class _Search:
         self.grid = telling_grid(ends)
         parts = ends.parts
         self.rigid = parts.top_damping + parts.bit_damping + sum(
-            x.drag + x.mass_damping * (x.inertia + x.end_inertia) for x in parts.sections
+            x.drag + x.end_drag + x.mass_damping * (x.inertia + x.end_inertia)
+            for x in parts.sections
         )  # fmt: skip
         s = 1j * self.grid
         # The bit's own damper apart: it adds to D* and leaves the reactance lossless.

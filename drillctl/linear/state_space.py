@@ -149,7 +149,7 @@ def open_loop(design: Design) -> control.StateSpace:
     kp, ki = design.linear_drive.gains()
     inputs = ("speed_error", "bit_torque")
     return named(
-        open_loop_matrices(design.string, kp, ki),
+        open_loop_matrices(design.sliding_string, kp, ki),
         "open_loop",
         inputs,
         LOOP_OUTPUTS,

@@ -72,8 +72,8 @@ def continuous_line(section: Section, s: ComplexArray) -> Line:
 
 
 def _lump(section: Section, s: ComplexArray) -> ComplexArray:
-    """Impedance of the inertia at the lower end of a section (N m s/rad)."""
-    return (s + section.mass_damping) * section.end_inertia
+    """Impedance of inertia and damper at the lower end of a section (N m s/rad)."""
+    return (s + section.mass_damping) * section.end_inertia + section.end_drag
 
 
 class EndMobility(NamedTuple):

@@ -5,7 +5,7 @@ slope of the rock closed around the bit:
 
     analysis = drillctl.linear.loop(design)
     slope = analysis.operating_point.slope
-    omega = pole_grid(ends_of(design.string), analysis.poles)
+    omega = pole_grid(ends_of(design.sliding_string), analysis.poles)
     response = frequency_response(design, omega / (2 * np.pi), "open_loop", slope=slope)
 
 The falling slope makes each mode of an undamped string grow without drive, and L circle at its
@@ -302,7 +302,7 @@ def _turns(loop: ComplexArray, analysis: LoopAnalysis | None) -> str:
     if analysis is None or not analysis.design.simple_drive or analysis.bit_side.path is not None:
         return ""
     design = analysis.design
-    free = loop_poles(design.string, 0.0, 0.0, analysis.operating_point.slope)
+    free = loop_poles(design.sliding_string, 0.0, 0.0, analysis.operating_point.slope)
     growing, left = int((free.real > 0.0).sum()), int((analysis.poles.real > 0.0).sum())
     turns = turns_about_critical(loop, len(analysis.poles) - len(free))
     if turns is None or turns != growing - left or (left == 0) != analysis.stable:

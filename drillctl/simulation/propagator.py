@@ -35,6 +35,7 @@ from drillctl.rig.well.wall import Wall
 from drillctl.simulation.kernels.string_step import (
     BlockString,
     DenseString,
+    DriftString,
     UndampedString,
     WallString,
 )
@@ -97,7 +98,7 @@ class StringStep:
     """A string ready to be stepped."""
 
     # what the kernels take
-    string: UndampedString | BlockString | DenseString | WallString
+    string: UndampedString | BlockString | DenseString | WallString | DriftString
     # shape (states, nodes): State per nodal angle (1/rad) and per nodal speed (s/rad), both in
     # the frame
     angle_to_state: Array
@@ -153,7 +154,10 @@ def string_step(
             kind, fields, basis = _stepped(string, frequency, shapes, step)
         else:
             kind, fields, basis = WallString, *_rubbed(string, frequency, shapes, step, wall)
-            fields["pipe_by_wall"] = -left_out[list(wall.nodes[:-1])]
+            by_bit = np.append(left_out[:-1], -left_out[-1])
+            fields["pipe_by_wall"] = -by_bit[list(wall.nodes[:-1])]
+            if wall.drifts:
+                kind, fields["drift"] = DriftString, wall.drift[:-1]
     constants = {
         "drag": float(string.ground_damping.sum()),
         "pipe_offset": float(string.element_stiffness[0] * (rest[0] - rest[1])),

@@ -208,7 +208,7 @@ def _run(
         changes=clock.changes[: count[r.CHANGES]],
         crossings=clock.crossings[: count[r.CROSSINGS]],
         extremes=clock.extremes[: count[r.EXTREMES]],
-        energy=_audit(design, numbers.arrays["begin"], state, float(rig["wall_work"][0])),
+        energy=_audit(design, numbers.arrays["begin"], state, rig[0]),
         tolerance=tolerance,
         method="Rodas5P" if stiff else "DOP853",
         steps=int(rig["steps"][0]),
@@ -250,7 +250,7 @@ def _with_room(numbers: Numbers, clock: Any) -> Any:
     )
 
 
-def _audit(design: Design, before: Array, after: Array, wall: float) -> EnergyAudit:
+def _audit(design: Design, before: Array, after: Array, rig: Any) -> EnergyAudit:
     """Energy balance between the first and the final state."""
     string, nodes = design.string, design.string.nodes
 
@@ -260,6 +260,9 @@ def _audit(design: Design, before: Array, after: Array, wall: float) -> EnergyAu
         return float(kinetic + 0.5 * angle @ (string.stiffness @ angle))
 
     drive, bit, damping = (float(w) for w in after[2 * nodes : 2 * nodes + 3])
+    wall = float(rig["wall_work"])
+    if rig["drifts"]:  # its power was integrated with that of damping
+        damping -= wall
     return EnergyAudit(drive, bit, damping, stored(after) - stored(before), wall=wall)
 
 
@@ -416,7 +419,8 @@ def _laws_of(design: Design) -> tuple[dict[str, Any], dict[str, Array]]:
         "drive_torque": address(drive, "torque") if drive_kind == f.IDEAL else 0,
         "rock_torque": address(rocks[1], "torque_and_slope"),
         "static_torque": address(rocks[1], "static_torque"),
-        "set_valued": bool(design.bit_rock.set_valued) or design.wall is not None,
+        "set_valued": bool(design.bit_rock.set_valued)
+        or (design.wall is not None and not design.wall.drifts),
         "smooth": not (design.bit_rock.set_valued or tolerance > 0.0),
         "weight_kind": weight_kind,
         "weight": address(weight, method),
@@ -437,7 +441,12 @@ def _wall_of(design: Design) -> tuple[dict[str, Any], Array]:
     table = np.zeros((w.ROWS, max(len(one.nodes) - 1, 1)))
     table[w.NODE, : len(one.nodes) - 1] = one.nodes[:-1]
     table[w.FRICTION, : len(one.nodes) - 1] = one.torque[:-1]
+    table[w.DRIFT, : len(one.nodes) - 1] = drift = one.drift[:-1]
+    if math.isfinite(one.critical):
+        left = np.sqrt(np.maximum(one.critical**2 - drift**2, 0.0))
+        table[w.CRITICAL, : len(one.nodes) - 1] = left
     return {
+        "drifts": one.drifts,
         "wall_nodes": len(one.nodes) - 1, "bit_friction": float(one.torque[-1]), "bit_level": 1.0,
         "wall_ratio": one.ratio, "wall_critical": one.critical,
     }, table  # fmt: skip

@@ -77,7 +77,7 @@ WHOLE_NUMBERS = (
     "weight_kind", "weight",  # addresses of `law_calls` among them
     "rates", "margin", "decision", "weighing",  # addresses of what is compiled by itself
     "bands", "full_damping", "laws", "observer", "begin", "tape", "path",  # addresses of arrays
-    "path_nodes", "wall", "wall_nodes", "scratch",
+    "path_nodes", "wall", "wall_nodes", "drifts", "scratch",
     "components", "steps",  # kept of each step; on the tape
 )  # fmt: skip
 NUMBERS = (
@@ -675,7 +675,7 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
         rates[i] = state[n + i]
     _forces(rig, state, force)
     if rig.wall_nodes > 0:
-        wall.push_wall(wall_of(rig), force)
+        wall.push_wall(wall_of(rig), state[n : 2 * n], rig.set_speed, force)
     at_bit, bit_torque, count = force[n - 1], 0.0, n - 1
     if not held:
         bit_torque, count = slip_torque(rig, time, state, phase), n
@@ -694,6 +694,8 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
     rates[2 * n] = top_torque * (state[n] + rig.set_speed)
     rates[2 * n + 1] = bit_torque * bit_speed(rig, state)
     rates[2 * n + 2] = _damping_power(rig, state)
+    if rig.drifts:
+        rates[2 * n + 2] += wall.drift_power(wall_of(rig), state[n : 2 * n], rig.set_speed)
     if rig.weight_states:
         weight_rates(rig, time, state, top_torque, rates)
     return bit_torque

@@ -242,10 +242,9 @@ def _wall_margin(rig: Any, time: float, phase: int, state: Any) -> float:
         speed = state[n + int(table[wall.NODE, k])] + rig.set_speed
         margin = wall.margin_of(table, k, speed, rig.wall_ratio, rig.wall_critical)
         least = min(least, margin)
-    if abs(phase) == 1 and rig.wall_ratio < 1.0:
+    if abs(phase) == 1 and rig.wall_ratio < 1.0 and not rig.drifts:
         ahead = phase * f.bit_speed(rig, state)
-        away = rig.wall_critical - ahead if rig.bit_level == 1.0 else ahead - rig.wall_critical
-        least = min(least, away or 1e-300)
+        least = min(least, wall.to_critical(ahead, rig.bit_level, rig.wall_critical))
     return least
 
 
@@ -266,7 +265,7 @@ def _turn_wall(rig: Any, time: float, phase: int, state: Any) -> None:
             exact = wall.turn_node(table, k, speed, ratio, critical)
             if not stuck:
                 state[i] = exact - rig.set_speed
-    if abs(phase) == 1 and ratio < 1.0:
+    if abs(phase) == 1 and ratio < 1.0 and not rig.drifts:
         ahead = phase * f.bit_speed(rig, state)
         if abs(ahead - critical) <= max(abs(least), wall.SAME):
             rig.bit_level = ratio if rig.bit_level == 1.0 else 1.0
@@ -303,6 +302,9 @@ def _begin_wall(rig: Any, state: Any) -> None:
         speed = state[rig.nodes + int(table[wall.NODE, k])] + rig.set_speed
         table[wall.MODE, k] = 0.0 if speed == 0.0 else math.copysign(1.0, speed)
         slow = abs(speed) <= rig.wall_critical
+        if rig.drifts:
+            table[wall.MODE, k] = wall.DRIFTS
+            slow = abs(speed) <= table[wall.CRITICAL, k] > 0.0
         table[wall.LEVEL, k] = 1.0 if slow else rig.wall_ratio
     slow = abs(f.bit_speed(rig, state)) <= rig.wall_critical
     rig.bit_level = 1.0 if slow else rig.wall_ratio
@@ -461,7 +463,7 @@ def _end_piece(rig: Any, clock: Any, work: Any, state: Any, what: int) -> None:
     piece[0], piece[1], piece[2] = clock.now[PIECE_BEGIN], time, phase
     count[PIECES] += 1
     count[IN_PIECE] = 0
-    if rig.wall_nodes > 0:
+    if rig.wall_nodes > 0 and not rig.drifts:
         _add_work(rig, time - piece[0], state)
     if time >= clock.duration:
         return
@@ -484,6 +486,15 @@ def _add_work(rig: Any, length: float, state: Any) -> None:
         turned = state[int(table[wall.NODE, k])] - table[wall.ANGLE, k] + rig.set_speed * length
         torque = table[wall.MODE, k] * table[wall.LEVEL, k] * table[wall.FRICTION, k]
         rig.wall_work += torque * turned
+
+
+@f.compiled
+def _add_drift_work(rig: Any, length: float, before: Any, after: Any) -> None:
+    """The same of a string that drifts, in a step: the mean power of its ends."""
+    n, table = rig.nodes, f.wall_of(rig)
+    power = wall.drift_power(table, before[n : 2 * n], rig.set_speed)
+    power += wall.drift_power(table, after[n : 2 * n], rig.set_speed)
+    rig.wall_work += 0.5 * length * power
 
 
 @f.compiled
@@ -589,8 +600,19 @@ def _keep_step(
     if until <= 1.0:
         now[TIME] = time + until * step
         s.state_at(work, until, work.trial)
+        if rig.drifts:
+            _add_drift_work(rig, until * step, state, work.trial)
         f.copy(state, work.trial)
         return what
+    if rig.drifts:
+        _add_drift_work(rig, step, state, work.after)
+        before, after = state[rig.nodes : 2 * rig.nodes], work.after[rig.nodes : 2 * rig.nodes]
+        rates = work.stages[0, rig.nodes : 2 * rig.nodes]
+        rates_after = work.stages[s.STAGES, rig.nodes : 2 * rig.nodes]
+        table, frame = f.wall_of(rig), rig.set_speed
+        bent = wall.drift_power_rate(table, before, frame, rates)
+        bent -= wall.drift_power_rate(table, after, frame, rates_after)
+        rig.wall_work += bent * step**2 / 12.0
     now[TIME] = now[STOP] if step == now[STOP] - time else time + step
     f.copy(state, work.after)
     f.copy(work.stages[0], work.stages[s.STAGES])

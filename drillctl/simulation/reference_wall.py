@@ -5,6 +5,10 @@ or sticks: its acceleration is zero, its equation left out of the mass matrix, a
 holds it is what that equation asks for. A phase ends where a sliding node comes to rest or passes
 the critical speed, or where a node would need more than its friction at rest. No torque is ever
 smoothed, and the work of the wall is exact: torque times angle.
+
+Where the string drifts along the well nothing sticks: the torque of a node is a smooth function of
+its speed, and a phase ends where the sum of both velocities passes the critical speed. Its power
+is integrated with that of damping; what of it is the wall's is told by a rule of fourth order.
 """
 
 from __future__ import annotations
@@ -19,21 +23,55 @@ from drillctl.simulation.law_calls import OPTIONS
 compiled = numba.njit(fastmath={"contract"}, nogil=True, **OPTIONS)
 
 # Rows of the table, a column a node: its number; friction at rest (N m); -1, 0 or 1 as it slides
-# or sticks; the share of the friction that is left; torque that holds it (N m); its angle as the
-# phase began (rad).
-NODE, FRICTION, MODE, LEVEL, HOLDING, ANGLE = range(6)
-ROWS = 6
+# or sticks, 2 where it drifts; the share of the friction that is left; torque that holds it (N m);
+# its angle as the phase began (rad); its drift, and the speed at which a share is lost (rad/s).
+NODE, FRICTION, MODE, LEVEL, HOLDING, ANGLE, DRIFT, CRITICAL = range(8)
+ROWS = 8
+DRIFTS = 2.0
 
 SAME = 1e-9  # share of a friction, or speed (rad/s), by which two events are one
+CAME_FROM = 1e-14  # rad/s: a node that was put at the critical speed is that near, to rounding
 MOST_TURNS = 200  # of a search for the sets that are consistent
 
 
 @compiled
-def push_wall(table: Any, force: Any) -> None:
+def drift_torque(table: Any, k: int, speed: float) -> float:
+    """Torque of a node that drifts (N m)."""
+    along = math.hypot(speed, table[DRIFT, k])
+    return table[LEVEL, k] * table[FRICTION, k] * speed / along
+
+
+@compiled
+def drift_power(table: Any, speeds: Any, frame: float) -> float:
+    """Power that the wall takes from a string that drifts (W)."""
+    power = 0.0
+    for k in range(table.shape[1]):
+        speed = speeds[int(table[NODE, k])] + frame
+        power += speed * drift_torque(table, k, speed)
+    return power
+
+
+@compiled
+def drift_power_rate(table: Any, speeds: Any, frame: float, accelerations: Any) -> float:
+    """Its rate of change (W/s)."""
+    total = 0.0
+    for k in range(table.shape[1]):
+        i = int(table[NODE, k])
+        speed, drift = speeds[i] + frame, table[DRIFT, k]
+        cube = math.hypot(speed, drift) ** 3
+        left = table[LEVEL, k] * table[FRICTION, k]
+        total += accelerations[i] * left * speed * (speed**2 + 2.0 * drift**2) / cube
+    return total
+
+
+@compiled
+def push_wall(table: Any, speeds: Any, frame: float, force: Any) -> None:
     """Torques of sliding nodes; those of the others are taken off, and kept."""
     for k in range(table.shape[1]):
         i = int(table[NODE, k])
-        if table[MODE, k] == 0.0:
+        if table[MODE, k] == DRIFTS:
+            force[i] -= drift_torque(table, k, speeds[i] + frame)
+        elif table[MODE, k] == 0.0:
             table[HOLDING, k] = force[i]
             force[i] = 0.0
         else:
@@ -81,6 +119,10 @@ def margin_of(table: Any, k: int, speed: float, ratio: float, critical: float) -
         if friction == 0.0:
             return 1.0
         return 1.0 - abs(table[HOLDING, k]) / friction
+    if table[MODE, k] == DRIFTS:
+        if ratio == 1.0 or table[CRITICAL, k] == 0.0:
+            return 1.0
+        return to_critical(abs(speed), table[LEVEL, k], table[CRITICAL, k])
     ahead = table[MODE, k] * speed
     return least_margin(ahead, table[LEVEL, k], ratio, critical)
 
@@ -91,9 +133,15 @@ def least_margin(ahead: float, level: float, ratio: float, critical: float) -> f
     tiny = 1e-300
     margin = ahead or tiny
     if ratio < 1.0:
-        to_critical = critical - ahead if level == 1.0 else ahead - critical
-        margin = min(margin, to_critical or tiny)
+        margin = min(margin, to_critical(ahead, level, critical))
     return margin
+
+
+@compiled
+def to_critical(ahead: float, level: float, critical: float) -> float:
+    """What is left to the critical speed (rad/s)."""
+    over = critical - ahead if level == 1.0 else ahead - critical
+    return 1e-300 if abs(over) < CAME_FROM else over
 
 
 @compiled
@@ -104,6 +152,9 @@ def turn_node(table: Any, k: int, speed: float, ratio: float, critical: float) -
         table[MODE, k] = math.copysign(1.0, table[HOLDING, k])
         table[LEVEL, k] = 1.0
         return 0.0
+    if mode == DRIFTS:
+        table[LEVEL, k] = ratio if table[LEVEL, k] == 1.0 else 1.0
+        return math.copysign(table[CRITICAL, k], speed)
     ahead = mode * speed
     if ratio < 1.0 and abs(ahead - critical) < abs(ahead):
         table[LEVEL, k] = ratio if table[LEVEL, k] == 1.0 else 1.0
@@ -119,6 +170,8 @@ def settle_node(table: Any, k: int, speed: float, push: float) -> bool:
     `push`: its inertia times acceleration (N m); of a node just let go, zero but for rounding.
     """
     friction = table[FRICTION, k]
+    if table[MODE, k] == DRIFTS:
+        return False
     if table[MODE, k] == 0.0:
         if abs(table[HOLDING, k]) > friction * (1.0 + 1e-12):
             table[MODE, k] = math.copysign(1.0, table[HOLDING, k])

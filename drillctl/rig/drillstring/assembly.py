@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -175,7 +176,7 @@ def assemble(
     end_drag = np.zeros_like(end_inertia)
     for section, last in zip(sections, np.cumsum([s.elements for s in sections]), strict=True):
         end_inertia[last] += section.end_inertia
-        end_drag[last] += section.mass_damping * section.end_inertia
+        end_drag[last] += section.mass_damping * section.end_inertia + section.end_drag
     end_inertia[0] += top_inertia
     end_inertia[-1] += bit_inertia
     end_drag[0] += top_damping
@@ -202,6 +203,30 @@ def assemble(
         ),
     )
     return string if modal_damping == 0.0 else _with_modal_damping(string, modal_damping)
+
+
+def with_dampers(string: Drillstring, nodes: tuple[int, ...], dampers: Array) -> Drillstring:
+    """A string with dampers to ground (N m s/rad) at nodes below its top, its sections cut there.
+
+    Elements and nodes stay as they are.
+    """
+    added = np.zeros(string.nodes)
+    np.add.at(added, list(nodes), dampers)
+    pieces, first = [], 0
+    for section in string.parts.sections:
+        last = first + section.elements
+        cuts = [first, *(int(k) for k in np.flatnonzero(added) if first < k < last), last]
+        for above, below in pairwise(cuts):
+            share = (below - above) / section.elements
+            pieces.append(replace(
+                section, elements=below - above, stiffness=section.stiffness / share,
+                inertia=section.inertia * share, length=section.length * share,
+                coupling_damping=section.coupling_damping / share, drag=section.drag * share,
+                end_inertia=section.end_inertia if below == last else 0.0,
+                end_drag=float(added[below]) + (section.end_drag if below == last else 0.0),
+            ))  # fmt: skip
+        first = last
+    return assemble(**vars(replace(string.parts, sections=tuple(pieces))))
 
 
 def _per_element(sections: tuple[Section, ...], value: Callable[[Section], float]) -> Array:

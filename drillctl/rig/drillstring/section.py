@@ -47,6 +47,8 @@ class Section:
         Damping to ground over inertia (1/s).
     drag : float
         Damping to ground, spread evenly over the length (N m s/rad).
+    end_drag : float
+        The same at the lower end alone (N m s/rad).
     yield_torque : float
         Torque at which the pipe body begins to yield (N m); infinite when unknown.
     lumped : tuple of str
@@ -63,6 +65,7 @@ class Section:
     stiffness_damping: float = 0.0
     mass_damping: float = 0.0
     drag: float = 0.0
+    end_drag: float = 0.0
     yield_torque: float = math.inf
     lumped: tuple[str, ...] = ()
 

@@ -3,6 +3,9 @@
 The torque of a length is mu r N at rest and for |w| < w_c, a share of it beyond (after Aarsnes &
 Shor 2018). N is that of the string rotating off bottom or under weight; it does not change in a
 run. Each cell's torque goes to the two nodes about it, in inverse proportion to their distance.
+
+A string that moves along the well at a speed v never sticks: with the drift d = v / r its torque
+is that share of mu r N times w / sqrt(w^2 + d^2), and w_c bounds the sum of both velocities.
 """
 
 from __future__ import annotations
@@ -14,40 +17,71 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drillctl.arrays import Array
-from drillctl.rig.well.soft_string import Line, tension
+from drillctl.rig.well.soft_string import Line, Motion, tension
 
 BY_TORQUE = 0.3
 """Share of the torque in the measure that nodes stand in equal parts of. With 12, 16 and 20 nodes
 the first slip of Well A is then within the scatter of finer ones; with 1 or 0 it is not."""
 
+TURNING = Motion(0.0, 1.0)
+
 
 class Wall(NamedTuple):
-    """Friction at nodes of a string, from the top down; the last is the bit."""
+    """Friction at nodes of a string, from the top down; the last is the bit.
+
+    Of a string that drifts the last has none: what rubs at the bit is a node of its own there,
+    smooth, while the rock may still hold the bit.
+    """
 
     nodes: tuple[int, ...]
     torque: Array  # shape (nodes,): at rest, at most (N m)
     ratio: float  # of it that is left beyond the critical speed
     critical: float  # speed (rad/s)
+    drift: Array  # shape (nodes,): speed along the well over the radius (rad/s)
 
     @property
     def total(self) -> float:
         """Torque at rest of the whole string, at most (N m)."""
         return float(self.torque.sum())
 
+    @property
+    def drifts(self) -> bool:
+        """Whether the string moves along the well."""
+        return bool(self.drift.any())
+
+    def _sliding(self, speed: Any) -> tuple[Array, Array, Array]:
+        """Speed and sum of both velocities (rad/s), and what is left of the friction (N m)."""
+        around = np.asarray(speed, dtype=float)[..., None]
+        along = np.hypot(around, self.drift)
+        return around, along, np.where(along > self.critical, self.ratio, 1.0) * self.torque
+
+    def at_speed(self, speed: Any) -> Array:
+        """Torque (N m) of all nodes while the string turns at a speed (rad/s) > 0."""
+        around, along, left = self._sliding(speed)
+        return np.asarray((left * around / along).sum(axis=-1))
+
+    def slopes(self, speed: float) -> Array:
+        """Growth of the torque of each node with its speed (N m s/rad): its viscous equivalent."""
+        _, along, left = self._sliding(speed)
+        return np.asarray(left * self.drift**2 / along**3)
+
 
 def edges_of(wall: Wall, depth: Array) -> Array:
     """Measured depths (m) between which the string belongs to each node, shape (nodes + 1,)."""
     places = depth[list(wall.nodes)]
-    if len(places) == 1:
-        return np.array([0.0, places[0]])
+    if places[0] == places[-1]:  # the bit alone
+        return np.array([0.0, *places])
     between = 0.5 * (places[:-1] + places[1:])
     first = max(0.0, places[0] - (between[0] - places[0]))
     return np.concatenate([[first], between, places[-1:]])
 
 
-def cell_torque(line: Line, factor: Array, weight_on_bit: float, coupled: bool) -> Array:
+def cell_torque(
+    line: Line, factor: Array, weight_on_bit: float, coupled: bool, motion: Motion = TURNING
+) -> Array:
     """Largest torque of the wall on each cell of a string that turns (N m)."""
-    along = tension(line, -weight_on_bit, 0.0 * factor)
+    up = np.array([motion.shares(float(r))[0] for r in line.radius])
+    along = tension(line, -weight_on_bit, -factor * up, coupled)
     _, mean = line.side_forces(along if coupled else 0.0 * along)
     return np.asarray(mean * factor * line.radius * line.length)
 
@@ -78,19 +112,36 @@ def choose_nodes(
 
 def lumped(
     line: Line, depth: Array, nodes: tuple[int, ...], factor: Array, weight_on_bit: float,
-    well: Any,
+    speed: float, well: Any,
 ) -> Wall:  # fmt: skip
-    """Friction of a well (its table) at nodes."""
-    torque = cell_torque(line, factor, weight_on_bit, well.tension)
-    middle = 0.5 * (line.depth[:-1] + line.depth[1:])
-    places = depth[list(nodes)]
-    below = np.clip(np.searchsorted(places, middle), 1, max(len(nodes) - 1, 1))
-    at = np.zeros(len(nodes))
-    if len(nodes) == 1:
-        at[0] = torque.sum()
-    else:
-        share = np.clip((middle - places[below - 1]) / np.diff(places)[below - 1], 0.0, 1.0)
-        np.add.at(at, below, share * torque)
-        np.add.at(at, below - 1, (1.0 - share) * torque)
+    """Friction of a well (its table) at nodes of a string that turns at a speed (rad/s)."""
+    motion = Motion(well.axial_speed, speed)
+    torque = cell_torque(line, factor, weight_on_bit, well.tension, motion)
+    at = _shared(line, depth[list(nodes)], torque)
     critical = well.critical_speed if well.friction_ratio < 1.0 else math.inf
-    return Wall(nodes, at, well.friction_ratio, critical)
+    if well.axial_speed == 0.0:
+        return Wall(nodes, at, well.friction_ratio, critical, 0.0 * at)
+    # The radius at which a node rubs: of one friction factor, so that draws of it share a drift.
+    alike = cell_torque(line, np.ones(len(torque)), weight_on_bit, well.tension)
+    arm, sums = (_shared(line, depth[list(nodes)], x) for x in (alike * line.radius, alike))
+    usual = float(line.radius.mean())
+    radius = np.divide(arm, sums, out=np.full(len(at), usual), where=sums > 0.0)
+    drift = abs(well.axial_speed) / radius
+    return Wall(
+        (*nodes, nodes[-1]), np.append(at, 0.0), well.friction_ratio, critical,
+        np.append(drift, drift[-1]),
+    )  # fmt: skip
+
+
+def _shared(line: Line, places: Array, amount: Array) -> Array:
+    """What cells have, given to the two nodes about each; at places (m), shape (nodes,)."""
+    at = np.zeros(len(places))
+    if len(places) == 1:
+        at[0] = amount.sum()
+        return at
+    middle = 0.5 * (line.depth[:-1] + line.depth[1:])
+    below = np.clip(np.searchsorted(places, middle), 1, len(places) - 1)
+    share = np.clip((middle - places[below - 1]) / np.diff(places)[below - 1], 0.0, 1.0)
+    np.add.at(at, below, share * amount)
+    np.add.at(at, below - 1, (1.0 - share) * amount)
+    return at

@@ -107,6 +107,14 @@ def rounded_down(value: Row) -> Row:
     return Row(builder().call(called, (value.ir,)))
 
 
+def root(value: Row) -> Row:
+    """The square root of a row."""
+    kind = ir.FunctionType(vector(), [vector()])
+    name = f"llvm.sqrt.v{lanes()}f64"
+    called = cgutils.get_or_insert_function(builder().module, kind, name)
+    return Row(builder().call(called, (value.ir,)))
+
+
 def lane_number() -> Row:
     """0, 1, 2, ...: each lane's place in its block."""
     return Row(ir.Constant(vector(), [float(lane) for lane in range(lanes())]))

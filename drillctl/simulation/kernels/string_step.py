@@ -143,6 +143,14 @@ class WallString(NamedTuple):
     pipe_by_bit: Any
 
 
+_DRIFTS = [*((name, Any) for name in WallString._fields), ("drift", Any)]
+DriftString: Any = NamedTuple("DriftString", _DRIFTS)  # type: ignore[misc]
+"""The same of a string that moves along the well.
+
+`drift`, shape (nodes,): that speed over the radius of each node (rad/s).
+"""
+
+
 class Swing(NamedTuple):
     """What a pass over the string tells."""
 

@@ -11,6 +11,10 @@ friction of its speed. The sweeps begin with the torques of the last step; their
 that no lane depends on its neighbours. The bit's own inclusion is then solved as without a wall,
 with the wall's torques as they were found.
 
+Of a string that drifts along the well no node sticks: its torque is F w / sqrt(w^2 + d^2) of the
+speed at the end of the step. Each sweep makes one step of Newton's method, from the last sweep's
+speed; the function is concave, so that no step goes too far once it is on the near side.
+
 Beyond the critical speed a part of the friction is lost. Where a node passes that speed within the
 step, as its last two speeds lead on, its friction is the mean over the step.
 """
@@ -22,17 +26,18 @@ from typing import Any, NamedTuple
 
 from drillctl.rig.bit_rock.law import Exp
 from drillctl.simulation.kernels import rows as r
-from drillctl.simulation.kernels.arithmetic import exp, fma, law_at, most, signed
+from drillctl.simulation.kernels.arithmetic import exp, fma, law_at, most, root, signed
 from drillctl.simulation.kernels.drive_step import RealStep, SampledStep, asks_for_top, eliminate
 from drillctl.simulation.kernels.rows import WIDTH
-from drillctl.simulation.kernels.string_step import Swing, WallString
+from drillctl.simulation.kernels.string_step import DriftString, Swing, WallString
 from drillctl.simulation.kernels.vectors import Variable, at, each, loop, pick, put
 from drillctl.simulation.kernels.weight_step import acting
 
-SWEEPS = 6
+SWEEPS = 4
 """Of Gauss-Seidel in a step; `tests/simulation/test_wall.py` holds what more would change."""
 
-# Rows of a node in the room that the string leaves, after those of the bit.
+# Rows of a node in the room that the string leaves, after those of the bit; of one that drifts the
+# speed of its last sweep, without sign, in place of whether it is stuck.
 TORQUE, SPEED, BEFORE, FRICTION, SLIDING, FREE, CLOSED, STUCK, GAIN, PER_GAIN = range(10)
 NODE_ROWS = 10
 BIT_FRICTION, BIT_LEVEL, WALL_WORK = range(3)
@@ -54,7 +59,12 @@ def _nodes(string: Any) -> Any:
 
 def has_wall(string: Any) -> bool:
     """Whether the wall rubs on a string."""
-    return isinstance(string, WallString)
+    return isinstance(string, (WallString, DriftString))
+
+
+def drifts(string: Any) -> bool:
+    """Whether it moves along the well."""
+    return isinstance(string, DriftString)
 
 
 def load_wall(string: Any, speed: Any, room: Any, work: Any, first: Any) -> None:
@@ -107,15 +117,19 @@ class WalledRock(NamedTuple):
 
 def walled(string: Any, law: Any, room: Any) -> Any:
     """The law that the bit meets: that of the rock, with the wall if there is one."""
-    if not has_wall(string):
+    if not has_wall(string) or drifts(string):
         return law
+    return _walled(string, law, room)
+
+
+def _walled(string: Any, law: Any, room: Any) -> WalledRock:
     friction = at(room, BIT_FRICTION * WIDTH)
     return WalledRock(law, friction, friction * at(room, BIT_LEVEL * WIDTH))
 
 
 def begin_wall(string: Any, room: Any, work: Any) -> None:
     """Torque of the wall on a bit that turns at time zero."""
-    if has_wall(string):
+    if has_wall(string) and not drifts(string):
         turning = at(work, r.DIRECTION) != 0.0
         level = _level_at(string, abs(at(work, r.BIT_SPEED)))
         own = pick(turning, at(room, BIT_FRICTION * WIDTH) * level, 0.0)
@@ -126,10 +140,12 @@ def _level_at(string: Any, speed: Any) -> Any:
     return pick(speed <= string.critical, 1.0, string.ratio)
 
 
-def _level(string: Any, speed: Any, before: Any) -> Any:
+def _level(string: Any, speed: Any, before: Any, drift: Any = None) -> Any:
     """Mean over the step of the share of the friction that is left, its end by the last speeds."""
     now = abs(speed)
     ahead = most(signed(each(1.0), speed) * (2.0 * speed - before), 0.0)
+    if drift is not None:
+        now, ahead = (root(fma(x, x, drift * drift)) for x in (now, ahead))
     slow, slow_after = now < string.critical, ahead < string.critical
     passed = (string.critical - now) / (ahead - now)
     share = pick(slow, pick(slow_after, 1.0, passed), pick(slow_after, 1.0 - passed, 0.0))
@@ -180,8 +196,11 @@ def rub(
     with loop(count) as nodes:
         k = nodes.index
         speed = at(room, _row(k, SPEED))
-        level = _level(string, speed, at(room, _row(k, BEFORE)))
+        drift = string.drift[k] if drifts(string) else None
+        level = _level(string, speed, at(room, _row(k, BEFORE)), drift)
         put(room, _row(k, SLIDING), at(room, _row(k, FRICTION)) * level)
+        if drifts(string):
+            put(room, _row(k, STUCK), abs(speed))
         closed = string.angle_by_wall[k] * by_angle - string.top_by_wall[k] * by_speed
         gain = string.by_wall[k, k] - string.by_top[k] * closed
         put(room, _row(k, CLOSED), closed)
@@ -190,16 +209,17 @@ def rub(
         put(room, _row(k, FREE), at(room, _row(k, FREE)) + at(work, r.SET_SPEED))
     at_rest, sliding = _rock_torques(string, law, weight, room, work)
     free_bit = swing.bit_speed + at(work, r.SET_SPEED)
+    slide = _drift if drifts(string) else _slide
     with loop(SWEEPS):
         with loop(count) as nodes:
-            _slide(string, nodes.index, room, top, bit)
+            slide(string, nodes.index, room, top, bit)
         _slide_bit(string, free_bit, reduced, at_rest, sliding, room, top, bit)
     return _under_wall(string, swing, room)
 
 
 def _rock_torques(string: Any, law: Any, weight: Any, room: Any, work: Any) -> tuple[Any, Any]:
     """Torques of rock and wall on the bit: at rest at most, and while it turns in this step."""
-    whole, load = walled(string, law, room), acting(weight, work)
+    whole, load = _walled(string, law, room), acting(weight, work)
     at_rest = at(work, r.REST_LOAD)
     direction, speed = at(work, r.DIRECTION), at(work, r.BIT_SPEED)
     ahead = most(direction * (2.0 * speed - at(work, r.SPEED_BEFORE)), 0.0)
@@ -249,6 +269,24 @@ def _slide(string: Any, k: Any, room: Any, top: Any, bit: Any) -> None:
     top.set(fma(at(room, _row(k, CLOSED)), new - torque, top.get()))
 
 
+def _drift(string: Any, k: Any, room: Any, top: Any, bit: Any) -> None:
+    """One node that drifts, d = `drift`: a step towards u + gain F u / sqrt(u^2 + d^2) = |free|."""
+    torque, gain = at(room, _row(k, TORQUE)), at(room, _row(k, GAIN))
+    free = fma(gain, torque, _speed(string, k, room, top.get(), bit.get()))
+    ahead, drift = abs(free), string.drift[k]
+    u, friction = at(room, _row(k, STUCK)), gain * at(room, _row(k, SLIDING))
+    inverse = 1.0 / root(fma(u, u, drift * drift))
+    share, turn = u * inverse, drift * inverse
+    slope = 1.0 + friction * turn * turn * inverse
+    step = (ahead - u - friction * share) / slope
+    least = most(ahead - friction, ahead * drift / (drift + friction))
+    new_speed = most(u + step, least)
+    put(room, _row(k, STUCK), new_speed)
+    new = signed(most(ahead - new_speed, 0.0) * at(room, _row(k, PER_GAIN)), free)
+    put(room, _row(k, TORQUE), new)
+    top.set(fma(at(room, _row(k, CLOSED)), new - torque, top.get()))
+
+
 def _slide_bit(
     string: Any, free_bit: Any, reduced: Any, at_rest: Any, sliding: Any, room: Any, top: Any,
     bit: Any,
@@ -275,7 +313,7 @@ def follow_wall(string: Any, room: Any, work: Any, step: Any) -> None:
     with loop(_nodes(string)) as nodes:
         k = nodes.index
         moved = _speed(string, k, room, top, bit)
-        new = pick(at(room, _row(k, STUCK)) > 0.0, 0.0, moved)
+        new = moved if drifts(string) else pick(at(room, _row(k, STUCK)) > 0.0, 0.0, moved)
         last = at(room, _row(k, SPEED))
         put(room, _row(k, BEFORE), last)
         put(room, _row(k, SPEED), new)
@@ -295,7 +333,7 @@ def sample_wall(string: Any, room: Any, signals: Any, after: int, first: Any) ->
         return
     with loop(_nodes(string)) as nodes:
         k = nodes.index
-        still = pick(at(room, _row(k, SPEED)) == 0.0, 1.0, 0.0)
+        still = each(0.0) if drifts(string) else pick(at(room, _row(k, SPEED)) == 0.0, 1.0, 0.0)
         put(signals[k + after], first, still)
 
 

@@ -41,7 +41,12 @@ from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import SampledDrive
 from drillctl.simulation.batch import Prepared, _shared, _turns, prepare
-from drillctl.simulation.kernels.string_step import BlockString, UndampedString, WallString
+from drillctl.simulation.kernels.string_step import (
+    BlockString,
+    DriftString,
+    UndampedString,
+    WallString,
+)
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import STATUSES
 from drillctl.simulation.scheme import (
@@ -120,7 +125,7 @@ def form_of(string: Any) -> str:
     """Name of the form of a string made ready: a key of `FORMS`."""
     if isinstance(string, UndampedString):
         return "undamped"
-    if isinstance(string, WallString):
+    if isinstance(string, (WallString, DriftString)):
         return "wall"
     return "blocks" if isinstance(string, BlockString) else "dense"
 

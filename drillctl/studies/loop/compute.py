@@ -104,7 +104,7 @@ def _mobility(design: Design, system: units.System) -> Figure:
 
 
 def _mobility_of(design: Design, system: units.System) -> Figure:
-    frequencies = telling_frequencies(design.string)
+    frequencies = telling_frequencies(design.sliding_string)
     strings = [frequency_response(design, frequencies)]
     if design.string.parts.modal_damping == 0.0:
         strings.append(frequency_response(design, frequencies, model="wave"))
@@ -124,14 +124,14 @@ def _of_loop(result: LoopAnalysis) -> Iterator[Picture]:
 
     @cache
     def opened() -> FrequencyResponse:
-        grid = pole_grid(ends_of(design.string), result.poles) / (2.0 * math.pi)
+        grid = pole_grid(ends_of(design.sliding_string), result.poles) / (2.0 * math.pi)
         return _smooth(
             lambda f: frequency_response(design, f, "open_loop", slope=bit.slope, path=bit.path),
             grid,
         )
 
     def closed() -> FrequencyResponse:
-        grid = telling_frequencies(design.string)
+        grid = telling_frequencies(design.sliding_string)
         return frequency_response(design, grid, "closed_loop", slope=bit.slope, path=bit.path)
 
     yield Picture(

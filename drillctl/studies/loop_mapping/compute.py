@@ -161,7 +161,7 @@ def _of_poles(group: Group, slope: Array, stable: Mask, wanted: set[str]) -> dic
             "mapped for all",
             "quantities",
         )
-    string = group.design.string
+    string = group.design.sliding_string
     kp, ki = gains_of(group.lanes)
     steady = np.isfinite(slope)
     poles = many_loop_poles(

@@ -208,7 +208,7 @@ def _slopes_kept(design: Design, tuned: tuple[Tuned, ...], grid: Array) -> Any:
     if slope <= 0.0:
         return np.ones(len(grid), bool)
     if design.simple_loop and [t.path for t in tuned] == ["controller.kp", "controller.ki"]:
-        margin = slope_margins(ends_of(design.string), grid[:, 0], grid[:, 1]).slope
+        margin = slope_margins(ends_of(design.sliding_string), grid[:, 0], grid[:, 1]).slope
     else:
         margin = np.array([_tolerated(put(design, tuned, one)) for one in grid])
     return np.nan_to_num(margin) >= asked * slope

@@ -93,7 +93,7 @@ def slope_margin_of(design: Design, speed: float) -> tuple[float, float, bool]:
     seen = poles[(poles.real > 0.0) & (np.abs(poles.imag) <= limit)]
     if len(seen):
         return math.nan, float(abs(seen[np.argmax(seen.real)].imag)), False
-    result = whole_crossings(ends_of(design.string), design.linear_drive, bit)
+    result = whole_crossings(ends_of(design.sliding_string), design.linear_drive, bit)
     over = np.flatnonzero((result.slope > 0.0) & (result.omega <= limit))
     if len(over) == 0:
         return math.inf, math.nan, True
@@ -101,10 +101,10 @@ def slope_margin_of(design: Design, speed: float) -> tuple[float, float, bool]:
 
 
 def _margins(design: Design, slope: float, speed: float) -> Margins:
-    bit, ends = bit_side(design, slope, speed), ends_of(design.string)
+    bit, ends = bit_side(design, slope, speed), ends_of(design.sliding_string)
     drive = design.linear_drive
     poles = (
-        loop_poles(design.string, *drive.gains(), slope)
+        loop_poles(design.sliding_string, *drive.gains(), slope)
         if design.simple_loop
         else model_poles(design, bit)
     )

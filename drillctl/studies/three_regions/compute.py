@@ -120,7 +120,7 @@ def slopes_tolerated(
     # comes late.
     lanes = group.lanes
     if group.design.simple_loop:
-        return slope_margins(ends_of(group.design.string), *gains_of(lanes))
+        return slope_margins(ends_of(group.design.sliding_string), *gains_of(lanes))
     slope, omega = np.full((2, len(lanes)), np.nan)
     for lane in np.flatnonzero(np.isfinite(speed)):
         cell = cell_design(design, axes, int(group.cells[lane]))

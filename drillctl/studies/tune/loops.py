@@ -269,7 +269,7 @@ def loops_of(designs: Iterable[Design], tuned: tuple[Tuned, ...]) -> list[Loop]:
     for design in designs:
         loop = _loop(middle(design, tuned), strings, tuned)
         side = None if loop.weight is None else (loop.weight.torque, loop.weight.path, loop.slope)
-        key = (design.string.parts, design.tables.controller.model_dump_json(), side)
+        key = (design.sliding_string.parts, design.tables.controller.model_dump_json(), side)
         if key not in results or results[key].slope < loop.slope:
             results[key] = loop
     return list(results.values())
@@ -283,9 +283,9 @@ def _loop(
     longest = max([t.high for t in tuned if t.path == WEIGHT_KEYS[1]], default=0.0)
     if side is not None:
         longest = max(longest, side.path.delay)
-    parts = design.string.parts
+    parts = design.sliding_string.parts
     if parts not in strings:
-        ends = ends_of(design.string)
+        ends = ends_of(design.sliding_string)
         apart = 2.0 * math.pi / (TURNS * longest) if longest > 0.0 else math.inf
         strings[parts] = (ends, grid_of(ends, apart), string_numbers(design.string))
     return Loop(design, *strings[parts], slope, side)
@@ -488,7 +488,7 @@ class Loops:
             return LoopState(loop, result, stable)
         variant = put(loop.design, self.tuned, values)
         if variant.simple_drive and loop.weight is None:
-            poles = loop_poles(variant.string, *variant.linear_drive.gains(), loop.slope)
+            poles = loop_poles(variant.sliding_string, *variant.linear_drive.gains(), loop.slope)
         else:
             poles = self._poles(loop, variant, loop.slope)
         asked, omega = self.asked, pole_grid(loop.ends, poles)
