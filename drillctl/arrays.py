@@ -16,3 +16,8 @@ Index = NDArray[np.int64]
 # Whatever the user of the library has set with `numpy.seterr`: the exponentials of friction laws
 # vanish far from rest, which is no fault.
 own_errstate = partial(np.errstate, divide="warn", over="warn", under="ignore", invalid="warn")
+
+
+def finite(value: float | None) -> float | None:
+    """A number as strict JSON has it: none where it is not finite."""
+    return None if value is None or not np.isfinite(value) else float(value)

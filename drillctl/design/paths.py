@@ -28,6 +28,11 @@ USUAL_NAMES = {
     "operating_point.weight_on_bit": "weight on bit",
 }  # fmt: skip
 """What the usual parameters are called in pictures and sentences; others keep their path."""
+SI_OF = {
+    "kp": "N*m*s/rad", "ki": "N*m/rad", "spring": "N*m/rad", "damper": "N*m*s/rad",
+    "mobility": "rad/(N*m*s)", "sensed_inertia": "kg*m^2", "corner": "1/s",
+}  # fmt: skip
+"""Units of the numbers that a drive has, where their paths have none."""
 _HIDDEN = (
     "title", "author", "source", "status", "notes", "schema_version", "map", "uncertain",
     "uncertainty",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array, ComplexArray, own_errstate
+from drillctl.arrays import Array, ComplexArray, finite, own_errstate
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import BitSide, bit_side, ends_of, weight_path
@@ -93,19 +93,19 @@ class LoopAnalysis(Result, kind="loop"):
             "stable": self.stable,
             "spectral_abscissa": self.spectral_abscissa,
             "slope": self.operating_point.slope,
-            "slope_margin": _finite(self.slope_margin),
-            "deciding_frequency_hz": _finite(self.deciding_frequency_hz),
+            "slope_margin": finite(self.slope_margin),
+            "deciding_frequency_hz": finite(self.deciding_frequency_hz),
             "disk_margin": None
             if result is None
-            else {"gain_db": _finite(result.gain_db), "phase_deg": result.phase_deg},
+            else {"gain_db": finite(result.gain_db), "phase_deg": result.phase_deg},
             "peak_sensitivity": None if result is None else result.peak_sensitivity,
-            "delay_margin": None if result is None else _finite(result.delay),
+            "delay_margin": None if result is None else finite(result.delay),
             "margins": None
             if result is None
-            else {name: _finite(value) for name, value in asdict(result).items()},
+            else {name: finite(value) for name, value in asdict(result).items()},
             "continuum_slope_margin": self.continuum_slope_margin,
-            "weight_delay_margin": _finite(self.weight_delay_margin),
-            "mesh_limited": {name: _finite(x) for name, x in self.mesh_limited.items()},
+            "weight_delay_margin": finite(self.weight_delay_margin),
+            "mesh_limited": {name: finite(x) for name, x in self.mesh_limited.items()},
             "critical_speed": self.critical_speed,
             "critical_weight_on_bit": self.critical_weight_on_bit,
             "operating_speed": self.operating_point.speed,
@@ -280,7 +280,3 @@ def _nearest_zero(function: Callable[[float], float], points: Array, about: floa
     zeros = [float(brentq(function, points[i], points[i + 1], rtol=1e-13)) for i in changes]
     zeros += [float(x) for x in points[values == 0.0]]
     return min(zeros, key=lambda x: abs(math.log(x / about)), default=None)
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None

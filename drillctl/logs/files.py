@@ -58,12 +58,13 @@ def open_source(path: Path) -> Source:
     return source
 
 
-def _needed(package: str) -> Any:
+def _needed(module: str) -> Any:
     from importlib import import_module
 
     try:
-        return import_module(package)
+        return import_module(module)
     except ImportError:
+        package = module.partition(".")[0]
         raise InputError(
             f"needs the package {package}: pip install 'drillctl[{EXTRAS[package]}]'"
         ) from None
@@ -183,8 +184,7 @@ def _csv_pieces(
 
 
 def _parquet(path: Path) -> Source:
-    parquet = _needed("pyarrow") and __import__("pyarrow.parquet", fromlist=["parquet"])
-    file = parquet.ParquetFile(path)
+    file = _needed("pyarrow.parquet").ParquetFile(path)
     heads = tuple(
         Head(field.name, (field.metadata or {}).get(b"unit", b"").decode())
         for field in file.schema_arrow

@@ -2,15 +2,15 @@
 
 Each window is a run of the inclusion driven by the wave that goes down. What is fitted are the
 numbers of a law and, where asked for, factors on the string; the bit speed at the beginning of
-each window is a number of its own, eliminated window by window. Errors follow from the scatter of
-windows: each is left out once, to first order (a jackknife), since what limits a fit, sampling at
-the edges of stick and slip, is neither white nor the same in every window.
+each window is a number of its own, eliminated window by window. Errors follow from scatter: each
+third of a window is left out once, to first order (a jackknife), since what limits a fit, sampling
+at the edges of stick and slip, is neither white nor the same everywhere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -19,15 +19,16 @@ from scipy.interpolate import CubicSpline
 from drillctl.arrays import Array
 from drillctl.logs.inclusion import RESTS, SLIPS, advance
 from drillctl.logs.laws import Curve, Family
-from drillctl.logs.waves import FINEST, Below, Factors, Track, below, split
+from drillctl.logs.waves import FINEST, PER_SWING, Below, Factors, Track, below, split, swing
 from drillctl.rig.drillstring import Parts
 
 FACTORS = ("travel_time", "impedance", "bit_inertia", "drive_inertia")
-HUBER = 2.0  # residual over its usual size from which a sample counts less
+ROBUST = 2.4  # residual over its usual size at which a sample counts half (Cauchy)
+PIECES = 3  # of a window that are left out one by one: a cycle or more each
 ROUNDS = 25  # of Gauss-Newton at most
 SMALL = 1e-6  # relative step of a difference
 SETTLED = 1e-6  # decrease of the objective, relative, that ends a fit
-AT_REST = 0.5  # speed (rad/s) of the bit at the beginning of a window that noise may be
+AT_REST = 0.05  # speed of the bit at the beginning of a window, over the mean, that noise may be
 FARTHEST = 0.5  # of its size that a number may go with a window left out, as all that tells it
 QUIET = 2.0  # variance over that of noise of a log that says nothing but a mean
 STICKING = 0.02  # share of a window at rest from which it has sticks
@@ -50,13 +51,16 @@ class Problem:
     parts: Parts
     windows: tuple[Window, ...]
     free: tuple[str, ...] = ()  # of `FACTORS`
-    held: Factors = field(default_factory=Factors)  # where they are not free
     downhole: bool = False  # whether the residual is that of the downhole speed
-    prior: bool = True  # whether what a log does not say is held near usual numbers
 
     def factors(self, values: Array) -> Factors:
         """Factors on the string."""
-        return replace(self.held, **dict(zip(self.free, map(float, values), strict=True)))
+        return Factors(**dict(zip(self.free, map(float, values), strict=True)))
+
+    @property
+    def alike(self) -> float:
+        """Neighbouring samples whose residuals are alike: over a second, less of a quick string."""
+        return max(1.0, min(1.0, 0.4 * swing(self.parts)) / self.windows[0].track.spacing)
 
 
 @lru_cache(maxsize=64)
@@ -77,16 +81,16 @@ class Driven:
     mean: int  # fine steps over which the log's samples are means
     lead: int  # samples that are run before the first that counts
     begin: float  # bit speed to begin with (rad/s), from the waves alone
+    slow: float  # one that noise may be
     speed: Array | None  # measured bit speed (rad/s), shape (samples,)
 
 
 def driven(problem: Problem, window: Window, factors: Factors) -> Driven:
     """Prepare a window for a string."""
     string, track = _below(problem.parts, factors), window.track
-    inertia = problem.parts.top_inertia * factors.drive_inertia
-    down, up = split(track, inertia, problem.parts.top_damping, string.impedance)
+    down, up = split(track, string)
     spacing = track.spacing
-    part = max(1, int(np.ceil(spacing / FINEST)))
+    part = max(1, int(np.ceil(spacing / min(FINEST, swing(problem.parts) / PER_SWING))))
     step = spacing / part
     spline = _spline(track, down)
     lead = 0 if string.delay else min(window.first, int(np.ceil(string.memory / spacing)))
@@ -105,7 +109,8 @@ def driven(problem: Problem, window: Window, factors: Factors) -> Driven:
         speed = CubicSpline(track.time, track.bit)(times - string.delay)
     return Driven(
         step, string, np.ascontiguousarray(drive), up[window.first : window.last],
-        drive[::part], part, part if track.mean > 1 else 1, lead, begin, speed,
+        drive[::part], part, part if track.mean > 1 else 1, lead, begin,
+        AT_REST * abs(float(track.speed.mean())), speed,
     )  # fmt: skip
 
 
@@ -129,7 +134,7 @@ def run(made: Driven, curve: Curve, scale: float, begin: float | None = None) ->
     count = len(made.drive)
     speed, other, torque = np.empty(count), np.empty(count), np.empty(count)
     start = made.begin if begin is None else begin
-    start = start if start > AT_REST else 0.0
+    start = start if start > made.slow else 0.0
     state = _state(made, start, scale * curve.static)
     advance(
         string.rates, string.drive, string.torque, string.bit, string.top, made.step, made.drive,
@@ -182,13 +187,12 @@ class Fit:
     objective: float
     size: float  # usual residual (N m)
     explained: float  # share of the returning wave's variance, but for the noise of the log
-    leave: Array  # numbers with each window left out, shape (windows, numbers)
+    leave: Array  # numbers with each piece of a window left out, shape (pieces, numbers)
     sticks: tuple[bool, ...]  # whether the bit rests in each window
     fastest: float  # speed of the bit (rad/s)
     slowest: float
     # covariance of the numbers of the law that is left where a log says nothing of them
     unsaid: Array
-    excess: float  # root mean square of what the fit misses beyond noise (N m)
     signal: float  # variance of the wave that comes up over that of the noise of the log
     problem: Problem = field(repr=False)
 
@@ -244,11 +248,8 @@ def fit(
     size = _size(parts)
     value = _objective(parts, size) + size**2 * _off(x, centre, weight)
     for _ in range(rounds):
-        slopes = [
-            _slopes(problem, family, made, x, y, parts, k, lows, highs) for k in range(len(windows))
-        ]
-        scale = np.concatenate((family.scale(x[: len(family.least)]), np.ones(len(problem.free))))
-        blocks = [_block(r, *s, size, scale) for r, s in zip(parts, slopes, strict=True)]
+        scale = _scale(problem, family, x)
+        blocks = _blocks(problem, family, made, x, y, parts, size, highs)
         normal = sum(b.normal for b in blocks) + np.diag(size**2 * weight * scale**2)
         gradient = sum(b.gradient for b in blocks) + size**2 * weight * scale * (x - centre)
         improved = False
@@ -274,14 +275,11 @@ def fit(
         value = _objective(parts, size) + size**2 * _off(x, centre, weight)
         if gain < SETTLED:
             break
-    slopes = [
-        _slopes(problem, family, made, x, y, parts, k, lows, highs) for k in range(len(windows))
-    ]
-    scale = np.concatenate((family.scale(x[: len(family.least)]), np.ones(len(problem.free))))
-    blocks = [_block(r, *s, size, scale) for r, s in zip(parts, slopes, strict=True)]
+    scale = _scale(problem, family, x)
+    blocks = _blocks(problem, family, made, x, y, parts, size, highs)
     held = np.diag(size**2 * weight * scale**2)
     leave = _jackknife(blocks, x, scale, lows, highs, held)
-    unsaid = _unsaid(blocks, held, scale, size, windows[0].track.spacing)
+    unsaid = _unsaid(blocks, held, scale, size, problem.alike)
     motions = [
         run(m, family.curve(x[: len(family.least)]), w.weight, b)
         for m, w, b in zip(made, windows, y, strict=True)
@@ -289,24 +287,22 @@ def fit(
     told = [m.up if m.speed is None else 2.0 * m.string.impedance * m.speed for m in made]
     variance = sum(float(((one - one.mean()) ** 2).sum()) for one in told)
     count = sum(len(r) for r in parts)
-    noise = count * float(
-        np.mean([_noise(problem, w, m) for w, m in zip(windows, made, strict=True)])
-    )
+    noise = count * float(np.mean([_noise(w, m) for w, m in zip(windows, made, strict=True)]))
     missed = max(sum(float((r**2).sum()) for r in parts) - noise, 0.0)
     explained = 1.0 - missed / max(variance - noise, noise, 1e-30)
     return Fit(
         family, x, y, value, size, explained, leave,
         tuple(m.time_at_rest > STICKING for m in motions),
         float(max(m.bit.max() for m in motions)), float(min(m.bit.min() for m in motions)),
-        unsaid, float(np.sqrt(missed / count)), variance / max(noise, 1e-30), problem,
+        unsaid, variance / max(noise, 1e-30), problem,
     )  # fmt: skip
 
 
-def _noise(problem: Problem, window: Window, made: Driven) -> float:
+def _noise(window: Window, made: Driven) -> float:
     """Variance that the noise of the log gives the difference of two waves (N2 m2)."""
     one = window.track
     torque, speed = (n**2 / one.mean for n in one.noise)
-    inertia, zeta = problem.parts.top_inertia, made.string.impedance
+    inertia, zeta = made.string.top_inertia, made.string.impedance
     # Of the derivative by five samples: 130/144 over the square of their spacing.
     return 2.0 * (torque + (zeta**2 + 0.9 * inertia**2 / one.spacing**2) * speed)
 
@@ -328,22 +324,38 @@ def _residuals(
 
 def _size(parts: Sequence[Array]) -> float:
     """Usual size of residuals."""
-    return max(float(np.median(np.abs(np.concatenate(parts)))) / 0.6745, 1e-6)
+    return max(float(np.median(np.abs(np.concatenate(parts)))) / 0.6745, 1e-9)
 
 
 def _objective(parts: Sequence[Array], size: float) -> float:
-    """Huber's, over all samples."""
-    u = np.abs(np.concatenate(parts)) / size
-    return float(np.where(u <= HUBER, 0.5 * u**2, HUBER * (u - 0.5 * HUBER)).sum()) * size**2
+    """Cauchy's, over all samples: a stick that noise ended early does not bend the law."""
+    u = np.concatenate(parts) / (ROBUST * size)
+    return 0.5 * ROBUST**2 * float(np.log1p(u**2).sum()) * size**2
+
+
+def _scale(problem: Problem, family: Family, x: Array) -> Array:
+    """Size of each number."""
+    return np.concatenate((family.scale(x[: len(family.least)]), np.ones(len(problem.free))))
+
+
+def _blocks(
+    problem: Problem, family: Family, made: list[Driven], x: Array, y: Array,
+    parts: list[Array], size: float, highs: Array,
+) -> list[_Block]:  # fmt: skip
+    """Normal equations of every window."""
+    scale = _scale(problem, family, x)
+    slopes = (
+        _slopes(problem, family, made, x, y, parts, k, scale, highs) for k in range(len(parts))
+    )
+    return [_block(r, *s, size, scale) for r, s in zip(parts, slopes, strict=True)]
 
 
 def _slopes(
     problem: Problem, family: Family, made: list[Driven], x: Array, y: Array,
-    parts: list[Array], k: int, lows: Array, highs: Array,
+    parts: list[Array], k: int, scale: Array, highs: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Residual of a window by each number, and by its own beginning."""
     n = len(family.least)
-    scale = np.concatenate((family.scale(x[:n]), np.ones(len(problem.free))))
     window, base = problem.windows[k], parts[k]
     columns = []
     for j in range(len(x)):
@@ -371,6 +383,7 @@ class _Block:
     own: float  # curvature by the beginning
     cross: Array
     pull: float
+    pieces: list[tuple[Array, Array]]  # of normal and gradient
 
     def begin(self, step: Array) -> float:
         """Change of the beginning that goes with a scaled step."""
@@ -378,15 +391,19 @@ class _Block:
 
 
 def _block(values: Array, slopes: Array, own: Array, size: float, scale: Array) -> _Block:
-    weights = np.minimum(1.0, HUBER * size / np.maximum(np.abs(values), 1e-300))
+    weights = 1.0 / (1.0 + (values / (ROBUST * size)) ** 2)
     matrix = slopes * scale
-    weighted = matrix * weights[:, None]
-    curve = max(float(weights @ own**2), 1e-6 * float(values @ values + 1.0))
-    cross = weighted.T @ own
+    curve = max(float(weights @ own**2), 1e-6 * float(values @ values) + 1e-30)
+    cross = matrix.T @ (weights * own)
     pull = float((weights * own) @ values)
-    normal = weighted.T @ matrix - np.outer(cross, cross) / curve
-    gradient = weighted.T @ values - cross * pull / curve
-    return _Block(normal, gradient, curve, cross, pull)
+    # Samples, what the beginning takes of them eliminated.
+    left, missed = matrix - np.outer(own, cross / curve), values - own * (pull / curve)
+    pieces = [
+        (left[k].T @ (weights[k, None] * left[k]), left[k].T @ (weights[k] * missed[k]))
+        for k in np.array_split(np.arange(len(values)), PIECES)
+    ]
+    normal, gradient = (sum(of) for of in zip(*pieces, strict=True))
+    return _Block(normal, gradient, curve, cross, pull, pieces)
 
 
 def _step(
@@ -417,19 +434,16 @@ def _prior(problem: Problem, family: Family, x: Array) -> tuple[Array, Array]:
     """Usual numbers, and one over the variance they have; zero where there is no such thing."""
     usual, spread = family.usual(x[: len(family.least)])
     none = np.zeros(len(problem.free))
-    weight = np.concatenate((1.0 / spread**2, none)) * problem.prior
-    return np.concatenate((usual, none)), weight
+    return np.concatenate((usual, none)), np.concatenate((1.0 / spread**2, none))
 
 
 def _off(x: Array, centre: Array, weight: Array) -> float:
     return 0.5 * float(weight @ (x - centre) ** 2)
 
 
-def _unsaid(blocks: list[_Block], held: Array, scale: Array, size: float, spacing: float) -> Array:
+def _unsaid(blocks: list[_Block], held: Array, scale: Array, size: float, alike: float) -> Array:
     """Covariance that usual numbers leave, where a log says nothing: small elsewhere."""
-    # Neighbouring residuals are alike over about a second.
-    count = max(1.0, 1.0 / spacing)
-    said = sum(b.normal for b in blocks) / count + held
+    said = sum(b.normal for b in blocks) / alike + held
     ridge = 1e-12 * max(float(np.trace(said)), 1e-30) * np.eye(len(said))
     inverse = np.linalg.inv(said + ridge)
     return np.asarray(size**2 * inverse @ held @ inverse * np.outer(scale, scale))
@@ -438,17 +452,17 @@ def _unsaid(blocks: list[_Block], held: Array, scale: Array, size: float, spacin
 def _jackknife(
     blocks: list[_Block], x: Array, scale: Array, lows: Array, highs: Array, held: Array
 ) -> Array:
-    """Numbers with each window left out, to first order."""
+    """Numbers with each piece of a window left out, to first order."""
     normal = sum(b.normal for b in blocks) + held
     # What is at its bound stays there.
     free = (x > lows + 1e-9 * scale) & (x < highs - 1e-9 * scale)
     rows = []
-    for one in blocks:
+    for out, gradient in (piece for one in blocks for piece in one.pieces):
         step = np.zeros(len(x))
-        if len(blocks) > 1 and free.any():
-            left = (normal - one.normal)[np.ix_(free, free)]
+        if free.any():
+            left = (normal - out)[np.ix_(free, free)]
             ridge = 1e-9 * max(float(np.trace(normal)), 1e-30) * np.eye(len(left))
-            step[free] = np.linalg.solve(left + ridge, one.gradient[free])
+            step[free] = np.linalg.solve(left + ridge, gradient[free])
             step = np.clip(step, -FARTHEST, FARTHEST)
         rows.append(np.clip(x + step * scale, lows, highs))
     return np.array(rows)

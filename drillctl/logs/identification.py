@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtri, stdtrit
 
 from drillctl.arrays import Array
 from drillctl.errors import InputError
 from drillctl.logs.fit import Fit, Problem, Window, driven, fit, residual
-from drillctl.logs.laws import (
-    EXPONENTIAL_LAW,
-    LEAST_DECAY,
-    MOST_DECAY,
-    Family,
-)
+from drillctl.logs.laws import LEAST_DECAY, MOST_DECAY, Family
 from drillctl.logs.record import Log
-from drillctl.logs.waves import below, split, track
+from drillctl.logs.waves import Portrait, at_the_bit, below, track, used_rate
 from drillctl.logs.windows import tonal_share
 from drillctl.rig.drillstring import Parts
 
 CYCLES = 3  # of a window at least
 LEAST_SAMPLES = 30  # a period of the string
-SHORTEST = 20.0  # of a window (s)
+SHORTEST = 20.0  # of a window (s), or
+SHORT_CYCLES = 8  # of a quick string
 LONGEST = 90.0
 LEAST_SPEED = 0.5  # mean speed (rad/s) of a window: turning
 STILL, MOMENT = 0.05, 3.0  # speed (rad/s) and time (s) of a top that stands still
@@ -52,9 +48,10 @@ def tracks_of(
     more than `most` those that swing most at one frequency.
     """
     lag = below(parts).memory + 4.0 * log.spacing
-    places = _runs(log)
+    shortest = min(SHORTEST, SHORT_CYCLES * period)
+    places = runs_of(log, 0.5 * shortest)
     cycle = _cycle(log, places, period)
-    own = length or min(max(CYCLES * cycle, CYCLES * period, SHORTEST), max(LONGEST, 3.2 * period))
+    own = length or min(max(CYCLES * cycle, CYCLES * period, shortest), max(LONGEST, 3.2 * period))
     found: list[tuple[float, float, float, slice]] = []  # tonal share, begin, end, run
     for part in places:
         time = log.time[part]
@@ -76,15 +73,16 @@ def tracks_of(
             found.append((share, begin, end, part))
     chosen = sorted(found, key=lambda one: -one[0])[:most]
     chosen = sorted(chosen, key=lambda one: one[1])
-    return [_window(log, begin, end, lag, lags, part) for _, begin, end, part in chosen], own
+    rate = used_rate(period)
+    return [_window(log, begin, end, lag, lags, part, rate) for _, begin, end, part in chosen], own
 
 
 def _float(log: Log, name: str, rows: slice) -> Array:
     return np.asarray(log.signals[name][rows], float)
 
 
-def _runs(log: Log) -> list[slice]:
-    """Runs of rows without gaps and faults where the string turns on the mean under torque."""
+def runs_of(log: Log, least: float) -> list[slice]:
+    """Runs of rows, `least` (s) long, without gaps and faults where the string turns."""
     torque, speed = log.signals["top_torque"], log.signals["top_speed"]
     good = log.usable & np.isfinite(torque) & np.isfinite(speed)
     # A soft drive is stopped by the bit for a moment; what lasts is no drilling.
@@ -100,7 +98,7 @@ def _runs(log: Log) -> list[slice]:
         edges = np.flatnonzero(np.diff(np.concatenate(([0], inside.view(np.int8), [0]))))
         for a, b in edges.reshape(-1, 2):
             rows = slice(stretch.start + int(a), stretch.start + int(b))
-            if (b - a) * log.spacing > 0.5 * SHORTEST and (
+            if (b - a) * log.spacing > least and (
                 np.mean(log.signals["top_speed"][rows]) > LEAST_SPEED
             ):
                 results.append(rows)
@@ -120,8 +118,9 @@ def _cycle(log: Log, places: Sequence[slice], period: float) -> float:
 
 
 def _window(
-    log: Log, begin: float, end: float, lag: float, lags: tuple[float, float], part: slice
-) -> Window:
+    log: Log, begin: float, end: float, lag: float, lags: tuple[float, float], part: slice,
+    rate: float,
+) -> Window:  # fmt: skip
     """The track of a window with what goes before it."""
     first, last = np.searchsorted(log.time, (begin - lag, end + 3.0 * log.spacing))
     rows = slice(max(int(first) - 1, 0), int(last) + 1)
@@ -136,7 +135,7 @@ def _window(
         else _float(log, name, rows)
         for name, late in zip(("top_torque", "top_speed"), lags, strict=True)
     )
-    made = track(log.time[rows], torque, speed, *held)
+    made = track(log.time[rows], torque, speed, rate, *held)
     place = np.searchsorted(made.time, (begin, end))
     last_sample = min(int(place[1]), len(made.time) - 3)
     return Window(made, int(place[0]), last_sample, 1.0)
@@ -166,32 +165,11 @@ def weighted(windows: Sequence[Window]) -> tuple[tuple[Window, ...], float | Non
     return tuple(replace(w, weight=m / mean) for w, m in zip(windows, means, strict=True)), mean
 
 
-class Portrait(NamedTuple):
-    """Speed and torque at the bit from the waves alone, no law assumed."""
-
-    speed: Array  # (rad/s)
-    torque: Array  # (N m)
-
-
 def portrait(problem: Problem) -> Portrait:
-    """Bit speed and torque without a law, of a uniform string; of others as the fit has them."""
-    speeds, torques = [], []
-    for window in problem.windows:
-        made = driven(problem, window, problem.held)
-        z = 2.0 * made.string.impedance
-        if not made.string.delay:
-            continue
-        one = window.track
-        down, up = split(one, problem.parts.top_inertia, problem.parts.top_damping, 0.5 * z)
-        delay = 2.0 * made.string.delay
-        times = one.time[window.first : window.last]
-        going = np.interp(times - delay, one.time, down)
-        speed = (going - up[window.first : window.last]) / z
-        body = 1.0 / float(made.string.torque[0].real)
-        rise = np.gradient(speed, one.spacing)
-        speeds.append(speed)
-        torques.append(going - 0.5 * z * speed - body * rise)
-    return Portrait(*(np.concatenate(x) if x else np.zeros(0) for x in (speeds, torques)))
+    """Bit speed and torque from the waves alone, in all windows."""
+    string = below(problem.parts)
+    found = [at_the_bit(problem.parts, string, window.track) for window in problem.windows]
+    return Portrait(*(np.concatenate(x) for x in zip(*found, strict=True)))
 
 
 def rough(problem: Problem) -> tuple[float, float]:
@@ -212,23 +190,27 @@ def best_fit(problem: Problem, family: Family, like: Fit | None = None) -> Fit:
         return fit(problem, family, np.concatenate((begin, like.x[like.numbers :])), like.begins)
     static, sliding = rough(problem)
     few = replace(problem, windows=problem.windows[:: max(1, len(problem.windows) // 3)][:3])
-    trials = [
-        fit(few, family, np.concatenate((family.start(s * static, sliding, d), extra)), rounds=8)
-        for d in ((0.05, 0.2) if family is EXPONENTIAL_LAW else (0.1,))
+    begins = [
+        np.concatenate((family.start(s * static, sliding, d * family.decay), extra))
+        for d in ((0.5, 2.0) if family.name == "navarro-lopez-suarez" else (1.0,))
         for s in (1.0, 1.6)
     ]
+    trials = [fit(few, family, begin, rounds=8) for begin in begins]
     return fit(problem, family, min(trials, key=lambda one: one.objective).x)
 
 
 def interval(values: Array, leave: Array, level: float) -> tuple[Array, int]:
     """Half widths of a band from values with each window left out, and windows that bear on it."""
-    from scipy import stats
-
     n = len(leave)
     if n < 2:
         return np.full(np.shape(values), np.nan), n
     variance = (n - 1) / n * ((leave - leave.mean(axis=0)) ** 2).sum(axis=0)
-    return float(stats.t.ppf(0.5 + 0.5 * level, n - 1)) * np.sqrt(variance), n
+    return stdtrit(n - 1, 0.5 + 0.5 * level) * np.sqrt(variance), n
+
+
+def normal(level: float) -> float:
+    """Half width of a band of a normal distribution, over its standard deviation."""
+    return float(ndtri(0.5 + 0.5 * level))
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,14 +238,14 @@ def band_of(one: Fit, level: float, floor: float) -> Band:
         for j, step in enumerate(steps)
     ])  # fmt: skip
     left = np.einsum("jw,jk,kw->w", slopes, one.unsaid[:n, :n], slopes)
-    half = np.hypot(half, 1.645 * np.sqrt(np.maximum(left, 0.0)))
+    half = np.hypot(half, normal(level) * np.sqrt(np.maximum(left, 0.0)))
     # One window has no scatter: ten floors, and it is said.
     half = 10.0 * floor * torque if windows < 2 else half
     half = np.hypot(half, floor * torque)
     return Band(speed, torque, torque - half, torque + half)
 
 
-def draws_of(one: Fit, count: int, seed: int, floor: float) -> Array:
+def draws_of(one: Fit, count: int, seed: int, level: float, floor: float) -> Array:
     """Joint draws of the numbers of a law: Student's t of the scatter between windows."""
     n, numbers = len(one.leave), one.numbers
     random = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, numbers])))
@@ -283,7 +265,7 @@ def draws_of(one: Fit, count: int, seed: int, floor: float) -> Array:
         stretch = min(np.sqrt(degrees / random.chisquare(degrees)), 3.0)
         trial = x + stretch * root @ random.standard_normal(numbers)
         trial += loose @ random.standard_normal(numbers)
-        common = 1.0 + floor / 1.645 * random.standard_normal()
+        common = 1.0 + floor / normal(level) * random.standard_normal()
         torques = slice(0, 2) if one.family.name == "navarro-lopez-suarez" else slice(0, numbers)
         trial[torques] *= common
         if spread:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,8 @@ LEAST_DECAY, MOST_DECAY = 1e-4, 30.0  # (s/rad)
 USUAL_DECAY = 0.1  # (s/rad), where a log says nothing
 SPEEDS = (0.0, 1.0, 3.0, 6.0, 11.0, 18.0, 28.0, 42.0)
 """Of tabulated points (rad/s), those that a log reaches."""
+SLOW = 6.0  # fastest speed (rad/s) of a rig whose points and decay are nearer to rest
+LEAST = 1e-9  # torque (N m) that is none
 NONE = np.zeros(2)
 
 
@@ -40,6 +42,7 @@ class Family:
 
     name: str  # of the law in a design
     knots: tuple[float, ...] = ()  # of tabulated points
+    decay: float = USUAL_DECAY  # (s/rad)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -65,7 +68,7 @@ class Family:
             result[2] = np.log(MOST_DECAY)
         return result
 
-    def start(self, static: float, sliding: float, decay: float = USUAL_DECAY) -> Array:
+    def start(self, static: float, sliding: float, decay: float) -> Array:
         """Numbers to begin with: torques at rest and at high speed (N m)."""
         drop = max(static - sliding, 0.02 * static)
         if self.name == "navarro-lopez-suarez":
@@ -77,23 +80,23 @@ class Family:
 
     def usual(self, x: Array) -> tuple[Array, Array]:
         """What numbers are where a log does not say, and how far from it they may be."""
-        size = max(float(np.sum(np.abs(x[:2]))), 1.0)
+        size = max(float(np.sum(np.abs(x[:2]))), LEAST)
         if self.name == "navarro-lopez-suarez":
             # Torque at rest 1.2 to 3 times that at high speed, lost over 3 to 30 rad/s.
-            return np.array([0.0, 0.5 * size, np.log(USUAL_DECAY)]), np.array([1e9, size, 1.0])
+            return np.array([0.0, 0.5 * size, np.log(self.decay)]), np.array([1e9, size, 1.0])
         if self.name == "jansen-van-den-steen":
             return np.array([0.0, 0.3 * size]), np.array([1e9, size])
-        size = max(float(np.sum(np.abs(x))), 1.0)
+        size = max(float(np.sum(np.abs(x))), LEAST)
         spread = np.full(len(x), 0.3 * size)
         spread[-1] = 1e9
         return np.zeros(len(x)), spread
 
     def scale(self, x: Array) -> Array:
         """Size of each number, for differences."""
-        size = max(float(np.sum(np.abs(x[:2]))), 1.0)
+        size = max(float(np.sum(np.abs(x[:2]))), LEAST)
         if self.name == "navarro-lopez-suarez":
             return np.array([size, size, 1.0])
-        return np.full(len(x), max(float(np.sum(np.abs(x))), 1.0))
+        return np.full(len(x), max(float(np.sum(np.abs(x))), LEAST))
 
     def curve(self, x: Array) -> Curve:
         """The law with these numbers: sliding torque, drop and log decay; or drops and the last."""
@@ -116,10 +119,18 @@ class Family:
 
 
 EXPONENTIAL_LAW = Family("navarro-lopez-suarez")
+
+
+def exponential_law(speed: float) -> Family:
+    """Of a mean top speed (rad/s): the slower, the sooner the torque falls."""
+    return replace(EXPONENTIAL_LAW, decay=USUAL_DECAY * max(1.0, SLOW / max(speed, 1e-3)))
+
+
 PEAK_LAW = Family("jansen-van-den-steen")
 
 
 def points_law(fastest: float) -> Family:
     """Tabulated points up to the fastest speed (rad/s) of a log."""
-    inside = [w for w in SPEEDS if w < 0.9 * fastest]
-    return Family("tabulated", (*inside, float(f"{max(fastest, inside[-1] + 1.0):.3g}")))
+    scale = 1.0 if fastest > SLOW else fastest / 20.0
+    inside = [w * scale for w in SPEEDS if w * scale < 0.9 * fastest]
+    return Family("tabulated", (*inside, float(f"{max(fastest, inside[-1] + scale):.3g}")))

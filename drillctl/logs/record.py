@@ -59,7 +59,6 @@ class Log:
     # first row of each stretch without a gap, and the end of the last, shape (stretches + 1,)
     bounds: Index
     faults: tuple[Fault, ...] = ()
-    begins: str = ""  # date and time of the first row, where the file has them
     usable: Any = field(default=None)  # rows where the torque may be believed, shape (rows,)
 
     @property
@@ -174,7 +173,6 @@ def _cleaned(file: str, order: list[Chosen], columns: dict[str, Any]) -> Log:
     for name, count in columns.pop("unread").items():
         faults.append(Fault(f"{count} cells of {QUANTITIES[name].label} are no numbers", count))
     time = columns.pop("time")
-    begins = _date(time) if order[0].unit == "date" else ""
     time, columns = _in_order(time, columns, faults, file)
     spacing = float(np.median(np.diff(time[: min(len(time), 200_000)])))
     if not spacing > 0.0:
@@ -194,12 +192,7 @@ def _cleaned(file: str, order: list[Chosen], columns: dict[str, Any]) -> Log:
     turning = np.abs(columns["top_speed"]) > TURNING
     for name, values in columns.items():
         _mend(name, values, time, turning, usable, spacing, faults)
-    return Log(file, tuple(order), time, columns, spacing, bounds, tuple(faults), begins, usable)
-
-
-def _date(time: Array) -> str:
-    first = time[np.isfinite(time)][:1]
-    return str(np.datetime64(round(float(first[0]) * 1e3), "ms")) if len(first) else ""
+    return Log(file, tuple(order), time, columns, spacing, bounds, tuple(faults), usable)
 
 
 def _in_order(

@@ -7,26 +7,31 @@ the controller nor a model of the drive but its inertia is needed.
 
 A uniform undamped string is a delay each way and the body of the bit. Any other is finite elements
 with a matched damper at the top, whose mean of consistent and lumped mass has dispersion of fourth
-order only.
+order only. Where the uppermost part is a spring without inertia, the drive belongs to the string
+that is computed, and Z is any number: that of the spring and the bodies below it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
 from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
+from scipy.signal.windows import tukey
 
 from drillctl.arrays import Array, ComplexArray
 from drillctl.rig.drillstring import Parts
 
 FINEST = 0.025  # step of the bit (s) at most: the falling friction stays on one branch
+PER_SWING = 100  # of them in the period of a quick string at least
 USED_RATE = 20.0  # (Hz) what is faster and noisy is averaged to this first
+USED_SAMPLES = 50  # a period at least, where that is more
 CLEAN = 2e-5  # noise over swing below which nothing is averaged
 SMOOTH = (5, 3)  # samples and order of the derivative of a noisy speed
-FASTEST = 4.0  # (Hz) up to which a mesh is fine enough
+FASTEST = 4.0  # (Hz) up to which a mesh is fine enough, or ten times the string's own
 PER_WAVE = 8  # elements in its wave length there
 
 
@@ -45,6 +50,9 @@ class Below:
     """The string under a matched pipe as exponentials; see `inclusion`."""
 
     impedance: float  # of the uppermost pipe (N m s/rad)
+    # of the drive, above the string (kg m2, N m s/rad); zero where they are part of it
+    top_inertia: float
+    top_damping: float
     delay: float  # one way, if it is a delay and a body, else 0 (s)
     rates: ComplexArray  # shape (states,), as the following
     drive: ComplexArray  # of the wave that goes down
@@ -73,9 +81,22 @@ def travel_time(parts: Parts) -> float:
     return float(sum((s.inertia / s.stiffness) ** 0.5 for s in parts.sections))
 
 
+def stiffness(parts: Parts) -> float:
+    """Stiffness of the whole string (N m/rad)."""
+    return 1.0 / sum(1.0 / s.stiffness for s in parts.sections)
+
+
+def swing(parts: Parts) -> float:
+    """Period (s) of the string held at its top, about."""
+    bodies = parts.bit_inertia + sum(s.inertia / 3.0 + s.end_inertia for s in parts.sections)
+    return float(2.0 * np.pi * (bodies / stiffness(parts)) ** 0.5)
+
+
 def impedance(parts: Parts) -> float:
-    """Impedance of the uppermost pipe (N m s/rad)."""
-    return float((parts.sections[0].inertia * parts.sections[0].stiffness) ** 0.5)
+    """Impedance of the uppermost pipe (N m s/rad), or one of the size of a lumped string's."""
+    first = parts.sections[0]
+    lumped = stiffness(parts) * swing(parts) / (2.0 * np.pi)
+    return float((first.inertia * first.stiffness) ** 0.5) or lumped
 
 
 def below(parts: Parts, factors: Factors = Factors()) -> Below:
@@ -89,13 +110,16 @@ def below(parts: Parts, factors: Factors = Factors()) -> Below:
         for one in parts.sections
     )
     body = parts.bit_inertia * factors.bit_inertia
-    made = replace(parts, sections=sections, bit_inertia=body)
+    drive = parts.top_inertia * factors.drive_inertia
+    made = replace(parts, sections=sections, bit_inertia=body, top_inertia=drive)
     zeta = impedance(made)
     if is_uniform(made):
         body += sections[0].end_inertia
         one: ComplexArray = np.ones(1, complex)
         into: ComplexArray = np.full(1, 1.0 / body, complex)
-        return Below(zeta, travel_time(made), -zeta * into, into, into, one, one)
+        return Below(
+            zeta, drive, parts.top_damping, travel_time(made), -zeta * into, into, into, one, one
+        )
     return _elements(made, zeta)
 
 
@@ -106,7 +130,8 @@ def _elements(parts: Parts, zeta: float) -> Below:
     mass: list[tuple[float, float, float]] = []  # of an element, its drag, and a body below it
     for one in parts.sections:
         time = (one.inertia / one.stiffness) ** 0.5
-        count = max(int(np.ceil(time * FASTEST * PER_WAVE)), 1) if one.inertia else 1
+        fastest = max(FASTEST, 10.0 / swing(parts))
+        count = max(int(np.ceil(time * fastest * PER_WAVE)), 1) if one.inertia else 1
         for number in range(count):
             springs.append(one.stiffness * count)
             dampers.append(
@@ -131,6 +156,13 @@ def _elements(parts: Parts, zeta: float) -> Below:
         m[j + 1, j + 1] += body
     m[-1, -1] += parts.bit_inertia
     c[-1, -1] += parts.bit_damping
+    outside = (parts.top_inertia, parts.top_damping)
+    if parts.modal_damping:
+        c += _modal(m, k, parts)
+    if not parts.sections[0].inertia:  # a node needs a mass
+        m[0, 0] += outside[0]
+        c[0, 0] += outside[1]
+        outside = (0.0, 0.0)
     c[0, 0] += zeta
     # Twist of the elements and speed of the nodes: no state for the angle of the whole.
     twist = np.eye(n)[:-1] - np.eye(n)[1:]
@@ -146,9 +178,19 @@ def _elements(parts: Parts, zeta: float) -> Below:
     keep = rates.imag >= 0.0  # of a pair one, twice its real part
     twice = np.where(rates.imag > 0.0, 2.0, 1.0)[keep]
     return Below(
-        zeta, 0.0, rates[keep], gains[keep, 0], gains[keep, 1],
+        zeta, *outside, 0.0, rates[keep], gains[keep, 0], gains[keep, 1],
         twice * shapes[-1, keep], twice * shapes[n - 1, keep],
     )  # fmt: skip
+
+
+def _modal(m: Array, k: Array, parts: Parts) -> Array:
+    """Damping of one ratio in every mode of the free string with its drive."""
+    whole = m.copy()
+    whole[0, 0] += parts.top_inertia
+    squares, shapes = scipy.linalg.eigh(k, whole)
+    rates = 2.0 * parts.modal_damping * np.sqrt(np.maximum(squares, 0.0))
+    into = whole @ shapes
+    return np.asarray((into * rates) @ into.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,9 +218,15 @@ def noise_of(values: Array) -> float:
     return float(np.median(np.abs(fourth)) / 0.6745 / np.sqrt(70.0)) if len(fourth) else 0.0
 
 
+def used_rate(period: float) -> float:
+    """Samples a second (Hz) that are enough for a string."""
+    return max(USED_RATE, USED_SAMPLES / period)
+
+
 def track(
-    time: Array, torque: Array, speed: Array, weight: Array | None = None, bit: Array | None = None
-) -> Track:
+    time: Array, torque: Array, speed: Array, rate: float = USED_RATE,
+    weight: Array | None = None, bit: Array | None = None,
+) -> Track:  # fmt: skip
     """Even samples of a stretch, averaged where they are fast and noisy."""
     spacing = float(np.median(np.diff(time)))
     even = time[0] + spacing * np.arange(round((time[-1] - time[0]) / spacing) + 1)
@@ -190,7 +238,7 @@ def track(
     noise = noise_of(columns["torque"]), noise_of(columns["speed"])
     swings = [float(np.ptp(np.percentile(columns[k], (2, 98)))) for k in ("torque", "speed")]
     clean = all(n <= CLEAN * max(s, 1e-9) for n, s in zip(noise, swings, strict=True))
-    mean = 1 if clean else max(1, round(1.0 / (spacing * USED_RATE)))
+    mean = 1 if clean else max(1, round(1.0 / (spacing * rate)))
     if mean > 1:
         count = len(even) // mean
         even = even[: count * mean].reshape(count, mean).mean(axis=1)
@@ -209,7 +257,54 @@ def track(
     )  # fmt: skip
 
 
-def split(one: Track, inertia: float, damping: float, zeta: float) -> tuple[Array, Array]:
-    """The waves that go down and come up (N m), of a drive with an inertia and a damper."""
-    torque = one.torque - inertia * one.rise - damping * one.speed
-    return torque + zeta * one.speed, torque - zeta * one.speed
+def split(one: Track, string: Below) -> tuple[Array, Array]:
+    """The waves that go down and come up (N m)."""
+    torque = one.torque - string.top_inertia * one.rise - string.top_damping * one.speed
+    return torque + string.impedance * one.speed, torque - string.impedance * one.speed
+
+
+class Portrait(NamedTuple):
+    """What the waves alone say of the bit, no law assumed."""
+
+    time: Array  # (s)
+    speed: Array  # (rad/s)
+    torque: Array  # of the rock (N m)
+
+
+def at_the_bit(parts: Parts, string: Below, one: Track) -> Portrait:
+    """Speed and torque at the bit: the string is inverted, line by line of the spectrum.
+
+    Ends, where the string remembers what was before or answers later, are left out, and so is what
+    is faster than noise allows.
+    """
+    down, up = split(one, string)
+    z, time = 2.0 * string.impedance, one.time
+    if string.delay:
+        time = time[time >= time[0] + 2.0 * string.delay]
+        down, up = np.interp(time - 2.0 * string.delay, one.time, down), up[-len(time) :]
+    seen = (down - up) / z
+    count, edge = len(time), int(min(string.memory / one.spacing, 0.2 * len(time)))
+    frequency = np.fft.rfftfreq(count, one.spacing)
+
+    def answer(to: ComplexArray, output: ComplexArray) -> ComplexArray:
+        s, each = 2j * np.pi * frequency[:, None], 0.5 * output * to
+        pairs = each / (s - string.rates) + each.conj() / (s - string.rates.conj())
+        return np.asarray(pairs.sum(axis=1))
+
+    shown = string.bit if string.delay else string.top
+    weights = tukey(count, 2.0 * edge / count)
+    lines = []
+    for values in (down, seen):
+        level = values.mean()
+        line = np.fft.rfft((values - level) * weights)
+        line[0] += level * count
+        lines.append(line)
+    quick = (20.0 if parts.sections[0].inertia else 4.0) / swing(parts)
+    kept = np.exp(-0.5 * (frequency / min(quick, 0.4 / one.spacing)) ** 2)
+    kept[kept < 1e-6] = 0.0
+    torque = answer(string.drive, shown) * lines[0] - lines[1]
+    torque *= np.where(kept > 0.0, kept / answer(string.torque, shown), 0.0)
+    speed = kept * answer(string.drive, string.bit) * lines[0]
+    speed -= answer(string.torque, string.bit) * torque
+    inside = slice(edge, count - edge)
+    return Portrait(time[inside], *(np.fft.irfft(x, count)[inside] for x in (speed, torque)))

@@ -11,13 +11,11 @@ from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.arrays import Array
-from drillctl.design.paths import USUAL_NAMES
+from drillctl.design.paths import SI_OF, USUAL_NAMES
 from drillctl.plots import style
 
 if TYPE_CHECKING:
     from drillctl.studies.schedule.compute import Schedule
-
-SI_OF = {"kp": "N*m*s/rad", "ki": "N*m/rad", "spring": "N*m/rad", "damper": "N*m*s/rad"}
 
 
 @style.picture(ax="Six panels.")

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array
+from drillctl.arrays import Array, finite
 from drillctl.design import Design, parts
 from drillctl.errors import InputError
 from drillctl.linear import modes
 from drillctl.logs import identification as ident
 from drillctl.logs.fit import FACTORS, Fit, Problem, driven, fit, run
-from drillctl.logs.laws import EXPONENTIAL_LAW, PEAK_LAW, points_law
+from drillctl.logs.laws import PEAK_LAW, exponential_law, points_law
 from drillctl.logs.waves import below, impedance, is_uniform, travel_time
 from drillctl.progress import SILENT, Progress
 from drillctl.store.codec import label
@@ -129,7 +129,7 @@ class Identification(Result, kind="identify"):
         return {
             "law": self.law,
             "values": dict(zip(one.names, one.values.tolist(), strict=True)),
-            "half_widths": dict(zip(one.names, map(_json, one.half), strict=True)),
+            "half_widths": dict(zip(one.names, map(finite, one.half), strict=True)),
             "weight": self.weight,
             "weight_known": self.weight_known,
             "curve": {
@@ -141,21 +141,17 @@ class Identification(Result, kind="identify"):
                 n.name: n.log if n.fitted else n.design for n in self.numbers
             },
             "checked": {
-                n.name: {"design": n.design, "log": _json(n.log), "half_width": _json(n.half)}
+                n.name: {"design": n.design, "log": finite(n.log), "half_width": finite(n.half)}
                 for n in self.numbers
             },
             "identifiable": dict(self.identifiable),
-            "hold_out": {fit.name: _json(fit.hold_out) for fit in self.fits},
+            "hold_out": {fit.name: finite(fit.hold_out) for fit in self.fits},
             "findings": list(self.findings),
             "windows": [
                 {"begin": float(a), "end": float(b), "sticks": bool(s)}
                 for a, b, s in zip(self.begin, self.end, self.sticks, strict=True)
             ],
         }  # fmt: skip
-
-
-def _json(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def identify(
@@ -202,7 +198,8 @@ def identify(
     held, weight = ident.weighted(windows)
     problem = Problem(line, held, settings.free)
     progress.begin("fitting laws", 7)
-    fits = [ident.best_fit(problem, EXPONENTIAL_LAW)]
+    turning = float(np.mean([w.track.speed.mean() for w in held]))
+    fits = [ident.best_fit(problem, exponential_law(turning))]
     progress.advance(1)
     fits.append(ident.best_fit(problem, PEAK_LAW))
     progress.advance(1)
@@ -238,7 +235,7 @@ def identify(
             f"driven by the downhole speed the curve differs from that by the surface alone by at "
             f"most {below_surface:.1%}"
         )
-    x = ident.draws_of(chosen, settings.draws, settings.seed, settings.floor)
+    x = ident.draws_of(chosen, settings.draws, settings.seed, settings.confidence, settings.floor)
     draws = np.array([chosen.family.coefficients(row, at) for row in x])
     seen = ident.portrait(problem)
     every = slice(None, None, max(1, len(seen.speed) // DRAWN_POINTS))
@@ -356,7 +353,7 @@ def _described(one: Fit, weight: float, score: float, level: float, floor: float
     leave = np.array([one.family.coefficients(x[:n], weight) for x in one.leave])
     half, _ = ident.interval(values, leave, level)
     loose = np.sqrt(np.maximum(np.diag(_carried(one, weight)), 0.0))
-    half = np.hypot(np.nan_to_num(np.asarray(half), nan=0.0), 1.645 * loose)
+    half = np.hypot(np.nan_to_num(np.asarray(half), nan=0.0), ident.normal(level) * loose)
     half = np.hypot(half, floor * np.abs(values))
     return FittedLaw(
         one.family.name, one.family.names, values, half, score, one.explained, one.size,
@@ -393,10 +390,9 @@ def _leading(fits: list[Fit]) -> Fit:
 
 
 def _misfits(fits: list[Fit]) -> Array:
-    """Misfits in units of the usual residual, neighbouring ones alike over about a second."""
+    """Misfits in units of the usual residual, neighbouring ones alike."""
     size = min(one.size for one in fits)
-    alike = max(1.0, 1.0 / fits[0].problem.windows[0].track.spacing)
-    return np.array([2.0 * one.objective / size**2 / alike for one in fits])
+    return np.array([2.0 * one.objective / size**2 / one.problem.alike for one in fits])
 
 
 def _not_told_apart(described: list[FittedLaw], fits: list[Fit]) -> list[FittedLaw]:
@@ -413,16 +409,20 @@ def _not_told_apart(described: list[FittedLaw], fits: list[Fit]) -> list[FittedL
 
 
 def _best(described: list[FittedLaw], fits: list[Fit]) -> str:
-    """The first law that predicts the next windows, and fits all, nearly as well as the best.
+    """Of the laws that predict the next windows nearly as well as the best, the one to write.
 
-    Akaike's price of a number is two.
+    Where the bit sticks the likeliest, at Schwarz's price of a number; where it does not, laws of
+    one slope at the mean speed are all alike, and the first of them leaves its decay open.
     """
+    count = sum(w.last - w.first for w in fits[0].problem.windows) / fits[0].problem.alike
+    price = np.log(max(count, 2.0)) * np.array([one.numbers for one in fits])
+    misfit = _misfits(fits) + price
     scores = np.array([one.hold_out for one in described])
-    misfit = _misfits(fits) + np.array([2.0 * f.numbers for f in fits])
     near = misfit <= misfit.min() + CLEARLY
-    if np.isfinite(scores).all():
+    if np.isfinite(scores).all() and (near & (scores <= NEARLY * scores.min())).any():
         near &= scores <= NEARLY * scores.min()
-    return described[int(np.argmax(near)) if near.any() else int(np.argmin(misfit))].name
+    best = np.argmin(np.where(near, misfit, np.inf)) if any(fits[0].sticks) else np.argmax(near)
+    return described[int(best)].name
 
 
 def _findings(
@@ -457,7 +457,7 @@ def _findings(
             "flat, and how it decays (beta) is not identified; Coulomb's law or tabulated points "
             "say all there is"
         )
-    elif main.family is EXPONENTIAL_LAW and (
+    elif main.family.name == "navarro-lopez-suarez" and (
         main.curve.numbers[2] * (fast - slow) < ident.SLOW_FALL or main.x[0] <= 0.0
     ):
         said["beta"] = said["a1"] = False

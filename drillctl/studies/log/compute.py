@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from drillctl.arrays import Array
+from drillctl.arrays import Array, finite
 from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear import modes
@@ -95,17 +95,13 @@ class LogOverview(Result, kind="log"):
             "windows": [
                 {
                     "begin": one.begin, "end": one.end, "log": one.log,
-                    "stick_slip_index": _json(w.index[one.best]),
-                    "period": _json(w.period[one.best]),
+                    "stick_slip_index": finite(w.index[one.best]),
+                    "period": finite(w.period[one.best]),
                     "tonal_share": float(w.share[one.best]),
                 }
                 for one in self.events
             ],
         }  # fmt: skip
-
-
-def _json(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def log_overview(

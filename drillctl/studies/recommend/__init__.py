@@ -101,8 +101,8 @@ def _limits(result: Recommendation) -> Table:
 
 def _numbers(result: Recommendation) -> Table:
     """What stands in the drive, in its units, with how far each number may be off."""
-    from drillctl.design.paths import USUAL_NAMES
-    from drillctl.studies.recommend.words import SI_OF, in_drive_units
+    from drillctl.design.paths import SI_OF, USUAL_NAMES
+    from drillctl.studies.recommend.words import in_drive_units
 
     best = result.recommended
     told = in_drive_units(best)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
+from drillctl.arrays import finite
 from drillctl.design import Design, parts
 from drillctl.errors import InputError
 from drillctl.linear.ends import bit_side, ends_of
@@ -199,7 +200,7 @@ def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Cri
     stable = Criterion("stable", one.stable, one.slope_margin, one.slope, 0.0, "")
     if not one.stable:
         miss = 1.0 if no_slope else min(1.0, 1.0 - one.slope_margin / one.slope)
-        stable = Criterion("stable", False, _none(one.slope_margin), one.slope, miss, unstable)
+        stable = Criterion("stable", False, finite(one.slope_margin), one.slope, miss, unstable)
     later = _criterion("delay", delay, own, True, late)
     if own == 0.0 and delay == 0.0:
         later = Criterion("delay", False, 0.0, 0.0, 1.0, late)
@@ -209,10 +210,6 @@ def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Cri
         _criterion("peak_sensitivity", peak, asked.peak_sensitivity, False, high),
         later,
     ]
-
-
-def _none(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def run_criteria(

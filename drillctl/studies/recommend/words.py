@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import units
 from drillctl.design import Design, parameter
-from drillctl.design.paths import USUAL_NAMES
+from drillctl.design.paths import SI_OF, USUAL_NAMES
 from drillctl.store.tables import percent
 from drillctl.studies.recommend.assess import FAILS, FRAGILE, Assessed
 from drillctl.studies.recommend.candidates import NAMES, PRESENT
@@ -15,12 +15,6 @@ from drillctl.studies.recommend.criteria import Criterion, drive_of, mode_at
 
 if TYPE_CHECKING:
     from drillctl.studies.recommend.compute import Recommendation
-
-SI_OF = {
-    "kp": "N*m*s/rad", "ki": "N*m/rad", "mobility": "rad/(N*m*s)", "sensed_inertia": "kg*m^2",
-    "corner": "1/s",
-}  # fmt: skip
-"""Units of the numbers that a drive has."""
 
 
 def numbers_of(one: Assessed) -> str:

@@ -93,6 +93,6 @@ STUDY = Study(
         ),
     ),
     sections=(
-        Section("torque-drag", "Torque and drag", ("torque-drag",), order=15, text=BUCKLING),
+        Section("torque-drag", "Torque and drag", ("torque-drag",), order=15),
     ),
 )  # fmt: skip
