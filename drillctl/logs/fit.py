@@ -194,6 +194,9 @@ class Fit:
     # covariance of the numbers of the law that is left where a log says nothing of them
     unsaid: Array
     signal: float  # variance of the wave that comes up over that of the noise of the log
+    normal: (
+        Array  # what pulls the free factors to where they are (N2 m2), the law's numbers with it
+    )
     problem: Problem = field(repr=False)
 
     @property
@@ -294,7 +297,7 @@ def fit(
         family, x, y, value, size, explained, leave,
         tuple(m.time_at_rest > STICKING for m in motions),
         float(max(m.bit.max() for m in motions)), float(min(m.bit.min() for m in motions)),
-        unsaid, variance / max(noise, 1e-30), problem,
+        unsaid, variance / max(noise, 1e-30), _free(blocks, held, problem), problem,
     )  # fmt: skip
 
 
@@ -303,8 +306,7 @@ def _noise(window: Window, made: Driven) -> float:
     one = window.track
     torque, speed = (n**2 / one.mean for n in one.noise)
     inertia, zeta = made.string.top_inertia, made.string.impedance
-    # Of the derivative by five samples: 130/144 over the square of their spacing.
-    return 2.0 * (torque + (zeta**2 + 0.9 * inertia**2 / one.spacing**2) * speed)
+    return 2.0 * (torque + zeta**2 * speed + (inertia * one.rise_noise) ** 2)
 
 
 def _prepared(problem: Problem, family: Family, x: Array) -> list[Driven]:
@@ -449,6 +451,14 @@ def _unsaid(blocks: list[_Block], held: Array, scale: Array, size: float, alike:
     return np.asarray(size**2 * inverse @ held @ inverse * np.outer(scale, scale))
 
 
+def _free(blocks: list[_Block], held: Array, problem: Problem) -> Array:
+    """Curvature of the objective over the free factors, the law's numbers going along."""
+    whole = sum(b.normal for b in blocks) + held
+    inside = slice(len(whole) - len(problem.free), None)
+    ridge = 1e-12 * max(float(np.trace(whole)), 1e-30) * np.eye(len(whole))
+    return np.asarray(np.linalg.inv(np.linalg.inv(whole + ridge)[inside, inside]))
+
+
 def _jackknife(
     blocks: list[_Block], x: Array, scale: Array, lows: Array, highs: Array, held: Array
 ) -> Array:
@@ -463,6 +473,6 @@ def _jackknife(
             left = (normal - out)[np.ix_(free, free)]
             ridge = 1e-9 * max(float(np.trace(normal)), 1e-30) * np.eye(len(left))
             step[free] = np.linalg.solve(left + ridge, gradient[free])
-            step = np.clip(step, -FARTHEST, FARTHEST)
+            step *= min(1.0, FARTHEST / max(float(np.abs(step).max()), 1e-30))
         rows.append(np.clip(x + step * scale, lows, highs))
     return np.array(rows)

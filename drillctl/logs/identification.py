@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from drillctl.errors import InputError
 from drillctl.logs.fit import Fit, Problem, Window, driven, fit, residual
 from drillctl.logs.laws import LEAST_DECAY, MOST_DECAY, Family
 from drillctl.logs.record import Log
-from drillctl.logs.waves import Portrait, at_the_bit, below, track, used_rate
+from drillctl.logs.waves import Portrait, at_the_bit, below, track
 from drillctl.logs.windows import tonal_share
 from drillctl.rig.drillstring import Parts
 
@@ -41,8 +41,8 @@ def tracks_of(
     length: float | None,
     most: int,
     lags: tuple[float, float] = (0.0, 0.0),
-) -> tuple[list[Window], float]:
-    """Windows to fit, and the length of them (s).
+) -> list[Window]:
+    """Windows to fit.
 
     Even tracks of the stretches that rotate under torque, cut into windows of three cycles; of
     more than `most` those that swing most at one frequency.
@@ -73,8 +73,7 @@ def tracks_of(
             found.append((share, begin, end, part))
     chosen = sorted(found, key=lambda one: -one[0])[:most]
     chosen = sorted(chosen, key=lambda one: one[1])
-    rate = used_rate(period)
-    return [_window(log, begin, end, lag, lags, part, rate) for _, begin, end, part in chosen], own
+    return [_window(log, begin, end, lag, lags, part, period) for _, begin, end, part in chosen]
 
 
 def _float(log: Log, name: str, rows: slice) -> Array:
@@ -119,7 +118,7 @@ def _cycle(log: Log, places: Sequence[slice], period: float) -> float:
 
 def _window(
     log: Log, begin: float, end: float, lag: float, lags: tuple[float, float], part: slice,
-    rate: float,
+    period: float,
 ) -> Window:  # fmt: skip
     """The track of a window with what goes before it."""
     first, last = np.searchsorted(log.time, (begin - lag, end + 3.0 * log.spacing))
@@ -135,7 +134,7 @@ def _window(
         else _float(log, name, rows)
         for name, late in zip(("top_torque", "top_speed"), lags, strict=True)
     )
-    made = track(log.time[rows], torque, speed, rate, *held)
+    made = track(log.time[rows], torque, speed, period, *held)
     place = np.searchsorted(made.time, (begin, end))
     last_sample = min(int(place[1]), len(made.time) - 3)
     return Window(made, int(place[0]), last_sample, 1.0)
@@ -199,13 +198,51 @@ def best_fit(problem: Problem, family: Family, like: Fit | None = None) -> Fit:
     return fit(problem, family, min(trials, key=lambda one: one.objective).x)
 
 
-def interval(values: Array, leave: Array, level: float) -> tuple[Array, int]:
-    """Half widths of a band from values with each window left out, and windows that bear on it."""
+def interval(leave: Array, level: float) -> Array:
+    """Half widths of a band from values with each piece left out."""
     n = len(leave)
-    if n < 2:
-        return np.full(np.shape(values), np.nan), n
     variance = (n - 1) / n * ((leave - leave.mean(axis=0)) ** 2).sum(axis=0)
-    return stdtrit(n - 1, 0.5 + 0.5 * level) * np.sqrt(variance), n
+    return np.asarray(stdtrit(n - 1, 0.5 + 0.5 * level) * np.sqrt(variance))
+
+
+def half_widths(
+    one: Fit, of: Callable[[Array], Array], level: float, floor: float
+) -> tuple[Array, Array]:
+    """Values that follow from the numbers of a law, and half widths of their band.
+
+    To first order: scatter between pieces of the log, what usual numbers leave open where it says
+    nothing, and a floor for what pieces have in common. One window's pieces are alike: ten floors.
+    """
+    n = one.numbers
+    x, values = one.x[:n], of(one.x[:n])
+    steps = 1e-5 * one.family.scale(x)
+    slopes = np.array([
+        (of(x + step * np.eye(n)[j]) - values) / step for j, step in enumerate(steps)
+    ])  # fmt: skip
+    left = np.einsum("jw,jk,kw->w", slopes, one.unsaid[:n, :n], slopes)
+    half = interval((one.leave[:, :n] - x) @ slopes, level)
+    half = np.hypot(half, normal(level) * np.sqrt(np.maximum(left, 0.0)))
+    common = floor if len(one.sticks) > 1 else 10.0 * floor
+    return values, np.hypot(half, common * np.abs(values))
+
+
+def noise_bias(one: Fit) -> Array:
+    """How far noise of the top's acceleration moves the free factors, to first order.
+
+    It is in what the string is driven by, times the drive's inertia: the less of that, the less
+    is left of it.
+    """
+    free, problem = one.problem.free, one.problem
+    if "drive_inertia" not in free:
+        return np.zeros(len(free))
+    at = free.index("drive_inertia")
+    inertia = problem.parts.top_inertia * one.factors.drive_inertia
+    pull = sum(
+        2.0 * (w.last - w.first) * (inertia * w.track.rise_noise) ** 2 for w in problem.windows
+    )
+    matrix = one.normal.copy()
+    matrix[at, at] += pull
+    return np.asarray(np.abs(np.linalg.inv(matrix)[:, at] * pull))
 
 
 def normal(level: float) -> float:
@@ -227,21 +264,7 @@ def band_of(one: Fit, level: float, floor: float) -> Band:
     """Torque over the speeds that were seen, from scatter between windows and a floor."""
     low = max(one.slowest, 0.0) if not any(one.sticks) else 0.0
     speed = np.linspace(low, max(one.fastest, low + 0.1), POINTS_OF_CURVE)
-    torque = one.curve.torque(speed)
-    n = one.numbers
-    leave = np.array([one.family.curve(x[:n]).torque(speed) for x in one.leave])
-    half, windows = interval(torque, leave, level)
-    # What usual numbers leave open where the log says nothing.
-    steps = 1e-5 * one.family.scale(one.x[:n])
-    slopes = np.array([
-        (one.family.curve(one.x[:n] + step * np.eye(n)[j]).torque(speed) - torque) / step
-        for j, step in enumerate(steps)
-    ])  # fmt: skip
-    left = np.einsum("jw,jk,kw->w", slopes, one.unsaid[:n, :n], slopes)
-    half = np.hypot(half, normal(level) * np.sqrt(np.maximum(left, 0.0)))
-    # One window has no scatter: ten floors, and it is said.
-    half = 10.0 * floor * torque if windows < 2 else half
-    half = np.hypot(half, floor * torque)
+    torque, half = half_widths(one, lambda x: one.family.curve(x).torque(speed), level, floor)
     return Band(speed, torque, torque - half, torque + half)
 
 

@@ -11,7 +11,7 @@ from drillctl.logs.inclusion import EXPONENTIAL, POINTS
 
 LEAST_DECAY, MOST_DECAY = 1e-4, 30.0  # (s/rad)
 USUAL_DECAY = 0.1  # (s/rad), where a log says nothing
-SPEEDS = (0.0, 1.0, 3.0, 6.0, 11.0, 18.0, 28.0, 42.0)
+SPEEDS = (0.0, 1.0, 2.5, 4.5, 7.0, 10.0, 14.0, 19.0, 26.0, 36.0, 48.0)
 """Of tabulated points (rad/s), those that a log reaches."""
 SLOW = 6.0  # fastest speed (rad/s) of a rig whose points and decay are nearer to rest
 LEAST = 1e-9  # torque (N m) that is none

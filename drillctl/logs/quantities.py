@@ -36,7 +36,8 @@ _SPEED = {
     "revs": 60.0 * units.RPM, "cs": 60.0 * units.RPM,
 }  # fmt: skip
 _TORQUE = {
-    "nm": 1.0, **dict.fromkeys(("knm", "kilonewtonmeter"), 1e3), "dnm": 10.0, "kgfm": 9.80665,
+    "nm": 1.0, "mnm": 1e-3, "ncm": 0.01,
+    **dict.fromkeys(("knm", "kilonewtonmeter"), 1e3), "dnm": 10.0, "kgfm": 9.80665,
     **dict.fromkeys(("ftlb", "ftlbs", "ftlbf", "lbft", "lbfft", "lbsft"), FOOT_POUND),
     **dict.fromkeys(
         ("kftlb", "kftlbs", "kftlbf", "klbfft", "klbft", "klbsft", "kipft", "kflb", "1000ftlbf"),
@@ -44,7 +45,8 @@ _TORQUE = {
     ),
 }  # fmt: skip
 _FORCE = {
-    "n": 1.0, "kn": 1e3, "dan": 10.0, "kdan": 1e4, "mn": 1e6, "lbf": POUND, "kgf": 9.80665,
+    "n": 1.0, "millinewton": 1e-3, "kn": 1e3, "dan": 10.0, "kdan": 1e4, "mn": 1e6, "lbf": POUND,
+    "kgf": 9.80665,
     **dict.fromkeys(("klbf", "klb", "klbs", "kip", "kips", "1000lbf"), 1e3 * POUND),
     **dict.fromkeys(("tf", "tonne", "tonnes", "t"), 9806.65),
 }  # fmt: skip
@@ -96,7 +98,9 @@ class Chosen(NamedTuple):
 
 
 def spelt(unit: str) -> str:
-    """A unit without blanks, brackets and signs, in lower case."""
+    """A unit without blanks, brackets and signs, in lower case; m is milli, M mega."""
+    if unit.strip("()[]{} ") == "mN":
+        return "millinewton"
     return re.sub(r"[^a-z0-9]", "", unit.lower().replace("³", "3"))
 
 
@@ -118,7 +122,9 @@ def split(head: Head, known: Mapping[str, float]) -> tuple[str, str]:
     for count in (3, 2, 1):
         ending = "".join(parts[-count:])
         if ending in known and len(parts) > count:
-            return " ".join(parts[:-count]), " ".join(parts[-count:])
+            tail = head.name.rstrip("_ ")
+            at = next(k for k in range(len(tail), -1, -1) if spelt(tail[k:]) == ending)
+            return " ".join(parts[:-count]), tail[at:]
     # `rpm` alone is a name and a unit.
     return name, parts[-1] if parts and parts[-1] in known and len(parts[-1]) > 2 else ""
 

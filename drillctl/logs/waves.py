@@ -7,8 +7,8 @@ the controller nor a model of the drive but its inertia is needed.
 
 A uniform undamped string is a delay each way and the body of the bit. Any other is finite elements
 with a matched damper at the top, whose mean of consistent and lumped mass has dispersion of fourth
-order only. Where the uppermost part is a spring without inertia, the drive belongs to the string
-that is computed, and Z is any number: that of the spring and the bodies below it.
+order only. Where the uppermost part is a spring without inertia, a little of the drive belongs to
+what is computed, and Z is that of the spring and the bodies below it: a string that is damped, too.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 from scipy.interpolate import CubicSpline
-from scipy.signal import savgol_filter
+from scipy.signal import savgol_coeffs, savgol_filter
 from scipy.signal.windows import tukey
 
 from drillctl.arrays import Array, ComplexArray
@@ -30,9 +30,12 @@ PER_SWING = 100  # of them in the period of a quick string at least
 USED_RATE = 20.0  # (Hz) what is faster and noisy is averaged to this first
 USED_SAMPLES = 50  # a period at least, where that is more
 CLEAN = 2e-5  # noise over swing below which nothing is averaged
-SMOOTH = (5, 3)  # samples and order of the derivative of a noisy speed
+SMOOTH = 5  # samples of the derivative of a noisy speed, by cubics, or where noise is more than
+NOISY = 0.05  # of its variance up to
+LONGEST = 0.1  # of a period
 FASTEST = 4.0  # (Hz) up to which a mesh is fine enough, or ten times the string's own
 PER_WAVE = 8  # elements in its wave length there
+LIGHT = 0.01  # time in which the top of a lumped string settles, over its period
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Below:
     """The string under a matched pipe as exponentials; see `inclusion`."""
 
     impedance: float  # of the uppermost pipe (N m s/rad)
-    # of the drive, above the string (kg m2, N m s/rad); zero where they are part of it
+    # of the drive, above what is computed (kg m2, N m s/rad)
     top_inertia: float
     top_damping: float
     delay: float  # one way, if it is a delay and a body, else 0 (s)
@@ -156,13 +159,12 @@ def _elements(parts: Parts, zeta: float) -> Below:
         m[j + 1, j + 1] += body
     m[-1, -1] += parts.bit_inertia
     c[-1, -1] += parts.bit_damping
-    outside = (parts.top_inertia, parts.top_damping)
     if parts.modal_damping:
         c += _modal(m, k, parts)
+    inside = 0.0
     if not parts.sections[0].inertia:  # a node needs a mass
-        m[0, 0] += outside[0]
-        c[0, 0] += outside[1]
-        outside = (0.0, 0.0)
+        inside = min(parts.top_inertia, LIGHT * zeta * swing(parts))
+        m[0, 0] += inside
     c[0, 0] += zeta
     # Twist of the elements and speed of the nodes: no state for the angle of the whole.
     twist = np.eye(n)[:-1] - np.eye(n)[1:]
@@ -178,7 +180,8 @@ def _elements(parts: Parts, zeta: float) -> Below:
     keep = rates.imag >= 0.0  # of a pair one, twice its real part
     twice = np.where(rates.imag > 0.0, 2.0, 1.0)[keep]
     return Below(
-        zeta, *outside, 0.0, rates[keep], gains[keep, 0], gains[keep, 1],
+        zeta, parts.top_inertia - inside, parts.top_damping, 0.0,
+        rates[keep], gains[keep, 0], gains[keep, 1],
         twice * shapes[-1, keep], twice * shapes[n - 1, keep],
     )  # fmt: skip
 
@@ -205,6 +208,7 @@ class Track:
     weight: Array | None  # (N)
     bit: Array | None  # downhole speed (rad/s)
     noise: tuple[float, float]  # of torque (N m) and speed (rad/s), of one sample of the log
+    rise_noise: float  # of the derivative (rad/s2)
 
     @property
     def spacing(self) -> float:
@@ -218,16 +222,11 @@ def noise_of(values: Array) -> float:
     return float(np.median(np.abs(fourth)) / 0.6745 / np.sqrt(70.0)) if len(fourth) else 0.0
 
 
-def used_rate(period: float) -> float:
-    """Samples a second (Hz) that are enough for a string."""
-    return max(USED_RATE, USED_SAMPLES / period)
-
-
 def track(
-    time: Array, torque: Array, speed: Array, rate: float = USED_RATE,
+    time: Array, torque: Array, speed: Array, period: float,
     weight: Array | None = None, bit: Array | None = None,
 ) -> Track:  # fmt: skip
-    """Even samples of a stretch, averaged where they are fast and noisy."""
+    """Even samples of a stretch, averaged where they are fast for a string's period and noisy."""
     spacing = float(np.median(np.diff(time)))
     even = time[0] + spacing * np.arange(round((time[-1] - time[0]) / spacing) + 1)
     columns = {
@@ -238,7 +237,7 @@ def track(
     noise = noise_of(columns["torque"]), noise_of(columns["speed"])
     swings = [float(np.ptp(np.percentile(columns[k], (2, 98)))) for k in ("torque", "speed")]
     clean = all(n <= CLEAN * max(s, 1e-9) for n, s in zip(noise, swings, strict=True))
-    mean = 1 if clean else max(1, round(1.0 / (spacing * rate)))
+    mean = 1 if clean else max(1, round(1.0 / (spacing * max(USED_RATE, USED_SAMPLES / period))))
     if mean > 1:
         count = len(even) // mean
         even = even[: count * mean].reshape(count, mean).mean(axis=1)
@@ -247,13 +246,18 @@ def track(
             for name, one in columns.items()
         }
     step = even[1] - even[0]
-    if clean:
-        rise = CubicSpline(even, columns["speed"])(even, 1)
-    else:
-        rise = savgol_filter(columns["speed"], *SMOOTH, deriv=1, delta=step)
+    rise, rise_noise = CubicSpline(even, columns["speed"])(even, 1), 0.0
+    count = SMOOTH
+    while not clean:
+        rise = savgol_filter(columns["speed"], count, 3, deriv=1, delta=step)
+        weights = savgol_coeffs(count, 3, deriv=1, delta=step)
+        rise_noise = noise[1] * float(np.sqrt((weights**2).sum() / mean))
+        count += 2
+        if rise_noise**2 < NOISY * np.var(rise) or count * step > LONGEST * period:
+            break
     return Track(
         even, columns["torque"], columns["speed"], rise, mean, columns.get("weight"),
-        columns.get("bit"), noise,
+        columns.get("bit"), noise, rise_noise,
     )  # fmt: skip
 
 

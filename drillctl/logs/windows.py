@@ -22,12 +22,13 @@ PERIODS = (3.0, 15.0)  # of stick-slip (s) where no string is known
 AROUND = (0.5, 1.5)  # of the first frequency of the string with the top held: its band
 SLOW = 0.02  # (Hz) what is slower is no vibration
 NEAR = 2  # lines on either side of the largest that belong to it
-LEAST_SPEED = 30.0 * np.pi / 30.0  # (rad/s) at any time in a window: rotating
+LEAST_SPEED = 30.0 * np.pi / 30.0  # (rad/s) at any time in a window: rotating, or
+UNDER_TORQUE = 0.5  # of its mean torque
 LEAST_TORQUE = 500.0  # mean of a window (N m): drilling
+SMALL = 0.3, 0.05  # shares of the largest speed and torque that are least on smaller rigs
 ROTATING = 0.98  # least share of a window that rotates
 ENDS = (1.0, 99.0)  # percentiles that are the swing of surface torque, which carries noise
 ALIKE = 0.15  # largest relative difference of period of neighbours that are merged
-STILL = 0.05  # of the mean speed: a bit that is slower is stuck
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class Windows:
     swing: Array  # of the torque, from the lower to the upper percentile (N m)
     speed: Array  # mean of the top speed (rad/s)
     weight: Array  # mean weight on bit (N); NaN where it is not logged
-    stuck: Array  # share of time at which the bit stands still; NaN without a downhole speed
+    stuck: Array  # share of time at which the bit stands still; NaN where that is not known
     from_bit: bool  # whether the index is of a downhole speed
 
     def __len__(self) -> int:
@@ -86,10 +87,10 @@ def windows_of(
         span = float(log.time[-1])
         own = length or min(LENGTH, max(span / 4.0, 6.0 / band[0]))
         count = max(int(own / log.spacing), 16)
-        places = _places(log, count)
+        places, least = _places(log, count), _least(log)
         progress.begin(f"windows of {log.file}", max(len(places), 1))
         for first in places:
-            row = _measured(log, slice(first, first + count), band, from_bit)
+            row = _measured(log, slice(first, first + count), band, from_bit, least)
             if row is not None:
                 rows.append((number, *row))
             progress.advance(1)
@@ -108,8 +109,21 @@ def _places(log: Log, count: int) -> list[int]:
     return [k for k in results if summed[k + count] - summed[k] <= 0.02 * count]
 
 
+def _least(log: Log) -> tuple[float, float]:
+    """Least speed and torque of drilling: of rigs, or on a smaller one shares of its largest."""
+    every = slice(None, None, max(1, len(log.time) // 100_000))
+    speed, torque = (
+        float(np.nanquantile(log.signals[name][every], 0.99))
+        for name in ("top_speed", "top_torque")
+    )
+    return (
+        LEAST_SPEED if speed > LEAST_SPEED else SMALL[0] * speed,
+        LEAST_TORQUE if torque > LEAST_TORQUE else SMALL[1] * torque,
+    )
+
+
 def _measured(
-    log: Log, rows: slice, band: tuple[float, float], from_bit: bool
+    log: Log, rows: slice, band: tuple[float, float], from_bit: bool, least: tuple[float, float]
 ) -> tuple[float, ...] | None:
     """Numbers of a window; None where the string does not rotate and drill."""
     time = log.time[rows]
@@ -120,21 +134,22 @@ def _measured(
         return None
     if not good.all():  # a few values, within a stretch
         speed, torque = (np.interp(time, time[good], x[good]) for x in (speed, torque))
-    if np.mean(speed >= LEAST_SPEED) < ROTATING or torque.mean() < LEAST_TORQUE:
+    # A soft drive is stopped for moments by a bit that sticks, under torque.
+    turning = (speed >= least[0]) | (torque >= UNDER_TORQUE * torque.mean())
+    if turning.mean() < ROTATING or min(speed.mean() / least[0], torque.mean() / least[1]) < 1.0:
         return None
     share, period = tonal_share(time, torque, band)
     low, high = np.percentile(torque, ENDS)
-    index, stuck = float((high - low) / (2.0 * torque.mean())), np.nan
+    index = float((high - low) / (2.0 * torque.mean()))
     if from_bit:
         bit = np.asarray(log.signals["bit_speed"][rows], float)
         mean = float(np.nanmean(bit))
         index = float((np.nanmax(bit) - np.nanmin(bit)) / (2.0 * mean)) if mean > 0.0 else np.nan
-        stuck = float(np.mean(np.abs(bit) < STILL * mean))
     weight = log.signals.get("weight_on_bit")
     mean_weight = np.nan if weight is None else float(np.nanmean(weight[rows]))
     return (
         float(time[0]), float(time[-1]), share, period, index, float(torque.mean()),
-        float(high - low), float(speed.mean()), mean_weight, stuck,
+        float(high - low), float(speed.mean()), mean_weight, np.nan,
     )  # fmt: skip
 
 

@@ -27,7 +27,7 @@ ROWS = (
 def log_overview(
     result: LogOverview, ax: Sequence[Axes] | None = None, system: units.System = "si"
 ) -> Figure:
-    """Least and largest torque, speed and weight over time; the strongest oscillations shaded."""
+    """Least and largest torque, speed and weight over time; oscillations and sticking marked."""
     held = [row for row in ROWS if any(row[0] in one.least for one in result.outlines)]
     figure, panels = style.grid_or_new(ax, len(held), 1, 9.0, 1.9 * len(held) + 1.2, share_x=True)
     scale, unit = (3600.0, "h") if result.duration > 7200.0 else (1.0, "s")
@@ -46,8 +46,15 @@ def log_overview(
                     f"{number}", (sum(ends) / 2.0, 1.0), xycoords=("data", "axes fraction"),
                     ha="center", va="bottom", fontsize=style.SMALL,
                 )  # fmt: skip
+        panel.broken_barh(
+            [(a / scale, (b - a) / scale) for a, b in result.sticking.tolist()],
+            (0.0, 0.03), transform=panel.get_xaxis_transform(), color=style.BLACK, linewidth=0.0,
+        )  # fmt: skip
         style.dress(panel, "", f"{text} ({shown})")
-    panels[-1].set_xlabel(f"time ({unit})", fontsize=style.LABEL)
+    still = f"; black: the bit stands still, by the {result.sticking_from}"
+    panels[-1].set_xlabel(
+        f"time ({unit}){still if len(result.sticking) else ''}", fontsize=style.LABEL
+    )
     panels[0].set_title(", ".join(result.files), fontsize=style.TITLE, loc="left", pad=16.0)
     return figure
 

@@ -17,8 +17,9 @@ from drillctl.linear import modes
 from drillctl.logs import identification as ident
 from drillctl.logs.fit import FACTORS, Fit, Problem, driven, fit, run
 from drillctl.logs.laws import PEAK_LAW, exponential_law, points_law
-from drillctl.logs.waves import below, impedance, is_uniform, travel_time
+from drillctl.logs.waves import below, impedance, is_uniform, stiffness, travel_time
 from drillctl.progress import SILENT, Progress
+from drillctl.rig.drillstring import Parts
 from drillctl.store.codec import label
 from drillctl.store.result import Result
 from drillctl.studies.log.compute import read_logs
@@ -26,7 +27,7 @@ from drillctl.studies.log.compute import read_logs
 CLEARLY = 8.0  # difference of misfits that tells two laws apart
 FOREIGN = 0.005  # unexplained share of the returning wave from which units are doubted
 NEARLY = 1.1  # error of a prediction over the least one that counts as equal
-LEAST_TORQUE = 100.0  # (N m) of a string that drills
+USUAL_TWIST = (0.002, 20.0)  # of a string, over what the top turns in a period
 DRAWN_POINTS = 4000  # of a portrait
 NUMBERS = {
     "travel_time": ("travel time", "s"), "impedance": ("pipe impedance", "N*m*s/rad"),
@@ -186,16 +187,17 @@ def identify(
     for held_log in logs:
         ident.refuse_slow(held_log.rate, period)
         lags = settings.torque_lag, settings.speed_lag
-        found, _ = ident.tracks_of(held_log, line, period, settings.window, settings.windows, lags)
-        windows += found
+        windows += ident.tracks_of(held_log, line, period, settings.window, settings.windows, lags)
     if not windows:
         raise InputError(
             f"no stretch of the log turns under torque for as long as a window: {ident.CYCLES} "
             f"cycles of {period:.3g} s",
             "--log",
         )
-    _refuse_implausible(windows)
+    _refuse_implausible(windows, line, period)
     held, weight = ident.weighted(windows)
+    if "travel_time" in settings.free and not travel_time(line):
+        raise InputError("a lumped string has no travel time to be fitted", "identify.free")
     problem = Problem(line, held, settings.free)
     progress.begin("fitting laws", 7)
     turning = float(np.mean([w.track.speed.mean() for w in held]))
@@ -253,28 +255,24 @@ def identify(
     )  # fmt: skip
 
 
-def _refuse_implausible(windows: Sequence[Any]) -> None:
+def _refuse_implausible(windows: Sequence[Any], line: Parts, period: float) -> None:
     """Refuse a speed or a torque that no rig has: another column, or another unit."""
     speed = float(np.median([np.median(w.track.speed) for w in windows]))
     torque = float(np.median([np.median(w.track.torque) for w in windows]))
-    for value, (low, high), text in (
-        (
-            speed,
-            (0.0, units.SPEED.usual[1]),
-            f"top speed of this log is {speed / units.RPM:.4g} rpm",
-        ),
-        (
-            torque,
-            (LEAST_TORQUE, units.TORQUE.usual[1]),
-            f"top torque of this log is {torque:.4g} N m",
-        ),
-    ):
-        if not low <= value <= high:
-            raise InputError(
-                f"the {text} on the median, which no rig drills with: another column, or its unit "
-                "is not the one it was read in (drillctl log prints both)",
-                "--log",
-            )
+    text = ""
+    if not 0.0 <= speed <= units.SPEED.usual[1]:
+        text = f"top speed of this log is {speed / units.RPM:.4g} rpm"
+    # Of turns while the bit stands still for a period: rigs of any size have some.
+    turns = torque / stiffness(line) / max(speed * period, 1e-9)
+    if not text and not USUAL_TWIST[0] <= turns <= USUAL_TWIST[1]:
+        twist = torque / stiffness(line) / (2.0 * np.pi)
+        text = f"top torque of this log is {torque:.4g} N m, {twist:.3g} turns of the string,"
+    if text:
+        raise InputError(
+            f"the {text} on the median, which no rig drills with: another column, or its unit is "
+            "not the one it was read in (drillctl log prints both)",
+            "--log",
+        )
 
 
 def _refuse_foreign(problem: Problem, main: Fit) -> None:
@@ -314,11 +312,16 @@ def _checked(problem: Problem, main: Fit) -> Fit | None:
     """The fit with all numbers of the rig free; None where too few windows tell their scatter."""
     if len(problem.windows) < 2 or main.signal < ident.TELLING:
         return None
-    free = replace(problem, free=FACTORS)
-    extra = [getattr(main.factors, name) for name in FACTORS]
+    free = replace(problem, free=_of_string(problem.parts))
+    extra = [getattr(main.factors, name) for name in free.free]
     return fit(
         free, main.family, np.concatenate((main.x[: main.numbers], extra)), main.begins, rounds=8
     )
+
+
+def _of_string(line: Parts) -> tuple[str, ...]:
+    """Numbers of the rig that a log can tell; a lumped string has no travel time."""
+    return tuple(name for name in FACTORS if travel_time(line) or name != "travel_time")
 
 
 def _numbers(problem: Problem, main: Fit, checked: Fit | None, level: float) -> list[StringNumber]:
@@ -328,49 +331,38 @@ def _numbers(problem: Problem, main: Fit, checked: Fit | None, level: float) -> 
         "travel_time": travel_time(line), "impedance": impedance(line), "bit_inertia": body,
         "drive_inertia": line.top_inertia,
     }  # fmt: skip
+    words = NUMBERS
+    if not travel_time(line):
+        design["impedance"] = stiffness(line)
+        words = NUMBERS | {"impedance": ("stiffness of the string", "N*m/rad")}
     results = []
-    for name in FACTORS:
+    for name in _of_string(line):
         fitted = name in problem.free
         source = main if fitted else checked
         factor = half = np.nan
         if source is not None:
             k = source.numbers + source.problem.free.index(name)
             factor = float(source.x[k])
-            half = float(ident.interval(source.x[k], source.leave[:, k], level)[0])
+            half = float(ident.interval(source.leave[:, k], level))
+            half += float(ident.noise_bias(source)[source.problem.free.index(name)])
         apart = abs(factor - 1.0)
         off = bool(apart > max(ident.OFF, 2.0 * half)) and not fitted
         value = design[name]
         results.append(
-            StringNumber(name, *NUMBERS[name], value, factor * value, half * value, fitted, off)
+            StringNumber(name, *words[name], value, factor * value, half * value, fitted, off)
         )
     return results
 
 
 def _described(one: Fit, weight: float, score: float, level: float, floor: float) -> FittedLaw:
     band = ident.band_of(one, level, floor)
-    n = one.numbers
-    values = one.family.coefficients(one.x[:n], weight)
-    leave = np.array([one.family.coefficients(x[:n], weight) for x in one.leave])
-    half, _ = ident.interval(values, leave, level)
-    loose = np.sqrt(np.maximum(np.diag(_carried(one, weight)), 0.0))
-    half = np.hypot(np.nan_to_num(np.asarray(half), nan=0.0), ident.normal(level) * loose)
-    half = np.hypot(half, floor * np.abs(values))
+    values, half = ident.half_widths(
+        one, lambda x: one.family.coefficients(x, weight), level, floor
+    )
     return FittedLaw(
         one.family.name, one.family.names, values, half, score, one.explained, one.size,
         band.speed, band.torque, band.low, band.high, one.curve.static,
     )  # fmt: skip
-
-
-def _carried(one: Fit, weight: float) -> Array:
-    """What usual numbers leave open, as covariance of the coefficients."""
-    n = one.numbers
-    base = one.family.coefficients(one.x[:n], weight)
-    steps = 1e-6 * one.family.scale(one.x[:n])
-    slopes = np.array([
-        (one.family.coefficients(one.x[:n] + step * np.eye(n)[j], weight) - base) / step
-        for j, step in enumerate(steps)
-    ])  # fmt: skip
-    return np.asarray(slopes.T @ one.unsaid[:n, :n] @ slopes)
 
 
 def _widened(law: FittedLaw, one: Fit, checked: Fit) -> FittedLaw:
@@ -522,7 +514,7 @@ def _trace(one: Fit) -> Trace:
 
 def _profile(one: Fit, weight: float) -> dict[str, Array]:
     """Objective with a number held at values around the best, in units of a standard deviation."""
-    if one.family.name == "tabulated" or len(one.leave) < 2:
+    if one.family.name == "tabulated":
         return {}
     n, results = one.numbers, {}
     spread = np.sqrt(

@@ -21,6 +21,13 @@ FORMULAS = {
     "logged; surface speed would miss nearly all of it under a stiff drive",
 }
 """Of the stick-slip index, by whether the downhole speed is known."""
+STICKING = {
+    "downhole speed": "Times at which the bit stands still are those of the downhole speed",
+    "waves": "Times at which the bit stands still follow from the waves at the top, with the "
+    "string and the drive of the design",
+    "": "When the bit stands still is not known: name a design, or log the downhole speed",
+}
+"""What tells when the bit stood still."""
 
 
 def computed(design: Design, run: Run) -> LogOverview:
@@ -81,6 +88,7 @@ def remarks(result: LogOverview, system: units.System) -> Iterator[str]:
     whose = "0.5 to 1.5 of the string's first frequency" if result.known else "no string was given"
     yield f"Oscillations were looked for at periods of {1 / high:.3g} to {1 / low:.3g} s ({whose})."
     yield f"Index: {FORMULAS[result.windows.from_bit]}."
+    yield f"{STICKING[result.sticking_from]}."
     w, worst, typical = result.windows, result.worst, result.typical
     if worst is None or typical is None:
         yield "No window rotates and drills: nothing to rank."
@@ -95,9 +103,11 @@ def remarks(result: LogOverview, system: units.System) -> Iterator[str]:
 def pictures(result: LogOverview) -> Iterator[Picture]:
     """Signals over time with oscillations marked; spectra."""
     yield Picture(
-        "log-overview", "Torque, speed and weight over time; the strongest oscillations shaded.",
+        "log-overview", "Torque, speed and weight over time; the strongest oscillations shaded, "
+        "times at which the bit stands still in black below.",
         f"Signals of {len(result.files)} logs over {result.duration:.0f} s; "
-        f"{len(result.events)} oscillations.",
+        f"{len(result.events)} oscillations, {len(result.sticking)} times at which the bit stands "
+        "still.",
         lambda system: plots.log_overview(result, system=system),
     )  # fmt: skip
     if result.spectra:

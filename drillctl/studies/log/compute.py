@@ -12,10 +12,12 @@ import numpy as np
 
 from drillctl.arrays import Array, finite
 from drillctl.design import Design
+from drillctl.design.parts import parts_of
 from drillctl.errors import InputError
 from drillctl.linear import modes
 from drillctl.logs.quantities import Chosen
 from drillctl.logs.record import Fault, Log, read_log
+from drillctl.logs.sticking import share, sticking
 from drillctl.logs.windows import Event, Windows, band_of, events_of, spectrum, windows_of
 from drillctl.progress import SILENT, Progress
 from drillctl.store.codec import label
@@ -62,6 +64,12 @@ class LogOverview(Result, kind="log"):
     frequencies: Array = label("mode", unit="Hz", means="of the string with the top held")
     windows: Windows = label(means="all windows of rotating time", flat=True)
     events: tuple[Event, ...] = label(means="oscillations, the strongest first")
+    sticking: Array = label(
+        "interval", "end", unit="s",
+        means="when the bit stood still, in the time of the pictures: those nearer than a pixel "
+        "are one",
+    )  # fmt: skip
+    sticking_from: str = label(means="what tells it: the downhole speed, the waves, or nothing")
     outlines: tuple[Outline, ...] = label(means="signals over time", over="log")
     spectra: tuple[Spectrum, ...] = label(means="of the strongest and of a typical window")
 
@@ -92,6 +100,8 @@ class LogOverview(Result, kind="log"):
             "faults": [one.said for one in self.faults],
             "band": list(self.band),
             "index_from": "downhole speed" if w.from_bit else "surface torque",
+            "sticking_from": self.sticking_from or None,
+            "sticking": self.sticking.tolist(),
             "windows": [
                 {
                     "begin": one.begin, "end": one.end, "log": one.log,
@@ -144,12 +154,25 @@ def log_overview(
     events = tuple(events_of(windows))
     spans = np.array([float(log.time[-1]) for log in logs])
     offsets = np.concatenate(([0.0], np.cumsum(1.02 * spans)[:-1]))
+    line = parts_of(design.tables) if known else None
+    still = [sticking(log, line, float(spans.sum()) / BINS) for log in logs]
+    for k, number in enumerate(windows.log.astype(int)):
+        spells = still[number]
+        if spells is not None:
+            windows.stuck[k] = share(spells, windows.begin[k], windows.end[k])
     return LogOverview(
         design=design, known=known, files=tuple(log.file for log in logs),
         rows=sum(len(log.time) for log in logs), rate=logs[0].rate, duration=float(spans.sum()),
         offsets=offsets, gaps=tuple(gap for log in logs for gap in log.gaps),
         columns=logs[0].columns, faults=tuple(fault for log in logs for fault in log.faults),
         band=band, frequencies=held, windows=windows, events=events,
+        sticking=np.concatenate([
+            np.zeros((0, 2)),
+            *(one + first for one, first in zip(still, offsets, strict=True) if one is not None),
+        ]),
+        sticking_from="" if all(one is None for one in still) else (
+            "downhole speed" if windows.from_bit else "waves"
+        ),
         outlines=tuple(map(_outline, logs)), spectra=tuple(_spectra(logs, windows, events)),
     )  # fmt: skip
 
