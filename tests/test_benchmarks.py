@@ -115,7 +115,7 @@ def test_operations_of_the_modal_pass_are_counted_right(modes):
     stepper = string_step(design.string, 0.02, modes)
     string = stepper.string
     assert string.kappa.shape == (modes,)
-    start = Start(np.zeros(31), np.zeros(1), np.full(31, -1.0), np.ones(1))
+    start = Start(((np.zeros(31), np.zeros(1)),), ((np.full(31, -1.0), np.ones(1)),))
     state = stepper.state(start, np.zeros(1))[:, 0]
     Counted.operations = 0
     moved, sums = step_by_hand(string, np.vectorize(Counted)(state), Counted(0.0), Counted(0.0))

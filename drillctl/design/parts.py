@@ -340,6 +340,18 @@ def axial(tables: DesignTables) -> AxialString | None:
     return axial_string(table, k, m, tables.drillstring.mass == "consistent")
 
 
+def refuse_weight_of_moving_top(tables: DesignTables) -> None:
+    """Refuse a weight that changes where no hook sets a force."""
+    if tables.bit_rock.law != REGENERATIVE or tables.axial.top != "velocity":
+        return
+    if weight_moves(tables):
+        raise InputError(
+            "'velocity': the top moves at a speed of its own and no hook sets a force, so no law "
+            "or program of the weight on bit can act; with 'force' it can",
+            "axial.top",
+        )
+
+
 def _axial_pieces(tables: DesignTables) -> list[tuple[float, float]]:
     """Axial stiffness (N/m) and mass (kg) of each section, of its body."""
     results = []

@@ -56,7 +56,7 @@ def _impossible(tables: DesignTables) -> Iterator[InputError]:
 
     each = (
         parts.refuse_impossible_string, refuse_impossible_well, parts.bit_rock_before,
-        parts.weight_on_bit, parts.program,
+        parts.weight_on_bit, parts.program, parts.refuse_weight_of_moving_top,
     )  # fmt: skip
     found = False
     for check in (*each, _refuse_impossible_drive):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -42,6 +43,7 @@ class AxialString:
     mass: Array  # shape (nodes, nodes): kg
     damping: Array  # shape (nodes, nodes): N s/m
     stiffness: Array  # shape (nodes, nodes): N/m
+    impedance: float = 0.0  # at the bit, of a string of elements (N s/m); 0 of a lumped one
 
     @property
     def nodes(self) -> int:
@@ -88,4 +90,6 @@ def axial_string(table: AxialTable, stiffness: Array, mass: Array, consistent: b
         c[at] += table.stiffness_damping * spring * np.array([[1.0, -1.0], [-1.0, 1.0]])
     m[0, 0] += top
     c[-1, -1] += table.damping
-    return AxialString(m, c, k)
+    lumped = table.model == "lumped"
+    impedance = 0.0 if lumped else math.sqrt(stiffness[-1] * mass[-1])
+    return AxialString(m, c, k, impedance)

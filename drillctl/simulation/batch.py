@@ -21,7 +21,7 @@ from drillctl.errors import InputError
 from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.simulation import measures as m
-from drillctl.simulation.lanes import Lanes, start
+from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.propagator import StringStep, string_step
 from drillctl.simulation.scheme import Scheme, bit_inertia, choose_scheme
 from drillctl.simulation.step_laws import (
@@ -148,44 +148,43 @@ def _run(
     from drillctl.simulation.kernels.string_step import MOST_READ
     from drillctl.simulation.kernels.wall_step import room_rows
 
-    if lanes.axial is not None:
-        return _cut(lanes, prepared, every, give_up, watch)
     count = len(lanes)
     # Every block is full: the last one is filled up with copies of the last lane.
     padded = lanes[np.minimum(np.arange(-(-count // WIDTH) * WIDTH), count - 1)]
-    rock = padded.before if np.any(padded.program.rock_until > 0.0) else padded.friction
-    static = rock.static_torque(padded.weight_at_rest)
-    begin = start(padded.string, padded.start, padded.set_speed, padded.turning_speed, static)
+    begin = padded.begin
     state = prepared.stepper.state(begin, padded.set_speed)
-    top_speed, bit_speed = begin.turn[0] * begin.speed, begin.turn[-1] * begin.speed
+    top_speed, *_, bit_speed = begin.speeds
     scheme, duration = prepared.scheme, prepared.duration
     samples = scheme.steps // every + 1 if every else 0
     measures = np.empty((MEASURES, len(padded)))
     wall = () if padded.wall is None else padded.wall.torque
-    traces = np.empty((samples, len(TRACED) + max(len(wall) - 1, 0), len(padded)))
+    friction, before, more, surface = _rock(padded, scheme)
+    axial = 2 if more else 0
+    traces = np.empty((samples, len(TRACED) + max(len(wall) - 1, 0) + axial, len(padded)))
     window = min(m.WINDOW, duration)
     observer = padded.observer
     ticks = Clock(
         scheme.step, scheme.steps, prepared.j1_from, duration - window, every, scheme.sampling,
         remembered(padded.weight, scheme.step), 0 if observer is None else observer.states,
-        give_up,
+        more, surface, give_up,
     )  # fmt: skip
     numbers = np.stack([
         padded.set_speed, bit_speed + padded.set_speed, padded.table_low, padded.table_high,
         top_speed, *wall,
     ])  # fmt: skip
     arguments = (
-        prepared.stepper.string, padded.friction, padded.before,
+        prepared.stepper.string, friction, before,
         drive_step(
             _at_whole_steps(padded.drive, scheme), scheme.step, prepared.stepper.string
         ),
         weight_step(padded.weight, scheme.step), program_step(padded.program),
-        variation_step(padded.variation, duration, padded.set_speed),
+        variation_step(padded.variation, duration, padded.set_speed, _rate(padded)),
         observer_step(observer, scheme.step, begin),
         numbers, np.ascontiguousarray(state), ticks,
     )  # fmt: skip
     run = kernel(*arguments[1:8])
     rows = ROWS + 2 * len(state) + ticks.remembered + 2 * ticks.estimated
+    rows += more + 2 * surface
     rows += -(-MOST_READ * len(state) // WIDTH) + room_rows(len(wall))
 
     watch = new_watch() if watch is None else watch
@@ -197,27 +196,22 @@ def _run(
     return measures[:, :count], traces[:, :, :count]
 
 
-def _cut(
-    lanes: Lanes, prepared: Prepared, every: int, give_up: float, watch: Watch | None
-) -> tuple[Array, Array]:
-    """The same of bits that cut their own wake: those rows, and behind them the axial ones."""
+def _rock(lanes: Lanes, scheme: Scheme) -> tuple[Any, Any, int, int]:
+    """What the kernel takes of the rock, and of that before; rows of memory, points of surface."""
+    if lanes.axial is None:
+        return lanes.friction, lanes.before, 0, 0
     from drillctl.simulation import cutting
-    from drillctl.simulation import cutting_step as c
-    from drillctl.simulation.kernels import rows as r
+    from drillctl.simulation.kernels.cutting_step import cutting_rows
 
-    duration = prepared.duration
-    window = min(m.WINDOW, duration)
-    watch = new_watch() if watch is None else watch
-    rows, traces = cutting.run(
-        lanes, prepared.scheme, duration, prepared.j1_from, window, every, give_up, watch,
-        _in_threads,
-    )  # fmt: skip
-    raw = np.zeros((r.MEASURES + 4, len(lanes)))
-    for ours, theirs in c.ROWS.items():
-        raw[(getattr(r, theirs) - r.FIRST_MEASURE) // r.WIDTH] = rows[ours]
-    raw[(r.WORK - r.FIRST_MEASURE) // r.WIDTH] += rows[c.AXIAL_WORK]
-    raw[r.MEASURES :] = rows[[c.DEPTH, c.CUT, c.AXIAL_STUCK, c.OFF_BOTTOM]]
-    return raw, traces
+    rock, before, points = cutting.cutting_step(lanes, scheme.step)
+    return rock, before, cutting_rows(rock), points
+
+
+def _rate(lanes: Lanes) -> float | Array:
+    """Rate of penetration (m/s) of a bit that drills by itself."""
+    if lanes.axial is None:
+        return 0.0
+    return np.asarray(lanes.friction.rate(lanes.weight_at_rest, lanes.begin_speed))
 
 
 def _aligned(size: int) -> Array:
@@ -317,7 +311,12 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
             "peak_drive_power": _where(
                 np.full(len(lanes), isinstance(lanes.drive, RealDrive)), row(r.PEAK_POWER)
             ),
-            **_axial(raw[r.MEASURES :], lanes, duration, row(r.WORK)),
+            **_axial(
+                [row(x) for x in (r.DRILLED, r.CUT_SUM, r.AXIAL_STUCK, r.OFF_BOTTOM)],
+                lanes,
+                duration,
+                row(r.WORK),
+            ),
         }
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(raw).all(axis=0))
     status = _statuses(finite, row(r.LATE_STUCK), window, values["settling_time_wide"])
@@ -331,7 +330,7 @@ def _measured(raw: Array, lanes: Lanes, prepared: Prepared) -> Batch:
     return Batch(values, status)
 
 
-def _axial(rows: Array, lanes: Lanes, duration: float, work: Array) -> dict[str, Array]:
+def _axial(rows: list[Array], lanes: Lanes, duration: float, work: Array) -> dict[str, Array]:
     """Measures of axial motion; undefined without any."""
     if lanes.axial is None:
         return dict.fromkeys(m.AXIAL_MEASURES, np.full(len(lanes), np.nan))

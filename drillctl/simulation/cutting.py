@@ -1,8 +1,7 @@
 """Runs of a bit that cuts its own wake: torsion and axial motion, in both engines.
 
-`cutting_events.py` locates events, `cutting_step.py` takes fixed steps of many lanes. Here is what
-both begin with: two strings as linear systems, the bit, the start, and the limits of the model: a
-PI or a constant torque at the top, a constant force or velocity of the hook.
+`cutting_events.py` locates events, `kernels/cutting_step.py` takes fixed steps of many lanes. Here
+is what both begin with: two strings as linear systems, the bit, the start.
 """
 
 from __future__ import annotations
@@ -12,38 +11,32 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
 
 from drillctl.arrays import Array
 from drillctl.errors import InputError, SimulationError
 from drillctl.rig.axial import AxialString
 from drillctl.rig.bit_rock.richard_detournay import RichardDetournay
-from drillctl.rig.bit_rock.variation import NoVariation, Variation, path, paths
+from drillctl.rig.bit_rock.variation import NoVariation, Variation, path
 from drillctl.rig.drillstring import Drillstring
-from drillctl.rig.top_drive import PI, ConstantTorque
-from drillctl.rig.weight_on_bit import ConstantWeight
+from drillctl.rig.program import OF_A_PATH
+from drillctl.rig.top_drive import RealDrive, SampledDrive
+from drillctl.rig.top_drive.real_drive import MEMORY, SAMPLED_MEMORY
+from drillctl.rig.weight_on_bit import PATHS, FollowingSpeed
+from drillctl.simulation.lanes import single_lane
 
 if TYPE_CHECKING:
     from drillctl.design import Design
     from drillctl.simulation.lanes import Lanes
 
 
-def refuse_others(drive: Any, weight: Any, moves: bool) -> None:
-    """Refuse (`InputError`) what this law does not go with yet."""
-    if not isinstance(drive, (PI, ConstantTorque)):
+def refuse_others(design: Design) -> None:
+    """Refuse (`InputError`) what the reference solver does not follow with axial motion."""
+    if isinstance(design.weight_on_bit, PATHS):
         raise InputError(
-            "'richard-detournay' goes with a PI or a constant torque without limits, lags, "
-            "filters and sampling",
-            "controller",
+            "with axial motion the reference solver follows a hook that holds its force, or sets "
+            "it by the bit speed at once; with delays, readings and lags use the batch engine",
+            "weight_on_bit",
         )
-    if not isinstance(weight, ConstantWeight):
-        raise InputError(
-            "'richard-detournay' has an axial string: the weight on the bit follows from its "
-            "motion, and the hook's law is 'constant'",
-            "weight_on_bit.law",
-        )
-    if moves:
-        raise InputError("'richard-detournay' goes with no program yet", "scenario")
 
 
 class Steady(NamedTuple):
@@ -60,32 +53,6 @@ def steady(rock: RichardDetournay, weight: Any, speed: Any) -> Steady:
     depth = rock.depth_of_cut(weight)
     slope = depth / (2.0 * math.pi)
     return Steady(depth, slope * speed, rock.static_torque(weight), slope)
-
-
-def begin(
-    kind: str, string: Drillstring, drive: Any, torque: Array, set_speed: Array, turning: Array,
-    bit_speed: Array,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Angles and speeds of every node in the frame at time zero, shape (nodes, lanes) each."""
-    compliance = np.concatenate([[0.0], np.cumsum(1.0 / string.element_stiffness)])
-    ones, last = np.ones(string.nodes), np.eye(string.nodes)[-1]
-    if kind == "rest":
-        return np.zeros((string.nodes, len(torque))), np.outer(ones, -set_speed)
-    if kind == "turning":
-        return np.zeros((string.nodes, len(torque))), np.outer(ones, turning - set_speed)
-    if kind == "wound_up":
-        shape = compliance / compliance[-1]
-        return np.outer(compliance, -torque), np.outer(shape, -set_speed)
-    # The drive gives what rock and drag take; its angle in the frame is what its integral holds.
-    rest = np.concatenate([[0.0], -np.cumsum(
-        (string.ground_damping.sum() - np.cumsum(string.ground_damping)[:-1])
-        / string.element_stiffness)])  # fmt: skip
-    whole = torque + string.ground_damping.sum() * set_speed
-    _, ki = drive.gains()
-    ki = np.broadcast_to(np.asarray(ki, dtype=float), whole.shape)
-    top = np.where(ki > 0.0, -whole / np.where(ki > 0.0, ki, 1.0), 0.0)
-    angles = np.outer(compliance, -torque) + np.outer(rest, set_speed) + np.outer(ones, top)
-    return angles, np.outer(last, bit_speed - set_speed)
 
 
 # Both strings as linear systems.
@@ -156,31 +123,30 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
     """Simulate a design with located events."""
     from drillctl.simulation import cutting_events as e
 
-    refuse_others(design.top_drive, design.weight_on_bit, design.program.moves)
+    refuse_others(design)
     assert design.axial is not None
-    rock, speed = design.bit_rock, design.speed
+    lane = single_lane(design)
+    rock, speed, program = design.bit_rock, design.speed, design.program
     assert isinstance(rock, RichardDetournay)
-    weight = design.tables.operating_point.weight_on_bit
-    point = steady(rock, weight, speed)
+    first: Any = design.bit_rock_before if program.rock_until > 0.0 else rock
+    nominal = design.tables.operating_point.weight_on_bit
+    begins = float(lane.weight_at_rest[0])
+    point, start = steady(rock, nominal, speed), steady(first, begins, float(lane.begin_speed[0]))
     torsion, axial = (
         torsional(design.string, design.string.nodes),
         along(design.axial, design.axial.nodes),
     )
-    start = design.tables.start
-    turning = speed if start.speed is None else start.speed
-    bit_speed = speed if start.bit_speed is None else start.bit_speed
-    angles, speeds = begin(
-        start.kind, design.string, design.top_drive,
-        *(np.array([x]) for x in (point.torque, speed, turning, bit_speed)),
-    )  # fmt: skip
+    angles, speeds = lane.begin.angles[:, 0], lane.begin.speeds[:, 0]
     n, m = len(torsion.by_bit), len(axial.by_bit)
-    stands = speeds[-1, 0] + speed == 0.0
-    state = np.zeros(n + m + e.WORKS)
-    state[: n // 2], state[n // 2 : n] = torsion.modal @ angles[:, 0], torsion.modal @ speeds[:, 0]
+    stands = speeds[-1] + speed == 0.0
+    drive = _drive(e, design.top_drive)
+    state = np.zeros(n + m + drive.states + e.WORKS)
+    state[: n // 2], state[n // 2 : n] = torsion.modal @ angles, torsion.modal @ speeds
     if not stands:
-        state[n + m // 2 : n + m] = axial.modal @ np.full(axial.modal.shape[1], point.velocity)
-    kp, ki = design.top_drive.gains()
-    constant = float(design.top_drive.torque(0.0, 0.0))
+        state[n + m // 2 : n + m] = axial.modal @ np.full(axial.modal.shape[1], start.velocity)
+    if drive.states:
+        held = float(lane.begin_torque[0]) if design.tables.start.kind == "steady" else 0.0
+        state[n + m :][: drive.states] = _memory(design.top_drive, drive.states, held, speeds[0])
     vary = _varying(design.variation, design.tables.simulation.duration, speed, point.velocity)
     between = 2.0 * math.pi / rock.blades
     scale = np.concatenate([
@@ -188,19 +154,61 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
         np.full(n // 2, _size(torsion.modal, speed)),
         np.full(m // 2, _size(axial.modal, point.depth_of_cut / rock.blades)),
         np.full(m // 2, _size(axial.modal, point.velocity)),
-        np.array([*[point.torque * speed] * 5, speed, weight]) + 1e-300,
+        np.array([
+            speed, point.torque, point.torque, 1.0, point.torque, point.torque, point.torque, speed,
+            point.torque,
+        ])[: drive.states],
+        np.array([*[point.torque * speed] * 5, speed, nominal]) + 1e-300,
     ])  # fmt: skip
     task = e.Task(
         _side(e, torsion, speed, torque=True), _side(e, axial, point.velocity, torque=False),
-        e.Rock(
-            rock.blades * rock.force_per_depth, rock.blades * rock.torque_per_depth,
-            rock.flat_force, rock.flat_torque, between, rock.blades,
-        ),
-        e.Drive(constant, float(kp), float(ki)), weight, speed,
-        design.tables.simulation.duration, tolerance, scale, point.slope,
+        e.Bit(between, rock.blades), drive, _hook(e, design.weight_on_bit),
+        _path(program.speed), _path(program.weight), _rock(rock), program.rock_until,
+        np.array([*program.breaks(), math.inf]), speed,
+        design.tables.simulation.duration, tolerance, scale, start.slope,
         np.array([axial.read[1] @ axial.by_bit, -torsion.read[1] @ torsion.by_bit]), *vary,
     )  # fmt: skip
-    return _run(e, task, state, stands)
+    return _run(e, task, state, stands, _rock(first))
+
+
+def _rock(rock: RichardDetournay) -> Array:
+    """Numbers of a rock in the order of `cutting_events`."""
+    return np.array([
+        rock.blades * rock.force_per_depth, rock.blades * rock.torque_per_depth,
+        rock.flat_force, rock.flat_torque,
+    ])  # fmt: skip
+
+
+def _path(path: Any) -> Array:
+    """Numbers of a program, zeros behind those of a single ramp."""
+    numbers = np.zeros(len(OF_A_PATH))
+    numbers[: len(path)] = path
+    return numbers
+
+
+def _hook(e: Any, law: Any) -> Any:
+    if isinstance(law, FollowingSpeed):
+        return e.Hook(*map(float, law))
+    return e.Hook(float(law[0]), 0.0, 0.0, -math.inf, math.inf)
+
+
+def _drive(e: Any, drive: Any) -> Any:
+    kp, ki = (float(x) for x in drive.gains())
+    if not isinstance(drive, RealDrive):
+        return e.Drive(e.IDEAL, float(drive.torque(0.0, 0.0)), kp, ki, np.zeros(1), 0)
+    sampled = isinstance(drive, SampledDrive)
+    kind, memory = (e.SAMPLED, SAMPLED_MEMORY) if sampled else (e.CONTINUOUS, MEMORY)
+    return e.Drive(kind, 0.0, kp, ki, np.array([float(x) for x in drive]), len(memory))
+
+
+def _memory(drive: Any, states: int, held: float, speed: float) -> Array:
+    """Memory of a drive at time zero, by the names of `SAMPLED_MEMORY`."""
+    memory = np.zeros(9)
+    memory[0] = memory[7] = speed
+    if held != 0.0 and drive.ki != 0.0:
+        memory[3] = (held - drive.feedforward) / drive.ki
+        memory[[1, 2, 4, 5, 6]] = held
+    return memory[:states]
 
 
 def _side(e: Any, system: System, speed: float, torque: bool) -> Any:
@@ -228,15 +236,15 @@ def _varying(
     return path(one, nodes), np.array([one.spread, one.spacing, one.advance, one.turns, one.sinks])
 
 
-def _run(e: Any, task: Any, state: Array, stands: bool) -> Located:
+def _run(e: Any, task: Any, state: Array, stands: bool, rock: Array) -> Located:
     room, size = 1 << 14, len(state)
     phase = e.STUCK if stands else e.DOWN
-    n = len(task.torsion.by_bit)
-    place = task.torsion.read[0] @ state[:n], task.axial.read[0] @ state[n : size - e.WORKS]
+    n, m = len(task.torsion.by_bit), len(task.axial.by_bit)
+    place = task.torsion.read[0] @ state[:n], task.axial.read[0] @ state[n : n + m]
     memory = e.Memory(
-        np.array([0.0, 1e-3 * task.rock.between / task.set_speed, *place, 0.0]),
-        np.array([phase, int(not stands), 0, 0]), np.zeros((room, 34)),
-        np.zeros((4096, 2)), state.copy(), np.zeros((8, size)),
+        np.array([0.0, 1e-3 * task.bit.between / task.set_speed, *place, 0.0]),
+        np.array([phase, int(not stands), 0, 0, 0, 0]), rock, np.zeros((room, 36)),
+        np.zeros((4096, 2)), state.copy(), np.zeros((9, size)),
     )  # fmt: skip
     while True:
         ended = e.advance(task, memory, 2000)
@@ -265,121 +273,62 @@ def _longer(table: Array, used: int) -> Array:
 # The batch engine.
 
 AXIAL_PHASE = 1.0  # axial modes that turn more than this (rad) in a step are left out
+FINEST = 3000.0  # most points of the surface between two blades
+SPACED = 0.25  # of what the bit turns in a step at the set speed, the least distance of two
 
 
-def blocks(system: System, step: float) -> Any:
-    """The exact step of a system in 2 x 2 blocks; refused where it does not fall into any."""
-    from drillctl.simulation.cutting_step import Blocks
+def cutting_step(lanes: Lanes, step: float) -> tuple[Any, Any, int]:
+    """What the kernel takes of bit and axial string, of the bit in the rock before, and points."""
+    from drillctl.simulation.kernels.cutting_step import Bit, CuttingStep
 
-    n = len(system.a) // 2
-    inputs = np.column_stack([system.by_top, system.by_bit, system.drag])
-    basis = _pairs(system, n)
-    inverse = np.linalg.inv(basis)
-    a, b, read = inverse @ system.a @ basis, inverse @ inputs, system.read @ basis
-    free, push = np.empty((n, 4)), np.empty((n, 2, 3))
-    for k in range(n):
-        at = slice(2 * k, 2 * k + 2)
-        held = np.zeros((5, 5))
-        held[:2, :2], held[:2, 2:] = a[at, at] * step, b[at] * step
-        moved = scipy.linalg.expm(held)
-        free[k], push[k] = moved[:2, :2].ravel(), moved[:2, 2:]
-    rows = np.stack([read[2], read[3], read[0], read[1], read[4], read[5]]).reshape(6, n, 2)
-    top, bit, load = (np.ascontiguousarray(push[:, :, k]) for k in range(3))
-    made = Blocks(free, top, bit, load, rows)
-    return made, inverse
-
-
-def _pairs(system: System, n: int) -> Array:
-    """States by columns in which A falls into 2 x 2 blocks."""
-    order = np.arange(2 * n).reshape(2, n).T.ravel()
-    damping = system.damping[n:, n:]
-    if np.abs(damping - np.diag(np.diag(damping))).max() <= 1e-9 * max(np.abs(damping).max(), 1.0):
-        return np.eye(2 * n)[:, order]
-    poles, vectors = np.linalg.eig(system.a)
-    # Two zero poles of a rigid body without dampers are no pair of eigenvectors.
-    kept = np.abs(poles) > 1e-9 * np.abs(poles).max()
-    if (~kept).sum() == 1:  # a damper to ground leaves the place alone free
-        kept[:] = True
-    columns = [] if kept.all() else [np.eye(2 * n)[0], np.eye(2 * n)[n]]
-    pairs = [k for k in np.flatnonzero(poles.imag > 0.0) if kept[k]]
-    real = [k for k in np.flatnonzero(poles.imag == 0.0) if kept[k]]
-    columns += [part for k in pairs for part in (vectors[:, k].real, vectors[:, k].imag)]
-    columns += [vectors[:, k].real for k in sorted(real, key=lambda k: -abs(poles[k]))]
-    basis = np.array(columns).T
-    if basis.shape != (2 * n, 2 * n) or np.linalg.cond(basis) > 1e9:
-        raise InputError("the dampers of this string do not let it fall into modes", "drillstring")
-    return basis
+    assert lanes.axial is not None
+    rock, first = lanes.friction, lanes.before
+    if not np.any(lanes.program.rock_until > 0.0):
+        first = rock
+    begin, weight = lanes.weight_at_rest, lanes.weight[0]
+    between = 2.0 * math.pi / rock.blades
+    closest = np.maximum(between / FINEST, SPACED * step * lanes.set_speed)
+    rate = first.rate(begin, lanes.begin_speed)
+    torque = lanes.begin_torque if lanes.start == "steady" else 0.0 * rate
+    bits = [
+        Bit(*(np.ascontiguousarray(x, dtype=float) for x in (
+            one.blades * one.force_per_depth, one.torque_per_depth / one.force_per_depth,
+            one.flat_force, one.flat_torque, between,
+            first.depth_of_cut(begin) / (2.0 * math.pi), rate, torque,
+            rock.rate(weight, lanes.set_speed), closest,
+        )))
+        for one in (rock, first)
+    ]  # fmt: skip
+    (free, push, by_force), to_block = _axial_blocks(lanes.axial, step)
+    nodes = lanes.axial.nodes
+    moving = to_block @ np.concatenate([np.zeros(nodes), np.ones(nodes)])
+    points = 1 << int(np.ceil(np.log2(np.max(between / closest) + 16.0)))
+    made = CuttingStep(bits[0], free, push, by_force, np.outer(moving, rate))
+    return made, bits[1], points
 
 
 @lru_cache(maxsize=8)
-def _prepared(string: Drillstring, axial: AxialString, step: float, modes: int) -> Any:
+def _axial_blocks(axial: AxialString, step: float) -> tuple[tuple[Array, ...], Array]:
+    """The exact step of an axial string in blocks, and states per displacement and velocity."""
+    from drillctl.simulation.propagator import Modal, blocks
+
     carried = max(1, int((axial.modes[0] * step <= AXIAL_PHASE).sum()))
-    one, two = torsional(string, modes), along(axial, carried)
-    return one, two, blocks(one, step), blocks(two, step)
-
-
-def run(
-    lanes: Lanes, scheme: Any, duration: float, j1_from: float, window: float, every: int,
-    give_up: float, watch: Any, in_threads: Any,
-) -> tuple[Array, Array]:  # fmt: skip
-    """What was measured, shape (`MEASURED`, lanes), and traces, shape (samples, signals, lanes)."""
-    from drillctl.simulation import cutting_step as c
-
-    refuse_others(lanes.drive, lanes.weight, lanes.program.moves)
-    count, rock, weight = len(lanes), lanes.friction, lanes.weight[0]
-    torsion, axial, (tied, into), (sunk, down) = _prepared(
-        lanes.string, lanes.axial, scheme.step, scheme.modes
-    )
-    point = steady(rock, weight, lanes.set_speed)
-    angles, speeds = begin(
-        lanes.start, lanes.string, lanes.drive, point.torque, lanes.set_speed,
-        lanes.turning_speed, lanes.bit_speed,
-    )  # fmt: skip
-    z = _each(into, np.vstack([_each(torsion.modal, angles), _each(torsion.modal, speeds)]))
-    stands = speeds[-1] + lanes.set_speed == 0.0
-    rigid = axial.modal.sum(axis=1)
-    velocity = np.where(stands, 0.0, point.velocity)
-    y = _each(down, np.vstack([np.zeros((len(rigid), count)), np.outer(rigid, velocity)]))
-    one, (table, first) = lanes.variation, _tables(lanes, duration, point.velocity)
-    none = np.zeros(count)
-    varies = not isinstance(one, NoVariation)
-    way = [np.broadcast_to(getattr(one, name), count) if varies else none + (name == "spacing")
-           for name in ("spread", "spacing", "advance", "turns", "sinks")]  # fmt: skip
-    kp, ki = (np.broadcast_to(np.asarray(x, dtype=float), count) for x in lanes.drive.gains())
-    numbers = np.stack([
-        rock.blades * rock.force_per_depth, rock.blades * rock.torque_per_depth,
-        rock.flat_force, rock.flat_torque, 2.0 * math.pi / rock.blades, weight, lanes.set_speed,
-        none + lanes.drive.torque(none, none), kp, ki, point.slope, *way, first,
-        point.velocity,
-    ], axis=1)  # fmt: skip
-    samples = scheme.steps // every + 1 if every else 0
-    out = np.zeros((count, c.MEASURED))
-    traces = np.zeros((count, samples, c.SIGNALS))
-    clock = c.Clock(scheme.step, scheme.steps, j1_from, duration - window, every, give_up)
-    element = np.array([lanes.string.element_stiffness[0], lanes.string.element_damping[0]])
-    starts = np.ascontiguousarray(z.T.reshape(count, -1, 2))
-    depths = np.ascontiguousarray(y.T.reshape(count, -1, 2))
-
-    def advance(begin: int, end: int) -> None:
-        c.run(begin, end, numbers, tied, sunk, clock, table, element, starts, depths, out, traces,
-              watch)  # fmt: skip
-
-    in_threads(advance, count, watch)
-    return np.ascontiguousarray(out.T), np.ascontiguousarray(traces.transpose(1, 2, 0))
-
-
-def _each(matrix: Array, columns: Array) -> Array:
-    """Their product lane by lane: that of two matrices would round by the number of lanes."""
-    return np.stack([matrix @ column for column in np.ascontiguousarray(columns.T)], axis=1)
-
-
-def _tables(lanes: Lanes, duration: float, velocity: Array) -> tuple[Array, Array]:
-    """Paths of a rock that varies, and the row of each lane."""
-    one = lanes.variation
-    if isinstance(one, NoVariation):
-        return np.zeros((1, 2)), np.zeros(len(lanes))
-    table, row = paths(one, int(np.max(one.nodes(duration, lanes.set_speed, velocity))))
-    return table, row.astype(float)
+    one = along(axial, carried)
+    n = carried
+    damping = one.damping[n:, n:]
+    classical = bool(np.abs(damping - np.diag(np.diag(damping))).max() <= 1e-12 * max(
+        np.abs(damping).max(), 1.0))  # fmt: skip
+    none = np.zeros(2 * n)
+    signals = np.array([one.read[0], one.read[1], none, none, none])
+    inputs = np.column_stack([one.by_bit, one.drag])
+    found = blocks(Modal(one.a, inputs, signals, classical, not one.ground), step)
+    if found is None:
+        raise InputError("the dampers of this string do not let it fall into modes", "axial")
+    fields, basis = found
+    to_modal = np.kron(np.eye(2), one.modal)
+    by_force = np.array([fields["angle_by_top"], fields["speed_by_top"]])
+    arrays = (fields["free"], fields["push"], by_force)
+    return tuple(np.ascontiguousarray(x) for x in arrays), basis @ to_modal
 
 
 def axial_measures(

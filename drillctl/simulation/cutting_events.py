@@ -16,9 +16,24 @@ import numba
 import numpy as np
 from numba.extending import register_jitable
 
+from drillctl.rig import program
+from drillctl.rig.top_drive import real_drive
+from drillctl.simulation import reference_rates
 from drillctl.simulation.kernel_cache import on_disk
+from drillctl.simulation.reference_rates import (
+    CONTINUOUS,
+    IDEAL,
+    SAMPLED,
+    answer,
+    answer_held,
+    path_at,
+    path_integral,
+    real_of,
+    sampled,
+    sampled_of,
+)
 
-compiled = numba.njit(fastmath={"contract"}, nogil=True, error_model="numpy")
+compiled = numba.njit(fastmath={"contract"}, nogil=True, error_model="numpy", _nrt=False)
 
 UP, STUCK, DOWN, OFF = -1, 0, 1, 2
 """Axial phases: rising, at rest and sinking in contact with the rock; off bottom.
@@ -53,23 +68,39 @@ class Side(NamedTuple):
     steady_loss: float  # power of dampers at the set speed alone (W)
 
 
-class Rock(NamedTuple):
-    """The bit and what it cuts: numbers of `RichardDetournay`, multiplied out."""
+PER_DEPTH, TORQUE_PER_DEPTH, FLAT, FLAT_TORQUE = range(4)
+"""Of a rock: force and torque on all blades per depth of one (N/m, N), force and torque of the
+wear flat (N, N m)."""
 
-    per_depth: float  # force on all blades per depth of one (N/m)
-    torque_per_depth: float  # N m/m
-    flat: float  # force on the wear flat (N)
-    flat_torque: float  # torque on it (N m)
+
+class Bit(NamedTuple):
+    """The bit."""
+
     between: float  # angle between two blades (rad)
     blades: float
 
 
 class Drive(NamedTuple):
-    """A PI, or a constant torque, at the top; the axial top is free under a constant force."""
+    """The drive at the top."""
 
+    kind: int  # of `reference_rates`
+    # an ideal one
     constant: float  # N m
     kp: float  # N m s/rad
     ki: float  # N m/rad
+    # any other: its numbers, and those of its memory among the states
+    numbers: Any
+    states: int
+
+
+class Hook(NamedTuple):
+    """Force of hook and string on the bit: at once after its speed, within limits."""
+
+    nominal: float  # N
+    gain: float  # N s/rad
+    set_speed: float  # rad/s
+    least: float  # N
+    most: float
 
 
 class Task(NamedTuple):
@@ -77,9 +108,14 @@ class Task(NamedTuple):
 
     torsion: Side
     axial: Side
-    rock: Rock
+    bit: Bit
     drive: Drive
-    weight: float  # force of hook and string on the bit (N)
+    hook: Hook
+    speed: Any  # numbers of the programs of set speed and weight
+    weight: Any
+    rock: Any  # shape (4,), by the names above; from `rock_until` (s) on
+    rock_until: float
+    breaks: Any  # times at which something jumps or bends (s), infinity the last
     set_speed: float
     duration: float
     tolerance: float
@@ -95,14 +131,18 @@ class Memory(NamedTuple):
     """What a run has been through; arrays so that calls can go on."""
 
     now: Any  # shape (5,): time, next step; angle and depth at the start; energy of impacts (J)
-    count: Any  # shape (4,): axial phase, torsional one, steps, events
-    # shape (room, 34): begin (s), length (s), 1 if in contact; value, slope and curvature at both
+    # shape (6,): axial phase, torsional one, steps, events; next break, next sample of the drive
+    count: Any
+    rock: Any  # shape (4,): that of the hour
+    # shape (room, 36): begin (s), length (s), 1 if in contact; value, slope and curvature at both
     # ends of bit angle, depth, top angle and angle of the node below; force on the bit and its
-    # torque at both ends; phases; depth of cut at both ends
+    # torque at both ends; phases; depth of cut, torque of the drive at both ends
     tape: Any
     events: Any  # shape (room, 2): time, kind
     state: Any
-    work: Any  # shape (8, states): rates of the seven stages, the state at the end of the step
+    # shape (9, states): rates of the seven stages, the state at the end of the step; rates that
+    # nobody keeps
+    work: Any
 
 
 @compiled
@@ -173,7 +213,7 @@ def slope_on_step(memory: Any, step: int, share: float, which: int) -> float:
 
 
 @compiled
-def surface(rock: Any, slope: float, memory: Any, angle: float) -> float:
+def surface(bit: Any, slope: float, memory: Any, angle: float) -> float:
     """Depth of the rock where the bit was at an angle, as it left it."""
     tape, begin = memory.tape, memory.now[2]
     while True:
@@ -189,7 +229,7 @@ def surface(rock: Any, slope: float, memory: Any, angle: float) -> float:
                 low = middle + 1
         if tape[low, 2] != 0.0:
             break
-        angle -= rock.between  # not cut then: as a blade before has left it
+        angle -= bit.between  # not cut then: as a blade before has left it
     a, b = tape[low, FIRST], tape[low, FIRST + 3]
     if angle >= b or b <= a:
         return tape[low, FIRST + 9]
@@ -233,44 +273,88 @@ class Contact(NamedTuple):
     top: Any  # torque of the drive (N m)
     spare: Any  # torque of the rock beyond what holds a bit that stands still (N m)
     cutting: Any  # force of the cutters (N)
+    hook: Any  # of hook and string (N)
 
 
 @compiled
-def _contact(task: Any, memory: Any, time: float, axial: int, turning: bool, x: Any) -> Contact:
-    rock, torsion, other, n = task.rock, task.torsion, task.axial, len(task.torsion.by_bit)
-    angle, _, place, _ = _bit(task, x, time)
-    drive = task.drive
-    top = (
-        drive.constant
-        - drive.kp * _dot(torsion.read[3], x, 0)
-        - drive.ki * _dot(torsion.read[2], x, 0)
+def _hook(task: Any, time: float, speed: float) -> float:
+    """Force of hook and string on the bit (N)."""
+    hook, nominal = task.hook, task.hook.nominal
+    if task.weight[0] != 0.0:
+        nominal *= 1.0 + path_at(task.weight, time)
+    return min(max(nominal + hook.gain * (speed - hook.set_speed), hook.least), hook.most)
+
+
+@compiled
+def _top(task: Any, time: float, turning: bool, torque: float, x: Any, rates: Any) -> float:
+    """Torque of the drive (N m), and rates of its memory; `torque` of the rock on a turning bit."""
+    drive, torsion = task.drive, task.torsion
+    angle, speed = _dot(torsion.read[2], x, 0), _dot(torsion.read[3], x, 0)
+    lead = path_at(task.speed, time)
+    if drive.kind == IDEAL:
+        angle -= path_integral(task.speed, time)
+        return drive.constant - drive.kp * (speed - lead) - drive.ki * angle
+    first = len(torsion.by_bit) + len(task.axial.by_bit)
+    memory = x[first : first + drive.states]
+    if drive.kind == SAMPLED:
+        given, seen, motor, impulse = answer_held(sampled_of(drive.numbers), memory, speed)
+        for i in range(drive.states):
+            rates[first + i] = 0.0
+        rates[first], rates[first + 4], rates[first + 8] = seen, motor, impulse
+        return given
+    assert drive.kind == CONTINUOUS
+    # Acceleration of the top without its torque, and per torque; a bit at rest holds its place.
+    by_top = _dot(torsion.read[3], torsion.by_top, 0)
+    by_bit = _dot(torsion.read[3], torsion.by_bit, 0)
+    at_bit = _dot(torsion.read[1], torsion.by_top, 0)
+    free = _free(torsion, 3, x, 0)
+    if turning:
+        free -= by_bit * torque
+    else:
+        free -= by_bit * _free(torsion, 1, x, 0) / task.hold[1]
+        by_top -= by_bit * at_bit / task.hold[1]
+    given, changes = answer(
+        real_of(drive.numbers), memory, speed, lead, speed + task.set_speed, (free, by_top)
     )
-    depth = place - surface(rock, task.slope, memory, angle - rock.between)
+    for i in range(drive.states):
+        rates[first + i] = changes[i]
+    return given
+
+
+@compiled
+def _contact(
+    task: Any, memory: Any, time: float, axial: int, turning: bool, x: Any, rates: Any
+) -> Contact:
+    rock, torsion, other, n = memory.rock, task.torsion, task.axial, len(task.torsion.by_bit)
+    angle, speed, place, _ = _bit(task, x, time)
+    depth = place - surface(task.bit, task.slope, memory, angle - task.bit.between)
     hard = hardness(task, time, angle, place, memory)
-    cut = rock.per_depth * hard * depth if axial != OFF else 0.0
+    cut = rock[PER_DEPTH] * hard * depth if axial != OFF else 0.0
+    hook = _hook(task, time, speed if turning else 0.0)
     share = 0.0
     if axial == DOWN:
         share = 1.0
     elif axial == STUCK:
-        share = (task.weight + _free(other, x, n) / task.hold[0] - cut) / rock.flat
+        share = (hook + _free(other, 1, x, n) / task.hold[0] - cut) / rock[FLAT]
     used = min(max(share, 0.0), 1.0) if axial == STUCK and not turning else share
-    force = cut + rock.flat * used
-    torque = rock.torque_per_depth * hard * (depth if axial != OFF else 0.0)
-    torque += rock.flat_torque * used
+    force = cut + rock[FLAT] * used
+    torque = rock[TORQUE_PER_DEPTH] * hard * (depth if axial != OFF else 0.0)
+    torque += rock[FLAT_TORQUE] * used
+    top = _top(task, time, turning, torque, x, rates)
     spare = 0.0
     if not turning:
         by_top = _dot(torsion.read[1], torsion.by_top, 0)
-        pull = (_free(torsion, x, 0) + by_top * top) / task.hold[1]
+        pull = (_free(torsion, 1, x, 0) + by_top * top) / task.hold[1]
         spare = torque - pull
         torque = pull
-    return Contact(depth, force, torque, share, top, spare, cut)
+    return Contact(depth, force, torque, share, top, spare, cut, hook)
 
 
 @compiled
-def _free(side: Any, x: Any, offset: int) -> float:
-    """Acceleration of the bit without torque or force of drive and rock."""
+def _free(side: Any, row: int, x: Any, offset: int) -> float:
+    """Acceleration of the bit (row 1), or of the top (3), without forces of drive and rock."""
     total = 0.0
-    read = side.read[1]
+    read = side.read[row]
     size = len(read)
     for i in range(size):
         if read[i] != 0.0:
@@ -287,9 +371,9 @@ def _rates(
 ) -> None:
     torsion, other = task.torsion, task.axial
     n, m = len(torsion.by_bit), len(other.by_bit)
-    now = _contact(task, memory, time, axial, turning, x)
+    now = _contact(task, memory, time, axial, turning, x, out)
     held, force = axial == STUCK, now.force
-    push = -_free(other, x, n) / task.hold[0] if held else task.weight - force
+    push = -_free(other, 1, x, n) / task.hold[0] if held else now.hook - force
     for i in range(n):
         rate = torsion.load[i] + torsion.by_top[i] * now.top - torsion.by_bit[i] * now.torque
         for j in range(n):
@@ -301,14 +385,14 @@ def _rates(
             rate += other.a[i, j] * x[n + j]
         out[n + i] = rate
     _, speed, _, sinking = _bit(task, x, time)
-    first = n + m
+    first = n + m + task.drive.states
     if held:
-        force, sinking = task.weight - push, 0.0
+        force, sinking = now.hook - push, 0.0
     out[first] = now.top * (_dot(torsion.read[3], x, 0) + task.set_speed)
-    out[first + 1] = task.weight * sinking + _dot(other.read[6], x, n)
+    out[first + 1] = now.hook * sinking + _dot(other.read[6], x, n)
     turned = 0.0 if not turning else speed
     flat = force - now.cutting
-    flat_torque = task.rock.flat_torque / task.rock.flat * flat if task.rock.flat > 0.0 else 0.0
+    flat_torque = memory.rock[FLAT_TORQUE] / memory.rock[FLAT] * flat
     out[first + 2] = now.cutting * sinking + (now.torque - flat_torque) * turned
     out[first + 3] = flat * sinking + flat_torque * turned
     loss = torsion.steady_loss + 2.0 * _dot(torsion.read[6], x, 0)
@@ -388,7 +472,7 @@ def _margins(task: Any, memory: Any, time: float, axial: int, turning: bool, x: 
     Returns what the rock does then.
     """
     _, speed, _, sinking = _bit(task, x, time)
-    now = _contact(task, memory, time, axial, turning, x)
+    now = _contact(task, memory, time, axial, turning, x, memory.work[8])
     out[0] = -now.depth if axial == OFF else now.depth
     out[1] = out[2] = 1.0
     if axial in (UP, DOWN):
@@ -433,7 +517,7 @@ def _note(memory: Any, kind: int) -> None:
 @compiled
 def _axial_phase(task: Any, memory: Any, time: float) -> int:
     """The phase of a bit that turns in contact, and neither rises nor sinks."""
-    share = _contact(task, memory, time, STUCK, True, memory.state).share
+    share = _contact(task, memory, time, STUCK, True, memory.state, memory.work[8]).share
     return DOWN if share > 1.0 else UP if share < 0.0 else STUCK
 
 
@@ -452,7 +536,7 @@ def _after(task: Any, memory: Any, which: int) -> None:
             count[0] = STUCK
         count[1] = 0
         _note(memory, STICK)
-        if not _contact(task, memory, time, count[0], False, x).spare < 0.0:
+        if not _contact(task, memory, time, count[0], False, x, memory.work[8]).spare < 0.0:
             return
     if which == 3:
         count[1] = 1
@@ -486,6 +570,37 @@ def _after(task: Any, memory: Any, which: int) -> None:
     _note(memory, AXIAL_SLIP)
 
 
+@compiled
+def _next_stop(task: Any, memory: Any) -> float:
+    """Time at which something jumps or bends next."""
+    stop = task.breaks[memory.count[4]]
+    if task.drive.kind == SAMPLED:
+        stop = min(stop, memory.count[5] * sampled_of(task.drive.numbers).period)
+    return stop
+
+
+@compiled
+def _turn_over(task: Any, memory: Any) -> None:
+    """Pass what is due now: a break, a sample of the drive."""
+    time, count, x = memory.now[0], memory.count, memory.state
+    close = 1e-12 * task.duration
+    while task.breaks[count[4]] <= time + close:
+        count[4] += 1
+        if time + close >= task.rock_until:
+            for i in range(4):
+                memory.rock[i] = task.rock[i]
+    if task.drive.kind == SAMPLED:
+        drive = sampled_of(task.drive.numbers)
+        if count[5] * drive.period <= time + close:
+            first = len(task.torsion.by_bit) + len(task.axial.by_bit)
+            speed = _dot(task.torsion.read[3], x, 0)
+            lead = path_at(task.speed, time)
+            after = sampled(drive, x[first:], speed, lead, speed + task.set_speed)
+            for i in range(9):
+                x[first + i] = after[i]
+            count[5] += 1
+
+
 def _advance(task: Any, memory: Any, most: int) -> int:
     """Advance a run by at most so many steps."""
     now, count, work = memory.now, memory.count, memory.work
@@ -496,14 +611,15 @@ def _advance(task: Any, memory: Any, most: int) -> int:
         time = now[0]
         if time >= task.duration * (1.0 - 1e-14):
             return DONE
+        _turn_over(task, memory)
         if count[2] + 2 >= len(memory.tape) or count[3] + 4 >= len(memory.events):
             return MORE
         axial, turning = count[0], count[1] != 0
         _rates(task, memory, time, axial, turning, memory.state, work[0])
         begin = _margins(task, memory, time, axial, turning, memory.state, margins[0])
         _, speed, _, _ = _bit(task, memory.state, time)
-        longest = REACH * task.rock.between / max(speed, task.set_speed)
-        h = min(now[1], longest, task.duration - time)
+        longest = REACH * task.bit.between / max(speed, task.set_speed)
+        h = min(now[1], longest, task.duration - time, _next_stop(task, memory) - time)
         if fresh:
             h = min(h, 1e-3 * longest)
         while True:
@@ -532,15 +648,16 @@ def _advance(task: Any, memory: Any, most: int) -> int:
                     break
             h = high
             _step(task, memory, time, h, axial, turning)
-            end = _contact(task, memory, time + h, axial, turning, work[7])
+            end = _contact(task, memory, time + h, axial, turning, work[7], work[8])
         row = memory.tape[count[2]]
         row[0], row[1], row[2] = time, h, 1.0 if axial != OFF else 0.0
         _ends(task, memory, row, 0, time, memory.state, work[0])
         _ends(task, memory, row, 3, time + h, work[7], work[6])
         row[LAST], row[LAST + 1] = begin.force, end.force
         row[LAST + 2], row[LAST + 3] = begin.torque, end.torque
-        row[LAST + 5] = max(begin.depth, 0.0) * task.rock.blades
-        row[LAST + 6] = max(end.depth, 0.0) * task.rock.blades
+        row[LAST + 5] = max(begin.depth, 0.0) * task.bit.blades
+        row[LAST + 6] = max(end.depth, 0.0) * task.bit.blades
+        row[LAST + 7], row[LAST + 8] = begin.top, end.top
         row[LAST + 4] = axial + (10.0 if turning else 0.0)
         if not turning:
             row[FIRST + 3], row[FIRST + 1], row[FIRST + 4] = row[FIRST], 0.0, 0.0
@@ -561,5 +678,7 @@ def _advance(task: Any, memory: Any, most: int) -> int:
     return MORE
 
 
-advance = on_disk(_advance, __file__)
+advance = on_disk(
+    _advance, __file__, program.__file__, real_drive.__file__, reference_rates.__file__
+)
 """Compiled, and kept on disk under a name that its source is part of."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctl.arrays import Array
+from drillctl.rig.top_drive import RealDrive
 from drillctl.simulation import cutting
 from drillctl.simulation import cutting_events as e
 from drillctl.simulation.measures import EnergyAudit, Event
@@ -141,7 +142,12 @@ class CuttingMotion:
         top_speed = self._values(TOP, time, slope=True)
         bit = self.bit_angle(time)
         spring, damper = design.string.element_stiffness[0], design.string.element_damping[0]
-        drive: Array = np.asarray(design.top_drive.torque(top, top_speed - speed)) + 0.0 * time
+        if isinstance(design.top_drive, RealDrive):
+            drive = self._between(e.LAST + 7, time)
+        else:
+            program = design.program.speed
+            led = np.array([[program.at(t), program.integral(t)] for t in time]).T
+            drive = design.top_drive.torque(top - led[1], top_speed - speed - led[0]) + 0.0 * time
         return {
             "top_speed": top_speed,
             "bit_speed": np.where(still, 0.0, self._values(ANGLE, time, slope=True)),

@@ -35,9 +35,9 @@ def njit(function: Any, cache: bool = True, **options: Any) -> Any:
     return made
 
 
-def on_disk(function: Any, source: str) -> Any:
-    """A function compiled with all that it calls in its file, which is part of its name on disk."""
-    version = hashlib.sha256(Path(source).read_bytes()).hexdigest()[:16]
+def on_disk(function: Any, *sources: str) -> Any:
+    """A function compiled with all that it calls in these files, which are part of its name."""
+    version = hashlib.sha256(b"".join(Path(one).read_bytes() for one in sources)).hexdigest()[:16]
     function.__name__ = function.__qualname__ = f"{function.__name__}_{version}"
     return njit(function, fastmath={"contract"}, nogil=True, error_model="numpy")
 

@@ -5,6 +5,7 @@ What a lane of the batch engine is: the numbers of one rig on a shared string.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +20,7 @@ from drillctl.rig.bit_rock import contact
 from drillctl.rig.bit_rock.variation import NoVariation, Variation
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.program import Program
+from drillctl.rig.top_drive import RealDrive
 from drillctl.rig.weight_on_bit import AlarmWeight
 from drillctl.rig.well.wall import Wall
 
@@ -29,42 +31,44 @@ Array = NDArray[np.float64]
 Kind = Literal["rest", "turning", "wound_up", "steady"]
 
 
+Shapes = tuple[tuple[Array, Array], ...]
+"""Shapes along the string, (nodes,), each with what it is to be multiplied with, (lanes,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Motion of the string at time zero: a shape along the string, times a number of each lane."""
+    """Motion of the string at time zero, in the frame."""
 
-    twist: Array  # shape (nodes,): Shape of the angles in the frame
-    # shape (lanes,): What it is to be multiplied with (rad, or N m where the shape is a
-    # compliance)
-    angle: Array
-    turn: Array  # shape (nodes,): Shape of the speeds in the frame
-    speed: Array  # shape (lanes,): What it is to be multiplied with (rad/s)
+    twists: Shapes  # angles (rad)
+    turns: Shapes  # speeds (rad/s)
 
     @property
     def angles(self) -> Array:
         """Angles of every node in the frame (rad), shape (nodes, lanes)."""
-        return np.outer(self.twist, self.angle)
+        return _outer(self.twists)
 
     @property
     def speeds(self) -> Array:
         """Speeds of every node in the frame (rad/s), shape (nodes, lanes)."""
-        return np.outer(self.turn, self.speed)
+        return _outer(self.turns)
 
 
-def start(
-    string: Drillstring, kind: Kind, set_speed: Array, turning_speed: Array, static_torque: Array
-) -> Start:
-    """Motion at time zero of a number of lanes."""
-    ones, none = np.ones(string.nodes), np.zeros(string.nodes)
-    if kind == "rest":
-        return Start(none, 0.0 * set_speed, ones, -set_speed)
-    if kind == "turning":
-        return Start(none, 0.0 * set_speed, ones, turning_speed - set_speed)
-    compliance = np.concatenate([[0.0], np.cumsum(1.0 / string.element_stiffness)])
-    return Start(compliance, -static_torque, compliance / compliance[-1], -set_speed)
+def _outer(shapes: Shapes) -> Array:
+    return functools.reduce(np.add, (np.outer(*pair) for pair in shapes))
+
+
+def rest_under_drag(string: Drillstring) -> Array:
+    """Angles per set speed with which the string carries its drag to ground; top at zero.
+
+    K rest = -g + e_top sum(g): in the coordinates u - rest Omega the whole drag acts at the
+    top, where the drive's torque acts too.
+    """
+    carried_below = string.ground_damping.sum() - np.cumsum(string.ground_damping)[:-1]
+    return np.concatenate([[0.0], -np.cumsum(carried_below / string.element_stiffness)])
 
 
 CUTTING_STEPS = 160.0  # fewest in a period of the cutting, and between two blades
+SETTLING_STEPS = 60.0  # fewest while the cutters relax against the pipe above the bit
 SPEEDS = 161  # speeds at which a slope is looked for, from rest to eight times the set speed
 
 
@@ -127,6 +131,48 @@ class Lanes:
         )  # fmt: skip
 
     @cached_property
+    def begin(self) -> Start:
+        """Motion at time zero."""
+        ones, none = np.ones(self.string.nodes), np.zeros(self.string.nodes)
+        if self.start == "rest":
+            return Start(((none, 0.0 * self.set_speed),), ((ones, -self.set_speed),))
+        if self.start == "turning":
+            turning = self.turning_speed - self.set_speed
+            return Start(((none, 0.0 * self.set_speed),), ((ones, turning),))
+        compliance = np.concatenate([[0.0], np.cumsum(1.0 / self.string.element_stiffness)])
+        rock = self.before if np.any(self.program.rock_until > 0.0) else self.friction
+        torque = rock.static_torque(self.weight_at_rest)
+        if self.start == "wound_up":
+            shape = compliance / compliance[-1]
+            return Start(((compliance, -torque),), ((shape, -self.set_speed),))
+        # The drive gives what rock and drag take: an ideal one by the angle that it has come to.
+        _, held = self.drive.gains()
+        held = np.broadcast_to(np.asarray(held, dtype=float), torque.shape)
+        held = np.where(isinstance(self.drive, RealDrive), 0.0, held)
+        top = np.where(held > 0.0, -self.begin_torque / np.where(held > 0.0, held, 1.0), 0.0)
+        speed, last = self.begin_speed, np.eye(self.string.nodes)[-1]
+        return Start(
+            ((compliance, -torque), (rest_under_drag(self.string), speed), (ones, top)),
+            ((ones, speed - self.set_speed), (last, self.bit_speed - speed)),
+        )
+
+    @property
+    def begin_speed(self) -> Array:
+        """Set speed at time zero (rad/s)."""
+        path = self.program.speed
+        late = getattr(path, "lag", 0.0) > 0.0
+        return self.set_speed + sum(
+            np.where((ramp.end > 0.0) | late, ramp.first, 0.0) for ramp in path.ramps
+        )
+
+    @property
+    def begin_torque(self) -> Array:
+        """Torque (N m) with which the drive drills steadily at time zero."""
+        rock = self.before if np.any(self.program.rock_until > 0.0) else self.friction
+        torque = rock.static_torque(self.weight_at_rest)
+        return np.asarray(torque + self.string.ground_damping.sum() * self.begin_speed)
+
+    @cached_property
     def steepest_fall(self) -> float:
         """Steepest falling slope of the rock in any lane (N m s/rad)."""
         steepest = max(self._steepest(rock) for rock in (self.friction, self.before))
@@ -142,10 +188,18 @@ class Lanes:
             delay = 2.0 * math.pi / (rock.blades * self.set_speed)
             stiffness = rock.blades * rock.force_per_depth
             swing = 2.0 * math.pi * np.sqrt(self.axial.total / stiffness)
-            return float(np.min(np.minimum(delay, swing))) / CUTTING_STEPS
+            followed = float(np.min(np.minimum(delay, swing))) / CUTTING_STEPS
+            if self.axial.impedance > 0.0:  # by itself, before a wave has come back
+                settles = float(np.min(self.axial.impedance / stiffness))
+                followed = min(followed, settles / SETTLING_STEPS)
+            rate = rock.rate(self.weight_at_rest, self.set_speed)
+            return min(followed, self._longest_on_rock(rate))
+        return self._longest_on_rock(0.0)
+
+    def _longest_on_rock(self, rate: float | Array) -> float:
         if isinstance(self.variation, NoVariation):
             return math.inf
-        return float(np.min(self.variation.longest_step(self.set_speed)))
+        return float(np.min(self.variation.longest_step(self.set_speed, rate)))
 
     def _steepest(self, rock: Any) -> float:
         if self.weight.moves:
@@ -210,7 +264,7 @@ def lane_numbers(design: Design) -> dict[str, float]:
     numbers["set_speed"] = design.speed
     numbers["turning_speed"] = design.speed if turning is None else turning
     alone = design.tables.start.bit_speed
-    numbers["bit_speed"] = design.speed if alone is None else alone
+    numbers["bit_speed"] = design.speed + program.speed.at(0.0) if alone is None else alone
     numbers["nominal_weight"] = design.tables.operating_point.weight_on_bit
     numbers["table_low"], numbers["table_high"] = design.table_range
     return numbers

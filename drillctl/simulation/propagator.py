@@ -39,7 +39,7 @@ from drillctl.simulation.kernels.string_step import (
     UndampedString,
     WallString,
 )
-from drillctl.simulation.lanes import Start
+from drillctl.simulation.lanes import Start, rest_under_drag
 
 Array = NDArray[np.float64]
 
@@ -115,18 +115,14 @@ class StringStep:
         `set_speed`, shape (lanes,), in rad/s. Shape by shape: the bits of a lane do not depend on
         how many there are, as those of a product of matrices may.
         """
-        twisted = self.angle_to_state @ start.twist
-        turning = self.speed_to_state @ start.turn
         at_rest = self.angle_to_state @ self.rest
-        return (
-            np.outer(twisted, start.angle)
-            + np.outer(turning, start.speed)
-            - np.outer(at_rest, set_speed)
-        )
+        parts = [np.outer(self.angle_to_state @ shape, x) for shape, x in start.twists]
+        parts += [np.outer(self.speed_to_state @ shape, x) for shape, x in start.turns]
+        return np.asarray(sum(parts[1:], parts[0]) - np.outer(at_rest, set_speed))
 
 
 @dataclass(frozen=True, eq=False)
-class _Modal:
+class Modal:
     """z' = A z + B [T_top, T_bit] of the modes carried, z = [modal angles, modal speeds].
 
     Rows of `signals` read top angle, bit speed, pipe torque, top speed and bit angle off z.
@@ -148,7 +144,7 @@ def string_step(
         frequency, shapes = string.undamped_modes
         left_out = _left_out(string, frequency[modes:], shapes[:, modes:])
         frequency, shapes = frequency[:modes], shapes[:, :modes]
-        rest = _rest(string)
+        rest = rest_under_drag(string)
         to_modal = shapes.T @ string.mass.toarray()
         if wall is None:
             kind, fields, basis = _stepped(string, frequency, shapes, step)
@@ -196,7 +192,7 @@ def _stepped(
         if result is not None:
             return UndampedString, *result
     modal = _modal(string, frequency, shapes)
-    result = _blocks(modal, step)
+    result = blocks(modal, step)
     if result is not None:
         return BlockString, *result
     return DenseString, *_dense(modal, step)
@@ -253,7 +249,7 @@ def _rubbed(
     return fields, inverse
 
 
-def _modal(string: Drillstring, frequency: Array, shapes: Array) -> _Modal:
+def _modal(string: Drillstring, frequency: Array, shapes: Array) -> Modal:
     n = len(frequency)
     damping = shapes.T @ (string.damping @ shapes)
     if string.classical:
@@ -274,17 +270,7 @@ def _modal(string: Drillstring, frequency: Array, shapes: Array) -> _Modal:
         [*zero, *shapes[0]],
         [*shapes[-1], *zero],
     ])  # fmt: skip
-    return _Modal(a, b, signals, string.classical, free)
-
-
-def _rest(string: Drillstring) -> Array:
-    """Angles per set speed with which the string carries its drag to ground; top at zero.
-
-    K rest = -g + e_top sum(g): in the coordinates u - rest Omega the whole drag acts at the
-    top, where the drive's torque acts too.
-    """
-    carried_below = string.ground_damping.sum() - np.cumsum(string.ground_damping)[:-1]
-    return np.concatenate([[0.0], -np.cumsum(carried_below / string.element_stiffness)])
+    return Modal(a, b, signals, string.classical, free)
 
 
 def _held(a: Array, b: Array, step: float) -> tuple[Array, Array]:
@@ -297,7 +283,7 @@ def _held(a: Array, b: Array, step: float) -> tuple[Array, Array]:
     return propagated[..., :states, :states], propagated[..., :states, states:]
 
 
-def _blocks(modal: _Modal, step: float) -> tuple[dict[str, Any], Array] | None:
+def blocks(modal: Modal, step: float) -> tuple[dict[str, Any], Array] | None:
     """Fields of a `BlockString` and the matrix from modal to block states; None if unfit."""
     result = _block_basis(modal)
     if result is None:
@@ -339,7 +325,7 @@ def _blocks(modal: _Modal, step: float) -> tuple[dict[str, Any], Array] | None:
     return fields, to_block.reshape(2 * count, -1)
 
 
-def _block_basis(modal: _Modal) -> tuple[Array, Array] | None:
+def _block_basis(modal: Modal) -> tuple[Array, Array] | None:
     """Basis of the modal states, by columns, in which A is 2 x 2 block-diagonal; its inverse."""
     states = len(modal.a)
     n = states // 2
@@ -370,7 +356,7 @@ def _real_columns(poles: Array, vectors: Array) -> Array:
     return np.array(columns).T
 
 
-def _dense(modal: _Modal, step: float) -> tuple[dict[str, Any], Array]:
+def _dense(modal: Modal, step: float) -> tuple[dict[str, Any], Array]:
     """Fields of a `DenseString`, whose states are the modal ones."""
     free, push = _held(modal.a, modal.b, step)
     s = modal.signals

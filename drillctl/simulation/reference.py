@@ -25,7 +25,7 @@ from drillctl.rig.bit_rock.variation import NoVariation, path
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight, ObservedWeight
-from drillctl.simulation.lanes import start
+from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.measures import EnergyAudit, Event
 
 STEPS = 1_000  # steps from one look at an interruption to the next: some milliseconds
@@ -464,16 +464,9 @@ def _variation_of(design: Design) -> tuple[dict[str, Any], Array]:
 
 def _start(design: Design, size: int, drive_states: int, weight_states: int) -> Array:
     """State at time zero; the weight's reading comes with the first look at it."""
-    from drillctl.simulation.lanes import single_lane
     from drillctl.simulation.reference_rates import WORKS
 
-    table, n = design.tables.start, design.string.nodes
-    turning = design.speed if table.speed is None else table.speed
-    rock: Any = design.bit_rock_before if design.program.rock_until > 0.0 else design.bit_rock
-    static = rock.static_torque(single_lane(design).weight_at_rest[0])
-    begin = start(
-        design.string, table.kind, *(np.array([x]) for x in (design.speed, turning, static))
-    )
+    n, begin = design.string.nodes, single_lane(design).begin
     state = np.zeros(size)
     state[:n], state[n : 2 * n] = begin.angles[:, 0], begin.speeds[:, 0]
     drive = state[2 * n + WORKS :][:drive_states]

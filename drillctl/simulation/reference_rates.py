@@ -125,8 +125,8 @@ TOP_ANGLE, TOP_SPEED, NEXT_ANGLE, NEXT_SPEED, BIT_ANGLE, BIT_SPEED, LAST_ANGLE =
 _ramp = from_numbers(Ramp)
 _ramp_at, _ramp_integral = jitted(Ramp.at), jitted(Ramp.integral)
 _late_at = jitted(Ramp.late_at)
-_real, _sampled = from_numbers(RealDrive), from_numbers(SampledDrive)
-_respond, _respond_held, _sample = jitted(respond), jitted(respond_held), jitted(sample)
+real_of, sampled_of = from_numbers(RealDrive), from_numbers(SampledDrive)
+answer, answer_held, sampled = jitted(respond), jitted(respond_held), jitted(sample)
 MEMORIES = (0, len(MEMORY), len(SAMPLED_MEMORY))  # numbers of memory of each kind of drive
 
 
@@ -432,7 +432,7 @@ def past(rig: Any, time: float) -> float:
 
 
 @compiled
-def _path_at(numbers: Any, time: float) -> float:
+def path_at(numbers: Any, time: float) -> float:
     """`Path.at`, or `Ramp.at` where zeros follow its numbers."""
     lag, total = numbers[3 * MOST_RAMPS], 0.0
     for k in range(0, 3 * MOST_RAMPS, 3):
@@ -444,7 +444,7 @@ def _path_at(numbers: Any, time: float) -> float:
 
 
 @compiled
-def _path_integral(numbers: Any, time: float) -> float:
+def path_integral(numbers: Any, time: float) -> float:
     """`Path.integral`, likewise."""
     lag, total = numbers[3 * MOST_RAMPS], 0.0
     for k in range(0, 3 * MOST_RAMPS, 3):
@@ -463,7 +463,7 @@ def _nominal(rig: Any, time: float) -> float:
     program = law(rig, WEIGHT_PROGRAM)
     if program[0] == 0.0:
         return law(rig, WEIGHT)[0]
-    return law(rig, WEIGHT)[0] * (1.0 + _path_at(program, time))
+    return law(rig, WEIGHT)[0] * (1.0 + path_at(program, time))
 
 
 @compiled
@@ -630,21 +630,21 @@ def drive_torque(rig: Any, time: float, state: Any, free: float, gain: float, ra
     n, numbers, program = rig.nodes, law(rig, DRIVE), law(rig, SPEED_PROGRAM)
     angle, speed, lead = state[0], state[n], 0.0
     if program[0] != 0.0:
-        lead = _path_at(program, time)
+        lead = path_at(program, time)
     if rig.drive_kind == IDEAL:
         if program[0] != 0.0:
-            angle -= _path_integral(program, time)
+            angle -= path_integral(program, time)
         return _drive_law(rig, numbers, angle, speed - lead, 0.0, 0.0)
     first = 2 * n + WORKS
     memory = state[first : first + rig.drive_states]
     if rig.drive_kind == CONTINUOUS:
-        torque, changes = _respond(
-            _real(numbers), memory, speed, lead, speed + rig.set_speed, (free, gain)
+        torque, changes = answer(
+            real_of(numbers), memory, speed, lead, speed + rig.set_speed, (free, gain)
         )
         for i in range(5):
             rates[first + i] = changes[i]
         return torque
-    torque, seen, motor, impulse = _respond_held(_sampled(numbers), memory, speed)
+    torque, seen, motor, impulse = answer_held(sampled_of(numbers), memory, speed)
     for i in range(rig.drive_states):
         rates[first + i] = 0.0
     rates[first], rates[first + 4], rates[first + 8] = seen, motor, impulse
@@ -656,8 +656,8 @@ def sample_drive(rig: Any, time: float, state: Any) -> None:
     """Let a sampled controller work."""
     n, first = rig.nodes, 2 * rig.nodes + WORKS
     speed, memory = state[n], state[first : first + rig.drive_states]
-    lead = _path_at(law(rig, SPEED_PROGRAM), time)
-    after = _sample(_sampled(law(rig, DRIVE)), memory, speed, lead, speed + rig.set_speed)
+    lead = path_at(law(rig, SPEED_PROGRAM), time)
+    after = sampled(sampled_of(law(rig, DRIVE)), memory, speed, lead, speed + rig.set_speed)
     for i in range(9):
         memory[i] = after[i]
 

@@ -157,31 +157,40 @@ def observer_step(observer: Observer | None, step: float, start: Start) -> Any:
     augmented[n + 1, n + 2] = 1.0
     propagated = scipy.linalg.expm(augmented)
     by_end = propagated[:n, n + 2]
-    still = np.zeros_like(start.turn)
+    still = np.zeros(len(start.twists[0][0]))
     return ObserverStep(
         np.ascontiguousarray(propagated[:n, :n]),
         np.ascontiguousarray(propagated[:n, n]),
         np.ascontiguousarray(propagated[:n, n + 1] - by_end),
         np.ascontiguousarray(by_end),
         np.ascontiguousarray(observer.read),
-        np.outer(observer.state(start.twist, still), start.angle)
-        + np.outer(observer.state(still, start.turn), start.speed),
+        np.asarray(
+            sum(
+                [np.outer(observer.state(shape, still), x) for shape, x in start.twists]
+                + [np.outer(observer.state(still, shape), x) for shape, x in start.turns]
+            )
+        ),
     )
 
 
-def variation_step(variation: Any, duration: float, set_speed: Array) -> Any:
-    """The kernel's form of a rock that varies along the way, with its paths."""
+def variation_step(
+    variation: Any, duration: float, set_speed: Array, rate: float | Array = 0.0
+) -> Any:
+    """The kernel's form of a rock that varies along the way, with its paths.
+
+    `rate`: of penetration (m/s) of a bit that drills by itself.
+    """
     from drillctl.simulation.kernels.variation_step import SameRock, VariationStep
 
     if isinstance(variation, NoVariation):
         return SameRock(np.zeros(1))
-    nodes = int(np.max(variation.nodes(duration, set_speed)))
+    nodes = int(np.max(variation.nodes(duration, set_speed, rate)))
     table, row = paths(variation, nodes)
     begin, last = row * float(nodes), np.array([nodes - 2.0])
     per_spacing = 1.0 / variation.spacing
     return VariationStep(
-        table.ravel(), last, begin, variation.advance, variation.turns, per_spacing,
-        variation.spread,
+        table.ravel(), last, begin, variation.advance, variation.turns, variation.sinks,
+        per_spacing, variation.spread,
     )  # fmt: skip
 
 

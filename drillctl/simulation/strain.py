@@ -14,7 +14,7 @@ import scipy.linalg
 
 from drillctl.arrays import Array
 from drillctl.design import Design
-from drillctl.simulation.lanes import single_lane, start
+from drillctl.simulation.lanes import single_lane
 
 
 def section_peaks(design: Design, time: Array, signals: dict[str, Array]) -> dict[str, float]:
@@ -45,9 +45,7 @@ def _modal_motion(design: Design, time: Array, signals: dict[str, Array]) -> tup
     string = design.string
     frequency, shapes = string.undamped_modes
     frequency, shapes = frequency[1:], shapes[:, 1:]
-    lanes = single_lane(design)
-    static = lanes.before.static_torque(lanes.weight_at_rest)
-    begin = start(string, lanes.start, lanes.set_speed, lanes.turning_speed, static)
+    begin = single_lane(design).begin
     q = shapes.T @ (string.mass @ begin.angles[:, 0])
     v = shapes.T @ (string.mass @ begin.speeds[:, 0])
     force = np.outer(signals["top_torque"], shapes[0])

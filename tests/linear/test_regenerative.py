@@ -81,6 +81,21 @@ def test_mobility_of_coupled_dampers_is_that_of_the_matrices():
         assert found == pytest.approx(np.linalg.inv(dynamic)[-1, -1], rel=1e-9)
 
 
+@pytest.mark.parametrize(("top", "share"), [("force", 0.0), ("velocity", 0.5)])
+def test_a_string_of_elements_is_a_rod(top, share):
+    """Frequencies and mobility of a uniform rod, free or held at the top, in closed form."""
+    spring, mass, count = 8e5, 8e4, 60
+    each = np.full(count, spring * count), np.full(count, mass / count)
+    string = axial_string(AxialTable(model="elements", top=top), *each, consistent=True)
+    travel, impedance = math.sqrt(mass / spring), math.sqrt(mass * spring)
+    exact = (np.arange(1, 6) - share) * math.pi / travel
+    assert string.modes[0][1:6] == pytest.approx(exact, rel=(5 * math.pi / count) ** 2 / 20)
+    s = np.array([0.4 + 3.0j, 0.9 + 11.0j])
+    answer = 1.0 / np.tanh(s * travel) if top == "force" else np.tanh(s * travel)
+    assert axial_mobility(string, s) == pytest.approx(answer / impedance, rel=2e-3)
+    assert string.impedance == pytest.approx(impedance)
+
+
 def test_a_loop_with_this_bit_tells_its_roots(design):
     result = drillctl.loop(design)
     assert not result.stable

@@ -71,7 +71,7 @@ def run_steps(*arguments):
 def by_kernel(string: Drillstring, angle, speed, torques, modes=999):
     """Top speed and bit angle after each step, in lane 0."""
     stepper = string_step(string, STEP, modes)
-    z = stepper.state(Start(angle, np.ones(1), speed, np.ones(1)), np.zeros(1))[:, 0]
+    z = stepper.state(Start(((angle, np.ones(1)),), ((speed, np.ones(1)),)), np.zeros(1))[:, 0]
     state = np.zeros((2 * len(z), r.WIDTH))
     state[: len(z), 0] = z
     seen = np.zeros((len(torques), 2))
@@ -221,7 +221,7 @@ def test_a_free_undamped_string_keeps_its_energy(seed, steps):
     random = np.random.default_rng(seed)
     angle, speed = random.normal(size=(2, string.nodes))
     stepper = string_step(string, STEP, 999)
-    z = stepper.state(Start(angle, np.ones(1), speed, np.ones(1)), np.zeros(1))[:, 0]
+    z = stepper.state(Start(((angle, np.ones(1)),), ((speed, np.ones(1)),)), np.zeros(1))[:, 0]
     state = np.zeros((2 * len(z), r.WIDTH))
     state[: len(z), 0] = z
     flat = state.ravel()

@@ -14,7 +14,7 @@ from drillctl.design import Design
 from drillctl.linear.observer import observer_of
 from drillctl.rig.bit_rock import contact
 from drillctl.rig.drillstring import Drillstring
-from drillctl.simulation.lanes import start
+from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.limit_cycle.flow import LONGEST_STEP, ending
 from drillctl.simulation.phases import Phase, slip_phase, stick_phase
 
@@ -80,23 +80,12 @@ class System:
 
     def start(self, design: Design) -> Array:
         """State at time zero."""
-        table = design.tables.start
-        turning = design.speed if table.speed is None else table.speed
-        static = self.rock(0.0).static_torque(self.weight_at_rest(design))
-        numbers = (np.array([x]) for x in (design.speed, turning, static))
-        begin = start(self.string, table.kind, *numbers)
+        begin = single_lane(design).begin
         angle, speed = begin.angles[:, 0], begin.speeds[:, 0]
         bit = float(speed[-1]) + self.set_speed
         memories = (self.drive.start(float(speed[0])), self.weight.start(bit, angle, speed))
         self._begin = np.concatenate([angle, speed, np.zeros(WORKS), *memories])
         return self._begin
-
-    def weight_at_rest(self, design: Design) -> float:
-        """Weight on a bit at rest at time zero (N)."""
-        still = np.zeros(self.nodes)
-        memory = self.weight.start(0.0, still, still - self.set_speed)
-        first = Moment(0.0, 0.0, lambda time: np.zeros_like(np.asarray(time, dtype=float)))
-        return float(self.weight.law(first, memory).weight(0.0))
 
     def rock(self, time: float) -> Any:
         """Bit-rock law of the moment."""

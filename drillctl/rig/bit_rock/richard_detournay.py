@@ -12,6 +12,7 @@ the rock of steady drilling, whose torque does not depend on speed.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal, NamedTuple
 
 from drillctl.rig import table as q
@@ -80,6 +81,10 @@ class RichardDetournay(NamedTuple):
         over = weight - self.flat_force
         return 0.5 * (over + abs(over)) / self.force_per_depth
 
+    def rate(self, weight: Any, speed: Any) -> Any:
+        """Steady rate of penetration (m/s)."""
+        return self.depth_of_cut(weight) / (2.0 * math.pi) * speed
+
     def static_torque(self, weight: Any) -> Any:
         """Torque on a bit that stands as it drilled (N m)."""
         depth = self.depth_of_cut(weight)
@@ -139,6 +144,7 @@ LAWS = (
                 RichardDetournay,
                 keys='`law = "richard-detournay"` (blades, radius, intrinsic_energy, zeta, '
                 "wear_flat_length, contact_stress, gamma, mu), `[axial]`",
+                sliding=("intrinsic_energy", "contact_stress"),
                 use="Where stick-slip comes from the cutting and not from a falling torque.",
             ),
         ),

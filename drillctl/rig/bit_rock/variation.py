@@ -131,9 +131,9 @@ class Variation(NamedTuple):
         way = duration * (self.advance + AHEAD * (self.turns * set_speed + self.sinks * rate))
         return np.ceil(way / self.spacing).astype(int) + 2
 
-    def longest_step(self, set_speed: Any) -> Any:
-        """Longest step (s) that sees every node, at twice the set speed too."""
-        return self.spacing / (self.advance + 2.0 * self.turns * set_speed)
+    def longest_step(self, set_speed: Any, rate: Any = 0.0) -> Any:
+        """Longest step (s) that sees every node, at twice the set speed and `rate` (m/s) too."""
+        return self.spacing / (self.advance + 2.0 * (self.turns * set_speed + self.sinks * rate))
 
 
 def variation_of(table: VariationTable | None, rate: float, seed: int) -> Variation | NoVariation:

@@ -27,6 +27,15 @@ from drillctl.simulation.kernels.arithmetic import (
     least,
     load_block,
 )
+from drillctl.simulation.kernels.cutting_step import (
+    FORCE,
+    begin_cutting,
+    conclude_cutting,
+    cut_rock,
+    cuts,
+    numbers_of,
+    sample_cutting,
+)
 from drillctl.simulation.kernels.drive_step import (
     begin_drive,
     eliminate,
@@ -108,6 +117,9 @@ class Clock(NamedTuple):
     sampling: int  # steps from one sample of the controller to the next; 0 for a continuous one
     remembered: int  # steps whose signals a weight law may ask for; 0 if none does
     estimated: int  # states of the observer; 0 without one
+    # of a bit that cuts its own wake: rows of its memory, points of the surface behind it; else 0
+    cutting: int
+    surface: int
     give_up: float  # J1 (s) over which nothing more is asked of a lane; infinite for none
 
 
@@ -115,7 +127,7 @@ def _load(
     string: Any, friction: Any, drive: Any, weight: Any, speed: Any, work: Any, first: Any
 ) -> None:
     """Numbers of the laws and of the lanes."""
-    load_block(friction, work, r.FRICTION, first)
+    load_block(numbers_of(friction), work, r.FRICTION, first)
     load_block(drive, work, r.DRIVE, first)
     load_block(weight, work, r.WEIGHT, first)
     set_speed = at(speed[0], first)
@@ -161,7 +173,10 @@ def _begin(
     begin_drive(drive, string, work, 1.0 / clock.step)
     begin_weight(weight, observer, work, memory, first)
     begin_variation(variation, work, first)
-    _begin_rock(friction, weight, program, variation, work)
+    if cuts(friction):
+        begin_cutting(friction, drive, weight, variation, work, memory, first)
+    else:
+        _begin_rock(friction, weight, program, variation, work)
     begin_wall(string, room, work)
     begin_measures(work, top_torque_now(drive, work, at(work, r.TOP_SPEED)))
 
@@ -176,8 +191,9 @@ def _look_around(string: Any, room: Any, state: Any, work: Any) -> None:
 
 
 def _sample(
-    string: Any, drive: Any, work: Any, room: Any, pipe: Any, traces: Any, sample: int, first: Any
-) -> None:
+    string: Any, friction: Any, drive: Any, work: Any, memory: Memory, room: Any, pipe: Any,
+    traces: Any, sample: int, first: Any,
+) -> None:  # fmt: skip
     """Store one sample of every lane; speeds and angles were seen before the pass."""
     set_speed, top_speed = at(work, r.SET_SPEED), at(work, r.SEEN_TOP)
     stuck = at(work, r.DIRECTION) == 0.0
@@ -191,7 +207,9 @@ def _sample(
     put(signals[5], first, pick(stuck, at(work, r.BIT_TORQUE), sliding))
     put(signals[6], first, pick(stuck, 1.0, 0.0))
     put(signals[7], first, top_torque_now(drive, work, top_speed))
-    put(signals[8], first, at(work, r.LOAD))
+    put(signals[8], first, at(memory.cutting, FORCE) if cuts(friction) else at(work, r.LOAD))
+    if cuts(friction):
+        sample_cutting(work, signals, len(TRACED), first)
     sample_wall(string, room, signals, len(TRACED), first)
 
 
@@ -240,36 +258,42 @@ def _step(
 ) -> None:  # fmt: skip
     """One step of some lanes of a block; of the one after the last only what it begins with."""
     n, step, rate = now.n, clock.step, 1.0 / clock.step
-    advance_program(program, friction, weight, variation, work, first, n * step, step)
+    advance_program(program, numbers_of(friction), weight, variation, work, first, n * step, step)
     with when(now.traced):
         _look_around(string, room, state, work)
     if has_wall(string):
         foreseen = None
         swing = pass_with_wall(string, drive, observer, room, state, work)
     else:
-        foreseen = foresee(friction, weight, program, variation, work)
+        foreseen = None if cuts(friction) else foresee(friction, weight, program, variation, work)
         swing = complete_and_propagate(string, drive, observer, room, state, work)
     put(work, r.PIPE, swing.pipe)
     with when(now.traced):
-        _sample(string, drive, work, room, swing.pipe, traces, now.sample, first)
+        _sample(string, friction, drive, work, memory, room, swing.pipe, traces, now.sample, first)
     with when(n < clock.steps):
         sample_drive(drive, work, now.sampled)
         raise_weight(weight, program, work, memory, n, step)
         hold_rock(friction, weight, program, work)
         advance_variation(variation, work, first, n * step, step)
         was = Before(at(work, r.BIT_SPEED), at(work, r.TOP_SPEED), at(work, r.LOAD))
-        law = varied(rock(friction, weight, program, work), variation, work)
-        swing = rub(string, drive, program, weight, law, swing, room, work, rate)
-        reduced = eliminate(drive, program, string, swing, work, rate)
-        law = walled(string, law, room)
-        outcome = meet_rock(law, weight, reduced, foreseen, work, now.slot)
+        if cuts(friction):
+            reduced = eliminate(drive, program, string, swing, work, rate)
+            outcome = cut_rock(friction, weight, program, variation, reduced, work, memory, step)
+        else:
+            law = varied(rock(friction, weight, program, work), variation, work)
+            swing = rub(string, drive, program, weight, law, swing, room, work, rate)
+            reduced = eliminate(drive, program, string, swing, work, rate)
+            law = walled(string, law, room)
+            outcome = meet_rock(law, weight, reduced, foreseen, work, now.slot)
         _conclude(string, drive, observer, swing, reduced, outcome, work)
         follow_wall(string, room, work, step)
-        turn_variation(variation, work, was.bit_speed, step)
+        if not cuts(friction):
+            turn_variation(variation, work, was.bit_speed, step)
         move_load(weight, program, work)
         follow_drive(drive, work, was.top_speed, rate)
         follow_weight(weight, observer, work, memory, was, n, step)
-        measure_load(weight, program, work, was, outcome, step)
+        if not cuts(friction):
+            measure_load(weight, program, work, was, outcome, step)
         note(work, now.slot, outcome, swing.pipe)
 
 
@@ -284,9 +308,14 @@ def _advance_block(
     ring = r.ROWS * WIDTH + 2 * WIDTH * start.shape[0]
     estimate = ring + clock.remembered * WIDTH
     moved = estimate + clock.estimated * WIDTH
-    read = moved + clock.estimated * WIDTH
+    cutting = moved + clock.estimated * WIDTH
+    surface = cutting + clock.cutting * WIDTH
+    read = surface + 2 * clock.surface * WIDTH
     work, state = kept[: r.ROWS * WIDTH], kept[r.ROWS * WIDTH : ring]
-    memory = Memory(kept[ring:estimate], kept[estimate:moved], kept[moved:read])
+    memory = Memory(
+        kept[ring:estimate], kept[estimate:moved], kept[moved:cutting], kept[cutting:surface],
+        kept[surface:read],
+    )  # fmt: skip
     room = kept[read:]
     with loop(kept.shape[0] // WIDTH) as rows:
         put(kept, rows.index * WIDTH, 0.0)
@@ -328,7 +357,10 @@ def _advance_block(
             chunks.leave()
     conclude(work, clock.step)
     conclude_bands(work, clock.steps * clock.step)
-    conclude_load(weight, program, work, clock.steps * clock.step)
+    if cuts(friction):
+        conclude_cutting(work)
+    else:
+        conclude_load(weight, program, work, clock.steps * clock.step)
     conclude_wall(string, room, work)
     for measured in range(r.MEASURES):
         put(measures[measured], first, at(work, r.FIRST_MEASURE + measured * WIDTH))

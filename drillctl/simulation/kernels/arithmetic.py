@@ -56,6 +56,16 @@ def gather(work: Array, places: Row) -> Row:
     return Row(result)
 
 
+def scatter(work: Array, places: Row, row: Row) -> None:
+    """Store one element of a flat array a lane; `places` holds whole numbers."""
+    whole = builder().fptosi(places.ir, vector(INTEGER))
+    for lane in range(lanes()):
+        index = ir.Constant(ir.IntType(32), lane)
+        address = builder().gep(work.data, [builder().extract_element(whole, index)])
+        element = builder().extract_element(row.ir, index)
+        builder().store(element, address, align=DOUBLE_BYTES)
+
+
 def any_of(condition: Mask) -> Truth:
     """Whether a condition holds in some lane."""
     bits = builder().bitcast(condition.ir, ir.IntType(lanes()))

@@ -158,11 +158,12 @@ def _turn(
     _set_nominal(law, work, now)
     direction, speed = at(work, r.DIRECTION), abs(at(work, r.BIT_SPEED))
     load = acting(weight, work)
-    rock = varied(law_at(friction, work, r.FRICTION), variation, work)
-    torque, slope = contact(rock, load, speed, exp)
-    turning = direction != 0.0
-    put(work, r.KINETIC, pick(turning, torque, at(work, r.KINETIC)))
-    put(work, r.SLOPE, pick(turning, slope, at(work, r.SLOPE)))
+    if hasattr(friction, "torque_and_slope"):  # else it is one of the rock that it cuts
+        rock = varied(law_at(friction, work, r.FRICTION), variation, work)
+        torque, slope = contact(rock, load, speed, exp)
+        turning = direction != 0.0
+        put(work, r.KINETIC, pick(turning, torque, at(work, r.KINETIC)))
+        put(work, r.SLOPE, pick(turning, slope, at(work, r.SLOPE)))
     put(work, r.LOAD, load.weight(speed))
     put(work, r.REST_END, load.weight(speed * 0.0))
 

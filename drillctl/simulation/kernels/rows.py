@@ -85,6 +85,8 @@ HELD = _next(4)  # `rock_step.HeldRock` at the weights of this step, or of all
 FACTOR = _next()  # of its torques at the end of the step
 FACTOR_MEAN = _next()  # on the mean over it
 TURNED = _next()  # angle of the bit since time zero, rad
+SUNK = _next()  # depth that it has drilled since, m, and its rate, m/s: none without axial motion
+SINKING = _next()
 
 # Torques of the step just taken, applied to the string by the next pass.
 TOP_TORQUE = _next()  # net of DRAG, N m
@@ -174,6 +176,12 @@ AT_POWER_LIMIT = _next()
 OVER_CONTINUOUS = _next()
 PEAK_POWER = _next()  # W
 WALL_WORK = _next()  # taken by the wall, J
+# of axial motion; m, m s, s, s
+DRILLED = _next()
+CUT_SUM = _next()
+AXIAL_STUCK = _next()
+OFF_BOTTOM = _next()
+AXIAL_WORK = _next()  # J; in `WORK` at the end
 BOUND = _next()  # J1 of a lane that was found over the level at which lanes are given up; else 0
 
 ROWS = _taken

@@ -25,11 +25,12 @@ class VariationStep(NamedTuple):
 
     table: Any  # shape (paths x nodes,): X, path after path
     last: Any  # shape (1,): number of the last node but one
-    # shape (lanes,): where the path of a lane begins; way per time and per angle, nodes per way;
-    # standard deviation of the logarithm
+    # shape (lanes,): where the path of a lane begins; way per time, per angle and per depth of a
+    # bit that drills by itself, nodes per way; standard deviation of the logarithm
     begin: Any
     advance: Any
     turns: Any
+    sinks: Any
     per_spacing: Any
     spread: Any
 
@@ -93,6 +94,8 @@ def advance_variation(variation: Any, work: Any, first: Any, begin: Any, step: A
     turned = at(work, r.TURNED)
     ahead = turned + 0.5 * step * (3.0 * speed - before)
     way = at(variation.advance, first) * (begin + step) + at(variation.turns, first) * ahead
+    deep = at(work, r.SUNK) + step * at(work, r.SINKING)
+    way = way + at(variation.sinks, first) * deep
     factor = _factor(variation, way, first)
     put(work, r.FACTOR_MEAN, 0.5 * (at(work, r.FACTOR) + factor))
     put(work, r.FACTOR, factor)

@@ -104,10 +104,13 @@ class Memory(NamedTuple):
     # shape (states x WIDTH,): States of the observer, and room for them
     estimate: Any
     moved: Any
+    cutting: Any  # rows of `cutting_step`
+    surface: Any  # rings of it, a lane after the other: shape (2 x points x WIDTH,)
 
     def part(self, first: Any) -> Memory:
-        """The same from a lane on."""
-        return Memory(*(Array(rows.address(first), rows.shape) for rows in self))
+        """The same from a lane on; each lane knows where its ring begins."""
+        parts = [Array(rows.address(first), rows.shape) for rows in self[:-1]]
+        return Memory._make([*parts, self.surface])
 
 
 def has_memory(weight: Any) -> bool:
