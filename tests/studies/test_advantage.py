@@ -449,7 +449,6 @@ def test_pictures_show_the_figures(result):
 @pytest.mark.parametrize(
     ("name", "values", "message"),
     [
-        (SHIPPED, {"controller.law": "soft-torque"}, "'soft-torque' is not compared here"),
         (SHIPPED, {"advantage.set": {"weight_on_bit.law": "stick-slip-alarm"}},
          "does not follow the bit speed; allowed: navarro-lopez-suarez"),
         (SHIPPED, {"advantage.weights": ["70 kN"]}, "advantage.weights: .*70 kN"),
@@ -465,12 +464,19 @@ def test_pictures_show_the_figures(result):
          {"tune.parameters": {"controller.kp": {"min": 0.0, "max": 9.0}}},
          "controller.ki has no bounds"),
         (SHIPPED, {"tune.weights.effort": 1.0}, "effort of the drive is not measured"),
-        ("uncertain-string-140kn", {}, "uncertain.operating_point.weight_on_bit"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_compared_is_refused(name, values, message):
     with pytest.raises(InputError, match=message):
         advantage(drillctl.load(name, **values))
+
+
+def test_what_the_study_does_not_take_is_left_out_and_told(design):
+    soft = policies(design.replace({"controller.law": "soft-torque"}))
+    assert {one.design.tables.controller.law for one in soft} == {"pi"}
+    drawn = drillctl.load("uncertain-string-140kn")
+    left = policies(drawn).constant.design.tables.uncertain
+    assert set(drawn.tables.uncertain) - set(left) == {"operating_point.weight_on_bit"}
 
 
 def test_equal_shift_at_the_edge_of_the_table_is_extrapolated(design):

@@ -206,6 +206,18 @@ def remarks(result: Advantage, system: units.System) -> Iterator[str]:
             yield f"{case.name}: not equal, off by {case.off:.1%} at the nearest nominal weight."
 
 
+def notes(result: Advantage) -> Iterator[str]:
+    """What of the design the study does not take."""
+    from drillctl.studies.advantage.cases import SET
+
+    law = result.design.tables.controller.law
+    if law != "pi":
+        yield f"the law of the drive is {law}: a PI is compared in its place"
+    for path in SET:
+        if path in result.design.tables.uncertain:
+            yield f"{path} is set by the study, and not drawn"
+
+
 def check(design: Design) -> None:
     """Refuse what the study would refuse in the midst of its work."""
     if "advantage" in design.tree:

@@ -39,6 +39,7 @@ from drillctl.studies.tune.tuned import Tuned, put, tuned_parameters
 KP, KI = "controller.kp", "controller.ki"
 DELAY = LAW + "path.delay"
 WEIGHT, SPEED = "operating_point.weight_on_bit", "operating_point.speed"
+SET = (WEIGHT, SPEED)  # what the study runs over
 CONSTANT, IDEAL, REAL = "constant weight", "dynamic, ideal path", "dynamic, real path"
 """Names of the policies."""
 AT_BOUND = 1e-3  # over the width of the bounds: gains nearer to one are on it
@@ -89,11 +90,7 @@ class Policies(NamedTuple):
 def policies(design: Design) -> Policies:
     """The policies of a design's `[advantage]` table."""
     # A gain that may only be zero is a constant weight: all three are the same then.
-    if design.tables.controller.law != "pi":
-        raise InputError(
-            f"{design.tables.controller.law!r} is not compared here; allowed: pi",
-            design.where("controller.law"),
-        )
+    design = studied(design)
     if design.tables.tune.weights.effort > 0.0:
         raise InputError("the effort of the drive is not measured in this study",
                          design.where("tune.weights.effort"))  # fmt: skip
@@ -108,8 +105,21 @@ def policies(design: Design) -> Policies:
     return Policies(bare, Policy(IDEAL, ideal, tuned), Policy(REAL, real, tuned))
 
 
+def studied(design: Design) -> Design:
+    """The design with a PI in its drive, and without draws of what the study itself sets."""
+    if design.tables.controller.law != "pi":
+        string = design.string
+        gains = {KP: string.drive_damper, KI: string.drive_spring}  # both are searched
+        design = design.replace({"controller.law": "pi", **gains})
+    drawn = {path: one for path, one in design.tree.get("uncertain", {}).items() if path not in SET}
+    if len(drawn) == len(design.tree.get("uncertain", {})):
+        return design
+    tree = {**design.tree, "uncertain": drawn}
+    return Design(design.name, validated(tree, design.origin), tree, design.origin)
+
+
 def _refuse_drawn(design: Design) -> None:
-    for path in (WEIGHT, SPEED, KP, KI):
+    for path in (KP, KI):
         if path in design.tables.uncertain:
             raise InputError("is what the study sets and cannot be drawn",
                              design.where(f"uncertain.{path}"))  # fmt: skip

@@ -494,8 +494,9 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
     Parameters
     ----------
     design : Design
-        With a PI controller. Its `[advantage]` table gives law and path of the weight, what is
-        run over and how many draws.
+        A PI is put in the place of another drive law; a weight on bit and a speed that are
+        uncertain keep their nominal values. Its `[advantage]` table gives law and path of the
+        weight, what is run over and how many draws.
     progress : Progress
         Receives finished searches.
 
@@ -507,7 +508,7 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
     Raises
     ------
     InputError
-        A controller or weight law that is not compared, a weight or speed outside what the rock or
+        A weight law that is not compared, a weight or speed outside what the rock or
         the limits of the law allow, impossible bounds, or something drawn that the study sets.
 
     Notes
