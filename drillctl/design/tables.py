@@ -295,8 +295,9 @@ class TopDriveTable(Table):
     limits are of one motor, or at the pipe. From motor to pipe torque counts `motors gear_ratio
     efficiency` times, speed one over `gear_ratio` times. `torque_speed`: points [speed, torque] of
     constant torque, then constant power, up to the maximum speed, beyond which the torque falls to
-    zero over a tenth of it. `intermittent_torque` limits the torque as well; `continuous_torque` is
-    measured against. Narrower limits of `[controller.drive]` hold.
+    zero over a tenth of it; of other points the largest such curve under them.
+    `intermittent_torque` limits the torque as well; `continuous_torque` is measured against.
+    Narrower limits of `[controller.drive]` hold.
     """
 
     inertia: q.Inertia | None = None

@@ -18,6 +18,7 @@ from drillctl.rig.drillstring import Drillstring, Parts
 from drillctl.rig.drillstring.frequencies import followed
 from drillctl.rig.drillstring.mesh import off_the_line
 from drillctl.rig.top_drive import TopDriveLaw
+from drillctl.rig.top_drive.law import OFF_THE_CURVE
 from drillctl.rig.weight_on_bit import PATHS
 
 CHATTER = 0.03  # damping ratio that the rock may take from the fastest modes at the bit
@@ -75,6 +76,7 @@ def warnings_of(
         _assumed_rock(tables),
         _varying_rock(tables),
         _weak_drive(tables, rock.static_torque(at_rest)),
+        _drive_curve(tables),
         _growing(string, parts, -float(slope), drive, tables.simulation.duration),
         _light_bit(parts, fall),
         _mesh(parts),
@@ -134,6 +136,19 @@ def _weak_drive(tables: DesignTables, static: float) -> DesignWarning | None:
         f"the bit, {units.full(static, 'N*m')}: once stuck it cannot be freed (status stalled)",
         key,
         f"more than {units.full(static, 'N*m')}",
+    )
+
+
+def _drive_curve(tables: DesignTables) -> DesignWarning | None:
+    """Points of a motor that no constant torque and constant power go through."""
+    share, speed = tables.top_drive.limits.lost
+    if share <= OFF_THE_CURVE:
+        return None
+    return DesignWarning(
+        f"the torque-speed curve counts as constant torque, then constant power, under its points: "
+        f"{share:.0%} less than that at {units.full(speed, 'rad/s')} of the pipe",
+        "top_drive.torque_speed",
+        "points of one constant torque and one constant power",
     )
 
 

@@ -59,6 +59,16 @@ def test_the_curve_is_constant_torque_then_power_then_nothing():
     assert curve_limits([(5.0, 3.0), (10.0, 3.0), (10.5, 0.0)]).speed == 10.0
 
 
+def test_other_points_count_as_the_largest_curve_under_them():
+    design = of_limits(limits_at="pipe", torque_speed=KINKED)
+    drive = design.top_drive
+    assert (drive.most, drive.power) == (9e3, pytest.approx(4e3 * 200 * RPM))
+    (said,) = (one for one in design.warnings if one.key == "top_drive.torque_speed")
+    assert "33% less than that at 150 rpm" in said.said("si")
+    rounded = of_limits(limits_at="pipe", torque_speed=[*CURVE[:2], ["150 rpm", "5.5 kN*m"]])
+    assert not [one for one in rounded.warnings if one.key == "top_drive.torque_speed"]
+
+
 def test_the_narrower_limit_holds():
     design = of_limits(limits_at="pipe", intermittent_torque="30 kN*m")
     assert design.top_drive.most == 30e3
@@ -80,7 +90,6 @@ SLOW = [["0 rpm", "20 kN*m"], ["90 rpm", "20 kN*m"]]
         ({"top_drive.intermittent_torque": "30 kN*m"}, r'at the "motor" or at the "pipe"'),
         ({"top_drive.limits_at": "motor"}, "needs motor_inertia and gear_ratio"),
         (AT_PIPE | {"top_drive.torque_speed": CURVE[::-1]}, "must rise"),
-        (AT_PIPE | {"top_drive.torque_speed": KINKED}, "off the curve"),
         (AT_PIPE | {"top_drive.torque_speed": SLOW}, "beyond the 90 rpm"),
         (AT_PIPE | {"top_drive.intermittent_torque": "3 kN*m"}, "top_drive: gives 3 kN"),
         ({"controller.drive.maximum_speed": "200 rpm"}, "needs a torque_limit"),

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 from pydantic import model_validator
 
-from drillctl import registry, units
+from drillctl import registry
 from drillctl.errors import InputError
 from drillctl.rig import table as q
 from drillctl.rig.table import Table, law_name
@@ -120,6 +120,8 @@ class DriveLimits(NamedTuple):
     power: float = math.inf  # at higher speed (W)
     speed: float = math.inf  # (rad/s)
     continuous: float = math.inf  # torque that it bears for any time (N m)
+    # largest share of the torque of a given point that these limits leave out, and its speed
+    lost: tuple[float, float] = (0.0, 0.0)
 
     def within(self, drive: DriveTable) -> DriveTable:
         """The keys of a drive with these limits where they are narrower."""
@@ -142,7 +144,10 @@ OFF_THE_CURVE = 0.03  # how far a point may lie from constant torque and constan
 
 
 def curve_limits(points: list[tuple[float, float]]) -> DriveLimits:
-    """Constant torque, then constant power, through points of speed (rad/s) and torque (N m)."""
+    """Largest constant torque, then constant power, under points of speed (rad/s) and torque (N m).
+
+    Within `OFF_THE_CURVE`: rounded points of such a curve lie on either side of it.
+    """
     key = "torque_speed"
     while len(points) > 1 and points[-1][1] == 0.0:  # how a curve may be closed at its end
         points = points[:-1]
@@ -154,15 +159,9 @@ def curve_limits(points: list[tuple[float, float]]) -> DriveLimits:
     if torques[-1] <= 0.0 or speeds[-1] == 0.0:
         raise InputError(f"{key}: needs a speed and a torque above 0 at its end")
     falling = [w * torque for w, torque in points if torque < torques[0] * (1.0 - OFF_THE_CURVE)]
-    made = DriveLimits(torques[0], min(falling, default=math.inf), speeds[-1])
-    for w, torque in points:
-        given = min(made.torque, made.power / max(w, 1e-9))
-        if abs(given / torque - 1.0) > OFF_THE_CURVE:
-            raise InputError(
-                f"{key}: {torque / 1e3:.4g} kN*m at {w / units.RPM:.4g} rpm of the pipe is off the "
-                f"curve of constant torque, then constant power ({given / 1e3:.4g} kN*m there)"
-            )
-    return made
+    power = min(falling, default=math.inf)
+    lost = max((1.0 - min(torques[0], power / max(w, 1e-9)) / torque, w) for w, torque in points)
+    return DriveLimits(torques[0], power, speeds[-1], lost=lost)
 
 
 class Controller(NamedTuple):

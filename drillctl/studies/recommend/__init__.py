@@ -111,16 +111,19 @@ def _numbers(result: Recommendation) -> Table:
     for name, value in best.controller.items():
         si = SI_OF[name]
         each = told[name]
-        field = " ".join(f"{v:.4g} {k.replace('*', ' ')}" for k, v in each.items() if "lbf" in k)
+        both = [
+            f"{v:.5g} {k.replace('*s/rad', '*s').replace('/rad', '').replace('*', ' ')}"
+            for k, v in list(each.items())[:2]
+        ]
         per = next((v for k, v in each.items() if k.startswith("per unit")), None)
         drift = drifts.get(f"controller.{name}")
         ends = (None, None) if drift is None else (drift.low, drift.high)
         label = USUAL_NAMES.get(f"controller.{name}", name.replace("_", " "))
         cells = [Quantity(one, si) for one in (value, *ends)]
-        rows.append([label, name, Unit(si), cells[0], field, per, *cells[1:]])
+        rows.append([label, name, Unit(si), cells[0], *both, per, *cells[1:]])
     columns = (
         Column("number"), Column("key", hidden=True), Column("unit", hidden=True),
-        Column("value", digits=5), Column("field", "field units"),
+        Column("value", hidden=True), Column("si", "SI"), Column("field", "field units"),
         Column("per_unit", "per unit", hidden=told["rated_torque"] is None),
         Column("low", "may be off down to"), Column("high", "up to"),
     )  # fmt: skip
