@@ -2,50 +2,20 @@
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-from tests.code_blocks import blocks
+from tests.package_copy import answer, changed, copied, inserted, marked, script
 
-ROOT = Path(__file__).resolve().parents[2]
-FILES = {b.mark.removeprefix("file "): b.text for b in blocks(ROOT / "docs" / "howto-law.md")}
-TOUCHED = 2
-"""Source files of a law: its own, and the registry."""
-
-
-def sources(package):
-    return {path: path.read_bytes() for path in package.rglob("*.py")}
+FILES = marked("howto-law.md", "file")
 
 
 def added(folder, room, file, registered):
-    """A copy of the package with one law more; how many of its files are other ones."""
-    for name in ("drillctl", "models", "designs"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-    before = sources(folder / "drillctl")
+    """A copy of the package with one law more: its own file, and a line of the registry."""
+    copied(folder)
     (folder / "drillctl" / "rig" / room / file).write_text(FILES[file])
-    registry = folder / "drillctl" / "registry.py"
-    head, found, tail = registry.read_text().partition(f"{registered} = (\n")
-    assert found
     line = f'    "drillctl.rig.{room}.{file.removesuffix(".py")}",\n'
-    registry.write_text(head + found + line + tail)
-    after = sources(folder / "drillctl")
-    return sum(before.get(path) != text for path, text in after.items())
-
-
-def answer(folder, *arguments):
-    done = subprocess.run(
-        [sys.executable, "-m", "drillctl", *arguments, "--json"],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    inserted(folder / "drillctl" / "registry.py", f"{registered} = (\n", after=line)
+    assert sorted(changed(folder)) == ["drillctl/registry.py", f"drillctl/rig/{room}/{file}"]
 
 
 def written(folder, text):
@@ -57,7 +27,7 @@ def written(folder, text):
 @pytest.fixture(scope="module")
 def friction(tmp_path_factory):
     folder = tmp_path_factory.mktemp("friction")
-    assert added(folder, "bit_rock", "popp_stelter.py", "FRICTION_LAWS") == TOUCHED
+    added(folder, "bit_rock", "popp_stelter.py", "FRICTION_LAWS")
     return folder, written(
         folder,
         """
@@ -80,7 +50,7 @@ duration = "2 s"
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drive")
-    assert added(folder, "top_drive", "matched_pipe.py", "DRIVE_LAWS") == TOUCHED
+    added(folder, "top_drive", "matched_pipe.py", "DRIVE_LAWS")
     return folder, written(
         folder, '[controller]\nlaw = "matched-pipe"\n\n[simulation]\nduration = "2 s"\n'
     )
@@ -97,7 +67,9 @@ def test_a_friction_law_is_one_file_and_one_line(friction):
 
 def test_another_rock_and_draws_come_with_a_friction_law(friction):
     folder, design = friction
-    script = f"""
+    told = script(
+        folder,
+        f"""
 import drillctl
 from drillctl.ensemble.parameters import uncertain_parameters
 design = drillctl.load({design!r})
@@ -107,13 +79,9 @@ try:
     design.replace({{"scenario.bit_rock.static_factor": 0.1}})
 except drillctl.InputError as error:
     print(error)
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    assert "static torque would be less than the sliding one" in done.stdout
+""",
+    )
+    assert "static torque would be less than the sliding one" in told
 
 
 @pytest.mark.slow
@@ -140,7 +108,9 @@ def test_a_drive_law_is_one_file_and_one_line(drive):
 
 def test_a_drive_law_says_what_is_tuned_and_takes_arrays(drive):
     folder, design = drive
-    script = f"""
+    script(
+        folder,
+        f"""
 import drillctl, numpy as np
 from drillctl.studies.tune.tuned import drive_numbers, string_numbers, tuned_parameters
 design = drillctl.load({design!r})
@@ -149,8 +119,5 @@ assert drillctl.loop(design).slope_margin > 0.0
 assert (tuned.path, tuned.unit, tuned.low, tuned.high) == ("controller.period", "s", 2.0, 10.0)
 numbers = drive_numbers(design, {{tuned.path: np.array([4.0, 5.0])}}, string_numbers(design.string))
 assert numbers["ki"][1] == design.top_drive.ki < numbers["ki"][0]
-"""
-    subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)}, check=True,
-    )  # fmt: skip
+""",
+    )

@@ -3,43 +3,27 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
-from tests.code_blocks import blocks
+from tests.package_copy import copied, inserted, marked, python, script
 
-ROOT = Path(__file__).resolve().parents[2]
-FILES = {b.mark.removeprefix("file "): b.text for b in blocks(ROOT / "docs" / "howto-study.md")}
+FILES = marked("howto-study.md", "file")
 SPEEDS = '["9 rad/s", "11 rad/s"]'
-
-
-def python(folder, *arguments):
-    return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def house(tmp_path_factory):
     """A copy of the package with one study more: its own files and one line."""
-    folder = tmp_path_factory.mktemp("study")
-    for name in ("drillctl", "models", "designs"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    folder = copied(tmp_path_factory.mktemp("study"))
     package = folder / "drillctl" / "studies" / "speed_scan"
     package.mkdir()
     for name in ("__init__.py", "settings.py", "compute.py"):
         (package / name).write_text(FILES[name])
-    registry = folder / "drillctl" / "registry.py"
-    head, mark, tail = registry.read_text().partition("STUDIES: tuple[str, ...] = (\n")
-    assert mark
-    registry.write_text(f'{head}{mark}    "drillctl.studies.speed_scan",\n{tail}')
+    inserted(
+        folder / "drillctl" / "registry.py", "STUDIES: tuple[str, ...] = (\n",
+        after='    "drillctl.studies.speed_scan",\n',
+    )  # fmt: skip
     (folder / "toy.toml").write_text(
         'schema = 1\nmodel = "monteiro-trindade-100kn"\n'
         f"[speed_scan]\nspeeds = {SPEEDS}\n[simulation]\nduration = '2 s'\n"
@@ -66,7 +50,9 @@ def test_the_command_the_folder_python_and_the_report_come_with_it(house):
     assert "already done" in again.stderr
     assert "set speed (rpm)" in again.stdout
     assert (house / "run" / "speed-scan.csv").read_text().startswith("speed (rad/s),j1 (s)\n9.0,")
-    script = """
+    script(
+        house,
+        """
 import drillctl
 from drillctl.reporting.sections import SECTIONS
 back = drillctl.open("run")
@@ -75,6 +61,5 @@ assert "in rad/s" in type(back).__doc__
 again = drillctl.speed_scan(back.design)
 assert again.summary() == back.summary()
 assert "speeds" in SECTIONS
-"""
-    done = python(house, "-c", script)
-    assert done.returncode == 0, done.stderr
+""",
+    )
