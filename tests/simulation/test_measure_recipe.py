@@ -50,7 +50,7 @@ def test_maps_and_draws_keep_it(house):
     assert lanes["measures"]["turns"] == pytest.approx(exact, rel=1e-3)
     answer(house, "map", "toy.toml", "--measure", "turns", "--out", "map")
     head = (house / "map" / "map.csv").read_text().splitlines()[0]
-    assert head == "controller.kp,controller.ki,j1,turns,status"
+    assert head == "controller.kp (N*m*s/rad),controller.ki (N*m/rad),j1 (s),turns,status"
     answer(house, "uncertainty", "toy.toml", "--out", "draws")
     script(
         house,
