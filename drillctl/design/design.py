@@ -76,7 +76,8 @@ class Design:
             tree = with_values(self.tree, values)
         except InputError as error:
             raise (error.within(self.origin) if self.origin else error) from None
-        return Design(self.name, validated(tree, self.origin), tree, self.origin)
+        tables = validated(tree, self.origin, (self.tree, self.tables))
+        return Design(self.name, tables, tree, self.origin)
 
     def where(self, key: str) -> str:
         """A key after the file and line that it is in, for messages."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from difflib import get_close_matches
 from typing import Any, get_args, get_origin
 
@@ -13,6 +14,7 @@ from drillctl.design.merging import Tree
 from drillctl.design.tables import DesignTables
 from drillctl.errors import InputError, MultipleInputError, nearest, shown
 from drillctl.rig.bit_rock.law import friction_laws
+from drillctl.rig.table import Table
 from drillctl.rig.top_drive.law import drive_laws, top_drive
 from drillctl.rig.weight_on_bit.law import weight_laws
 
@@ -34,10 +36,16 @@ _TYPES = {
 """What is due, by pydantic's name of the error."""
 
 
-def validated(tree: Tree, origin: str) -> DesignTables:
-    """Validate plain TOML data; up to ten errors are told at once, each with its line."""
+def validated(
+    tree: Tree, origin: str, like: tuple[Tree, DesignTables] | None = None
+) -> DesignTables:
+    """Validate plain TOML data; up to ten errors are told at once, each with its line.
+
+    What the data share with others of which the tables are known, `like`, is not read again: of
+    thousands of draws each changes a number or two.
+    """
     try:
-        tables = DesignTables.model_validate(tree)
+        tables = _read(tree, like)
     except ValidationError as error:
         problems = [_reported(one, tree) for one in _telling(error.errors())]
     else:
@@ -47,6 +55,30 @@ def validated(tree: Tree, origin: str) -> DesignTables:
     if origin:
         problems = [InputError(one.problem, place(origin, one.where, tree)) for one in problems]
     raise problems[0] if len(problems) == 1 else MultipleInputError(problems)
+
+
+def _read(tree: Tree, like: tuple[Tree, DesignTables] | None) -> DesignTables:
+    if like is not None:
+        with suppress(ValidationError):  # told in terms of the data below
+            return DesignTables.model_validate(_with_tables(tree, *like))
+    return DesignTables.model_validate(tree)
+
+
+def _with_tables(tree: Tree, before: Tree, table: Any) -> Tree:
+    """Plain data with the tables in it of what is the same object as before."""
+    result = dict(tree)
+    for key, value in tree.items():
+        old, held = before.get(key), getattr(table, key, None)
+        if value is old and _is_read(held):
+            result[key] = held
+        elif isinstance(held, Table) and isinstance(value, dict) and isinstance(old, dict):
+            result[key] = _with_tables(value, old, held)
+    return result
+
+
+def _is_read(held: object) -> bool:
+    some = held if isinstance(held, tuple) else (held,)
+    return bool(some) and all(isinstance(one, Table) for one in some)
 
 
 def _impossible(tables: DesignTables) -> Iterator[InputError]:

@@ -15,6 +15,7 @@ import drillctl
 from drillctl import catalog, units
 from drillctl.design import parameter, parameters, parse_setting, to_toml
 from drillctl.design.reading import parse_axis
+from drillctl.design.validation import validated
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import NavarroLopezSuarez
 from drillctl.rig.top_drive import PI, ConstantTorque
@@ -415,3 +416,24 @@ def test_reconstructed_rig_as_numbers():
     assert design.bit_rock == NavarroLopezSuarez(0.026, 0.085, 0.098)
     assert design.string.static_stiffness == pytest.approx(315.32, abs=0.005)
     assert design.tables.start.speed == pytest.approx(70 * units.RPM)
+
+
+@pytest.mark.parametrize("name", catalog.names("models"))
+def test_a_change_gives_what_reading_the_whole_gives(name):
+    """What does not change is not validated again."""
+    design = drillctl.load(name)
+    changes = [
+        {one.path: units.SI(0.99 * one.value + 1e-3) if one.kind else 0.99 * one.value + 1e-3}
+        for one in parameters(design)[::2] if one.value is not None and not one.whole
+    ]  # fmt: skip
+    changes.append({"controller.law": "pi", "controller.kp": 1.0, "controller.ki": 2.0})
+    compared = 0
+    for change in changes:
+        try:
+            changed = design.replace(change).replace({"title": "another"})
+        except InputError:  # beyond its range
+            continue
+        compared += 1
+        assert changed.tables == validated(changed.tree, changed.origin)
+        assert changed != design
+    assert compared > 0.6 * len(changes)
