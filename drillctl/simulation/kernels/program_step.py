@@ -169,6 +169,6 @@ def _turn(
 
 
 def _set_nominal(law: Any, work: Any, time: Any) -> None:
-    """Nominal weight of the hour: the first number of every weight law."""
+    """Put in the nominal weight at a time (s): the first number of every weight law."""
     over = _value(_weight(law), time)
     put(work, r.WEIGHT, at(work, r.NOMINAL) * (1.0 + over))

@@ -92,7 +92,7 @@ SINKING = _next()
 TOP_TORQUE = _next()  # net of DRAG, N m
 BIT_TORQUE = _next()  # N m
 
-# Program: set speed of the hour less the final one, and its integral at both ends of a step.
+# Program: set speed of the moment less the final one, and its integral at both ends of a step.
 LEAD = _next()  # rad/s
 SHIFT = _next()  # rad
 SHIFT_NEW = _next()
