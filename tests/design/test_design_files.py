@@ -418,13 +418,13 @@ def test_reconstructed_rig_as_numbers():
     assert design.tables.start.speed == pytest.approx(70 * units.RPM)
 
 
-@pytest.mark.parametrize("name", catalog.names("models"))
+@pytest.mark.parametrize("name", ["monteiro-trindade-2012", "navarro-lopez-4dof", "typical-land"])
 def test_a_change_gives_what_reading_the_whole_gives(name):
     """What does not change is not validated again."""
     design = drillctl.load(name)
     changes = [
         {one.path: units.SI(0.99 * one.value + 1e-3) if one.kind else 0.99 * one.value + 1e-3}
-        for one in parameters(design)[::2] if one.value is not None and not one.whole
+        for one in parameters(design)[::4] if one.value is not None and not one.whole
     ]  # fmt: skip
     changes.append({"controller.law": "pi", "controller.kp": 1.0, "controller.ki": 2.0})
     compared = 0
