@@ -155,7 +155,7 @@ def pictures(result: Recommendation) -> Iterator[Picture]:
         "recommended", "Settings side by side: J1, probability, window, loop.",
         f"J1, probability of the level, speeds and weights without sticking and slope margin of "
         f"{len(result.candidates)} settings; recommended: {result.recommended.name}.",
-        lambda system: plots.recommended(result, system=system), paper=True,
+        lambda system: plots.recommended(result, system=system),
     )  # fmt: skip
 
 
