@@ -219,3 +219,20 @@ def test_a_design_without_a_friction_factor_has_the_bits_of_one_without_a_well()
         assert found.measures == expected.measures
         for name, signal in expected.signals.items():
             assert np.array_equal(found.signals[name], signal), name
+
+
+@pytest.mark.parametrize("axial", ["0 m/s", "0.1 m/s"])
+def test_the_scheme_is_of_second_order(axial):
+    """From rest through the first slip, where no friction jumps at a critical speed."""
+    design = drillctl.load(WELL_A, **SHORT).replace({
+        "well.friction_ratio": 1.0, "well.axial_speed": axial, "simulation.duration": "6 s",
+        "drillstring.sections.pipe.elements": 32, "drillstring.sections.bha.elements": 8,
+        "simulation.modes": 41,
+    })  # fmt: skip
+    exact = simulate(design, "reference").measures.j1
+    coarse, fine = (
+        abs(simulate(design.replace({"simulation.step": step}), "batch").measures.j1 - exact)
+        for step in ("4 ms", "1 ms")
+    )
+    assert coarse < 3e-5 * exact
+    assert 0.5 * np.log2(coarse / fine) == pytest.approx(2.0, abs=0.3)

@@ -11,8 +11,8 @@ friction of its speed. The sweeps begin with the torques of the last step; their
 that no lane depends on its neighbours. The bit's own inclusion is then solved as without a wall,
 with the wall's torques as they were found.
 
-Of a string that drifts along the well no node sticks: its torque is F w / sqrt(w^2 + d^2) of the
-speed at the end of the step. Each sweep makes one step of Newton's method, from the last sweep's
+Of a string that drifts along the well no node sticks: its torque is F w / sqrt(w^2 + d^2), the mean
+of begin and end. Each sweep makes one step of Newton's method, from the last sweep's
 speed; the function is concave, so that no step goes too far once it is on the near side.
 
 Beyond the critical speed a part of the friction is lost. Where a node passes that speed within the
@@ -38,8 +38,8 @@ SWEEPS = 4
 
 # Rows of a node in the room that the string leaves, after those of the bit; of one that drifts the
 # speed of its last sweep, without sign, in place of whether it is stuck.
-TORQUE, SPEED, BEFORE, FRICTION, SLIDING, FREE, CLOSED, STUCK, GAIN, PER_GAIN = range(10)
-NODE_ROWS = 10
+TORQUE, SPEED, BEFORE, FRICTION, SLIDING, FREE, CLOSED, STUCK, GAIN, PER_GAIN, HELD = range(11)
+NODE_ROWS = 11
 BIT_FRICTION, BIT_LEVEL, WALL_WORK = range(3)
 BIT_ROWS = 3
 
@@ -199,13 +199,13 @@ def rub(
         drift = string.drift[k] if drifts(string) else None
         level = _level(string, speed, at(room, _row(k, BEFORE)), drift)
         put(room, _row(k, SLIDING), at(room, _row(k, FRICTION)) * level)
-        if drifts(string):
-            put(room, _row(k, STUCK), abs(speed))
         closed = string.angle_by_wall[k] * by_angle - string.top_by_wall[k] * by_speed
         gain = string.by_wall[k, k] - string.by_top[k] * closed
         put(room, _row(k, CLOSED), closed)
         put(room, _row(k, GAIN), gain)
         put(room, _row(k, PER_GAIN), 1.0 / gain)
+        if drifts(string):
+            _begin_drift(room, k, speed, string.drift[k], gain)
         put(room, _row(k, FREE), at(room, _row(k, FREE)) + at(work, r.SET_SPEED))
     at_rest, sliding = _rock_torques(string, law, weight, room, work)
     free_bit = swing.bit_speed + at(work, r.SET_SPEED)
@@ -269,10 +269,26 @@ def _slide(string: Any, k: Any, room: Any, top: Any, bit: Any) -> None:
     top.set(fma(at(room, _row(k, CLOSED)), new - torque, top.get()))
 
 
+def _begin_drift(room: Any, k: Any, speed: Any, drift: Any, gain: Any) -> None:
+    """Shares of begin and end in a torque that is held: the trapezoid's, unless it is too steep.
+
+    As of a creeping bit, see `rock_step.py`: what relaxes within half a step may not ring.
+    """
+    friction = at(room, _row(k, SLIDING))
+    inverse = 1.0 / root(fma(speed, speed, drift * drift))
+    turn = drift * inverse
+    steep = gain * friction * (turn * turn) * inverse
+    share = pick(steep > 2.0, 1.0 - 1.0 / steep, 0.5)
+    put(room, _row(k, SLIDING), share * friction)
+    put(room, _row(k, HELD), (1.0 - share) * friction * (speed * inverse))
+    put(room, _row(k, STUCK), abs(speed))
+
+
 def _drift(string: Any, k: Any, room: Any, top: Any, bit: Any) -> None:
     """One node that drifts, d = `drift`: a step towards u + gain F u / sqrt(u^2 + d^2) = |free|."""
     torque, gain = at(room, _row(k, TORQUE)), at(room, _row(k, GAIN))
-    free = fma(gain, torque, _speed(string, k, room, top.get(), bit.get()))
+    held = at(room, _row(k, HELD))
+    free = fma(gain, torque - held, _speed(string, k, room, top.get(), bit.get()))
     ahead, drift = abs(free), string.drift[k]
     u, friction = at(room, _row(k, STUCK)), gain * at(room, _row(k, SLIDING))
     inverse = 1.0 / root(fma(u, u, drift * drift))
@@ -282,7 +298,7 @@ def _drift(string: Any, k: Any, room: Any, top: Any, bit: Any) -> None:
     least = most(ahead - friction, ahead * drift / (drift + friction))
     new_speed = most(u + step, least)
     put(room, _row(k, STUCK), new_speed)
-    new = signed(most(ahead - new_speed, 0.0) * at(room, _row(k, PER_GAIN)), free)
+    new = signed(most(ahead - new_speed, 0.0) * at(room, _row(k, PER_GAIN)), free) + held
     put(room, _row(k, TORQUE), new)
     top.set(fma(at(room, _row(k, CLOSED)), new - torque, top.get()))
 
