@@ -99,6 +99,8 @@ class DistributionTable(Table):
     def _numbers_or_quantities(cls, values: object) -> object:
         if not isinstance(values, (list, tuple)):
             return values
+        if not values:
+            raise InputError("holds nothing to draw from")
         return tuple(number_or_quantity(value) for value in values)
 
     @model_validator(mode="after")

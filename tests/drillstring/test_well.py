@@ -176,3 +176,10 @@ def test_sections_with_and_without_tool_joints_have_their_weight():
         design = drillctl.load("navarro-lopez-2dof", **{"drillstring.sections": [section]})
         found = drillctl.torque_drag(design).summary()["cases"]["off_bottom"]["hook_load"]
         assert found == pytest.approx(9.81 * 7850 * 100 * area)
+
+
+def test_springs_without_a_body_do_not_drift():
+    values = {"well.friction_factor": 0.3, "well.axial_speed": "1 m/min"}
+    wall = drillctl.load("navarro-lopez-2dof", **values).wall
+    assert not wall.torque.any()
+    assert not wall.drifts

@@ -223,7 +223,6 @@ def test_limits_of_a_normal_law_may_be_given():
             {"distribution": "beta", "cov": 0.1, "min": "150 kN", "max": "160 kN"},
             "mean: 140000 must lie between",
         ),
-        ({"distribution": "samples", "samples": []}, "samples: holds nothing"),
         ({"distribution": "samples", "samples": ["-2 kN"]}, "samples: -2 kN: "),
         ({"distribution": "normal", "cov": 0.1, "max": "100 kN"}, "must lie between min and max"),
     ],
@@ -247,6 +246,7 @@ def test_impossible_distributions_are_refused_with_their_key(law, message):
         ),
         ({"distribution": "beta", "cov": 0.1, "min": 1}, "max is missing"),
         ({"distribution": "samples"}, "samples is missing"),
+        ({"distribution": "samples", "samples": []}, "samples: holds nothing"),  # on reading
     ],
 )
 def test_keys_that_do_not_go_together_are_refused(law, message):

@@ -119,7 +119,7 @@ def lumped(
     torque = cell_torque(line, factor, weight_on_bit, well.tension, motion)
     at = _shared(line, depth[list(nodes)], torque)
     critical = well.critical_speed if well.friction_ratio < 1.0 else math.inf
-    if well.axial_speed == 0.0:
+    if well.axial_speed == 0.0 or not line.radius.any():  # springs without a body rub on nothing
         return Wall(nodes, at, well.friction_ratio, critical, 0.0 * at)
     # The radius at which a node rubs: of one friction factor, so that draws of it share a drift.
     alike = cell_torque(line, np.ones(len(torque)), weight_on_bit, well.tension)
