@@ -15,7 +15,7 @@ import numpy as np
 
 from drillctl import catalog
 from drillctl.errors import InputError
-from drillctl.logs.quantities import QUANTITIES, Head, spelt, words
+from drillctl.logs.quantities import QUANTITIES, Head, spelt
 from drillctl.progress import SILENT, Progress
 
 PIECE = 262_144  # rows at a time
@@ -33,7 +33,7 @@ class Source:
 
     path: Path
     heads: tuple[Head, ...]  # its columns
-    dated: bool  # whether its time is text: dates, or times of day
+    dated: frozenset[int]  # columns that hold text or dates, by number
     pieces: Pieces  # of some columns by number: arrays of the same length, some rows at a time
 
 
@@ -87,17 +87,12 @@ class _Text:
 def _csv(path: Path) -> Source:
     layout = _layout(path)
     first = next(_csv_pieces(path, layout, range(len(layout.heads)), SILENT, rows=50), [])
-    named = [k for k, head in enumerate(layout.heads) if _is_time(head.name)]
-    dated = any(_is_text(first[k]) for k in named) if first else False
+    dated = frozenset(k for k, values in enumerate(first) if _is_text(values))
 
     def pieces(columns: Sequence[int], progress: Progress) -> Iterator[list[Any]]:
         return _csv_pieces(path, layout, columns, progress)
 
     return Source(path, layout.heads, dated, pieces)
-
-
-def _is_time(name: str) -> bool:
-    return bool(re.search(r"\b(time|date|t|stamp)\b|timestamp|datetime", words(name)))
 
 
 def _is_text(values: Any) -> bool:
@@ -189,10 +184,10 @@ def _parquet(path: Path) -> Source:
         Head(field.name, (field.metadata or {}).get(b"unit", b"").decode())
         for field in file.schema_arrow
     )
-    dated = any(
-        str(field.type).startswith(("timestamp", "string", "date")) and _is_time(field.name)
-        for field in file.schema_arrow
-    )
+    dated = frozenset(
+        k for k, field in enumerate(file.schema_arrow)
+        if str(field.type).startswith(("timestamp", "string", "large_string", "date"))
+    )  # fmt: skip
 
     def pieces(columns: Sequence[int], progress: Progress) -> Iterator[list[Any]]:
         names = [heads[k].name for k in columns]
@@ -243,7 +238,7 @@ def _mat73(path: Path) -> Source:
                 ]
                 progress.advance(part.stop - first)
 
-    return Source(path, heads, False, pieces)
+    return Source(path, heads, frozenset(), pieces)
 
 
 def _longest(found: list[Any]) -> tuple[list[Any], int]:
@@ -270,7 +265,7 @@ def _mat5(path: Path) -> Source:
             visit(name, value)
     found, _ = _longest(found)
     heads = tuple(Head(name) for name, _, _ in found)
-    return Source(path, heads, False, _of_arrays(path, [values for _, values, _ in found]))
+    return Source(path, heads, frozenset(), _of_arrays(path, [values for _, values, _ in found]))
 
 
 def _las(path: Path) -> Source:
@@ -281,7 +276,7 @@ def _las(path: Path) -> Source:
         raise InputError(f"is not LAS: {error}") from None
     heads = tuple(Head(one.mnemonic, one.unit) for one in file.curves)
     data = [np.asarray(one.data) for one in file.curves]
-    dated = any(_is_time(h.name) and _is_text(d) for h, d in zip(heads, data, strict=True))
+    dated = frozenset(k for k, values in enumerate(data) if _is_text(values))
     return Source(path, heads, dated, _of_arrays(path, data))
 
 

@@ -13,7 +13,7 @@ from drillctl.errors import InputError
 from drillctl.logs.fit import Fit, Problem, Window, driven, fit, residual
 from drillctl.logs.laws import LEAST_DECAY, MOST_DECAY, Family
 from drillctl.logs.record import Log
-from drillctl.logs.waves import Portrait, at_the_bit, below, track
+from drillctl.logs.waves import Portrait, at_the_bit, below, swing, track
 from drillctl.logs.windows import tonal_share
 from drillctl.rig.drillstring import Parts
 
@@ -32,6 +32,8 @@ UNSEEN = 0.5  # spread of the logarithm of the decay, where no stick shows the t
 LOOSE = 0.25  # relative standard deviation of a coefficient that is not identified
 SLOW_FALL = 0.2  # decay times the range of speeds below which a fall is straight
 POINTS_OF_CURVE = 41
+FINE = 0.06  # time between samples (s), less of a quick string, from which
+FINE_FLOOR = 0.6  # of the floor is enough
 
 
 def tracks_of(
@@ -205,6 +207,12 @@ def interval(leave: Array, level: float) -> Array:
     return np.asarray(stdtrit(n - 1, 0.5 + 0.5 * level) * np.sqrt(variance))
 
 
+def floor_at(floor: float, problem: Problem) -> float:
+    """The floor of a log: less where it is sampled finely, as sampling is what is in common."""
+    fine = FINE * min(1.0, 0.4 * swing(problem.parts))
+    return floor if problem.windows[0].track.spacing > fine else FINE_FLOOR * floor
+
+
 def half_widths(
     one: Fit, of: Callable[[Array], Array], level: float, floor: float
 ) -> tuple[Array, Array]:
@@ -235,14 +243,13 @@ def noise_bias(one: Fit) -> Array:
     free, problem = one.problem.free, one.problem
     if "drive_inertia" not in free:
         return np.zeros(len(free))
-    at = free.index("drive_inertia")
-    inertia = problem.parts.top_inertia * one.factors.drive_inertia
+    at, inertia = free.index("drive_inertia"), problem.parts.top_inertia
     pull = sum(
         2.0 * (w.last - w.first) * (inertia * w.track.rise_noise) ** 2 for w in problem.windows
     )
-    matrix = one.normal.copy()
-    matrix[at, at] += pull
-    return np.asarray(np.abs(np.linalg.inv(matrix)[:, at] * pull))
+    # The curvature is of noisy slopes, and has the pull in it already.
+    pulled = np.linalg.inv(one.normal)[:, at] * pull
+    return np.asarray(np.abs(pulled) * one.factors.drive_inertia / (1.0 - min(pulled[at], 0.9)))
 
 
 def normal(level: float) -> float:
@@ -261,7 +268,7 @@ class Band:
 
 
 def band_of(one: Fit, level: float, floor: float) -> Band:
-    """Torque over the speeds that were seen, from scatter between windows and a floor."""
+    """Torque over the speeds that were seen, from scatter between pieces of windows and a floor."""
     low = max(one.slowest, 0.0) if not any(one.sticks) else 0.0
     speed = np.linspace(low, max(one.fastest, low + 0.1), POINTS_OF_CURVE)
     torque, half = half_widths(one, lambda x: one.family.curve(x).torque(speed), level, floor)

@@ -130,12 +130,15 @@ def split(head: Head, known: Mapping[str, float]) -> tuple[str, str]:
 
 
 def choose(
-    heads: Iterable[Head], given: Mapping[str, tuple[str, str]], file: str, dated: bool = False
+    heads: Iterable[Head],
+    given: Mapping[str, tuple[str, str]],
+    file: str,
+    dated: frozenset[int] = frozenset(),
 ) -> dict[str, Chosen]:
     """The columns of each quantity.
 
-    `given`: column and unit by quantity, either may be empty. `dated`: whether the column of time
-    holds text. Refused (`InputError`): a needed one that is missing, two that fit, a unit that is
+    `given`: column and unit by quantity, either may be empty. `dated`: columns that hold text, by
+    number. Refused (`InputError`): a needed one that is missing, two that fit, a unit that is
     missing or of something else.
     """
     columns = list(heads)
@@ -159,7 +162,7 @@ def choose(
                 f"{file}: {names} all look like {one.label}; name one in [log.{name}] column", where
             )
         head = columns[matches[0]]
-        text = name == "time" and dated and not unit
+        text = name == "time" and matches[0] in dated and not unit
         read = "date" if text else unit or split(head, one.units)[1]
         factor = 1.0 if text else _factor(one, head, read, file)
         found[name] = Chosen(name, head.name, read, factor, matches[0])

@@ -157,7 +157,9 @@ def _seconds(values: Any) -> Array:
 
     values = pd.Series(np.asarray(values))
     if values.dtype.kind != "M":
-        times = pd.to_datetime(values, errors="coerce", format="mixed")
+        # 01.03.2024 is the first of March, where dates have dots.
+        dotted = bool(values.astype(str).str.match(r"\d{1,2}\.\d{1,2}\.\d{4}").any())
+        times = pd.to_datetime(values, errors="coerce", format="mixed", dayfirst=dotted)
         if times.dt.tz is not None:
             times = times.dt.tz_convert(None)
     else:

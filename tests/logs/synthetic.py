@@ -134,3 +134,27 @@ def write(path, samples, columns=3, weight=None):
         path, np.array(held).T, fmt="%.9g", delimiter=",", header=",".join(head), comments=""
     )
     return path
+
+
+@numba.njit
+def _lumped(count, step, top, bit, stiffness, gain, target, low, high, decay):
+    w, b, twist, total = 0.7 * target, 0.7 * target, low / stiffness, low
+    results = np.zeros((3, count))
+    for i in range(count):
+        total += 0.5 * gain * (target - w) * step
+        torque = gain * (target - w) + total
+        results[0, i], results[1, i], results[2, i] = torque, w, b
+        below = stiffness * twist
+        rock = low + (high - low) * np.exp(-decay * b)
+        b = max(b + step * (below - rock) / bit, 0.0) if b > 0.0 or below > high else 0.0
+        w += step * (torque - below) / top
+        twist += step * (w - b)
+    return results
+
+
+def laboratory(duration, top, bit, stiffness, gain, target, low, high, decay):
+    """Time, torque, top and bit speed of two bodies on a spring under PI, SI, fine."""
+    step = 1e-4
+    count = int(duration / step)
+    motion = _lumped(count, step, top, bit, stiffness, gain, target, low, high, decay)
+    return step * np.arange(count), *motion

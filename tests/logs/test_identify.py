@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl import units
 from drillctl.cli import run
 from drillctl.ensemble.parameters import draw
 from drillctl.errors import InputError
 from drillctl.logs.laws import EXPONENTIAL_LAW
 from drillctl.studies.identify.compute import _findings, identify
 from drillctl.studies.identify.written import write as write_design
-from tests.logs.synthetic import WEIGHT, Rig, sampled, write
+from drillctl.studies.log.compute import log_overview
+from tests.logs.synthetic import WEIGHT, Rig, laboratory, sampled, write
 
 NOISE = (200.0, 0.02)
 PI = {"controller.kp": 200, "controller.ki": 100}
@@ -110,7 +112,18 @@ def test_a_torque_in_the_wrong_unit_is_named(noisy, tmp_path):
     text = noisy.read_text().replace("top_torque_Nm", "top_torque_ftlb")
     path = tmp_path / "wrong.csv"
     path.write_text(text)
-    with pytest.raises(InputError, match=r"N m read as ft lbf would make it 0.7376 times"):
+    with pytest.raises(InputError, match=r"0\.\d% if the torque is in N m, read as ft lbf"):
+        identify(design(), [path])
+
+
+def test_a_speed_in_the_wrong_unit_is_named(noisy, tmp_path):
+    path = tmp_path / "wrong.csv"
+    rows = [line.split(",") for line in noisy.read_text().splitlines()[1:]]
+    path.write_text(
+        "time_s,top_torque_Nm,top_speed_rpm\n"
+        + "\n".join(f"{a},{b},{float(c) * np.pi / 30.0}" for a, b, c, *_ in rows)
+    )
+    with pytest.raises(InputError, match="the speed is in rad/s, read as rpm"):
         identify(design(), [path])
 
 
@@ -180,6 +193,47 @@ def test_several_damped_sections(tmp_path):
     law = rig.bit_rock
     truth = WEIGHT * (law.a1 + (law.a2 - law.a1) * np.exp(-law.beta * one.speed))
     assert one.torque == pytest.approx(truth, rel=0.005)
+
+
+def test_a_laboratory_rig_of_two_bodies_in_millinewton_metres(tmp_path):
+    top, bit, stiffness = 2e-3, 4e-4, 8e-3
+    law = (0.006, 0.012, 0.5)
+    motion = laboratory(70.0, top, bit, stiffness, 0.01, 5.0, *law)
+    time, torque, speed, _ = sampled(motion, 100.0, 10.0, 70.0, (5e-5, 0.005))
+    path = tmp_path / "rig.csv"
+    np.savetxt(
+        path, np.array([time, 1e3 * torque, speed]).T, delimiter=",", comments="",
+        header="time (s),motor torque (mN*m),motor speed (rad/s)",
+    )  # fmt: skip
+    numbers = {
+        "drillstring.sections.pipe.stiffness": stiffness, "drillstring.sections.pipe.damping": 0.0,
+        "top_drive.inertia": top, "top_drive.damping": 0.0, "bha.inertia": bit, "bha.damping": 0.0,
+    }  # fmt: skip
+    rig = drillctl.load("navarro-lopez-2dof-bistable").replace(
+        {path: units.SI(value) for path, value in numbers.items()}
+    )
+    result = identify(rig, [path])
+    one = result.fitted
+    truth = law[0] + (law[1] - law[0]) * np.exp(-law[2] * one.speed)
+    assert result.sticks.all()
+    assert one.torque == pytest.approx(truth, rel=0.03)
+    assert np.mean((one.low <= truth) & (truth <= one.high)) > 0.9
+    assert not any(number.off for number in result.numbers), result.numbers
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_the_bit_stands_still_where_it_did(motion, tmp_path, known):
+    samples = sampled(motion, 20.0, 60.0, 240.0, NOISE)
+    path = write(tmp_path / "a.csv", samples, columns=3 if known else 4)
+    result = log_overview(design() if known else None, [path])
+    assert result.sticking_from == ("waves" if known else "downhole speed")
+    time, bit = samples[0], samples[3]
+    seen = (time > 12.0) & (time < 168.0)  # what the waves tell
+    marked = np.zeros(len(time), bool)
+    for begin, end in result.sticking:
+        marked |= (time >= begin) & (time <= end)
+    assert np.mean((marked == (bit < 0.05 * samples[2].mean()))[seen]) > 0.97
+    assert 0.3 < np.nanmean(result.windows.stuck) < 0.6
 
 
 def test_the_command_writes_what_others_run(noisy, tmp_path, capsys, monkeypatch):

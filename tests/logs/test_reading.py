@@ -112,6 +112,17 @@ def test_what_is_wrong_is_named(tmp_path):
         assert np.diff(log.time[part]).max() < 0.25
 
 
+def test_dates_with_dots_are_of_the_day_first_and_any_column_may_hold_them(tmp_path):
+    rows = [f"{day:02}.03.2024 {clock};{k},5;100,0" for k, (day, clock) in enumerate(
+        (1 + n // 20, f"23:59:{40 + n}" if n < 20 else f"00:00:{n - 20:02}") for n in range(40)
+    )]  # fmt: skip
+    path = tmp_path / "a.csv"
+    path.write_text("Zeit;Torque (kN m);RPM (1/min)\n" + "\n".join(rows), encoding="cp1252")
+    log = read_log(path, {"time": ("Zeit", "")})
+    assert log.time == pytest.approx(np.arange(40.0))
+    assert log.signals["top_torque"][3] == pytest.approx(3500.0)
+
+
 @pytest.mark.parametrize(
     ("head", "words"),
     [

@@ -25,6 +25,7 @@ from drillctl.store.result import Result
 from drillctl.studies.log.compute import read_logs
 
 CLEARLY = 8.0  # difference of misfits that tells two laws apart
+BEYOND = 1.3  # of how far another law is away: a band that holds it, and what lies behind it
 FOREIGN = 0.005  # unexplained share of the returning wave from which units are doubted
 NEARLY = 1.1  # error of a prediction over the least one that counts as equal
 USUAL_TWIST = (0.002, 20.0)  # of a string, over what the top turns in a period
@@ -36,13 +37,18 @@ NUMBERS = {
 }  # fmt: skip
 FOOT_POUND = units.factor("lbf*ft", units.TORQUE)
 WRONG_UNITS = (
-    (FOOT_POUND, "N m read as ft lbf"),
-    (1.0 / FOOT_POUND, "ft lbf read as N m"),
-    (1e3, "N m read as kN m"), (1e-3, "kN m read as N m"), (10.0, "daN m mistaken"),
-    (1e3 * FOOT_POUND, "N m read as klbf ft"),
-    (1e-3 / FOOT_POUND, "klbf ft read as N m"),
-    (9.80665, "N m read as kgf m"), (1.0 / 9.80665, "kgf m read as N m"),
+    (FOOT_POUND, "the torque is in N m, read as ft lbf"),
+    (1.0 / FOOT_POUND, "the torque is in ft lbf, read as N m"),
+    (1e3, "the torque is in N m, read as kN m"), (1e-3, "the torque is in kN m, read as N m"),
+    (1e3 * FOOT_POUND, "the torque is in N m, read as klbf ft"),
+    (1e-3 / FOOT_POUND, "the torque is in klbf ft, read as N m"),
+    (10.0, "the torque is in N m, read as daN m"), (0.1, "the torque is in daN m, read as N m"),
+    (9.80665, "the torque is in N m, read as kgf m"),
+    (1.0 / 9.80665, "the torque is in kgf m, read as N m"),
+    (1.0 / units.RPM, "the speed is in rad/s, read as rpm"),
+    (units.RPM, "the speed is in rpm, read as rad/s"),
 )  # fmt: skip
+"""Torque over speed as it was read, over what it is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,10 +225,10 @@ def identify(
         raise InputError(
             "must be > 0: the coefficients are torque over weight", "operating_point.weight_on_bit"
         )
-    described = []
+    described, floor = [], ident.floor_at(settings.floor, problem)
     for one in fits:
         score = ident.held_out(one.problem, one.family, one.x, one.begins)
-        described.append(_described(one, at, score, settings.confidence, settings.floor))
+        described.append(_described(one, at, score, settings.confidence, floor))
         progress.advance(1)
     described = _not_told_apart(described, fits)
     if any(n.off for n in numbers) and checked is not None:
@@ -237,7 +243,7 @@ def identify(
             f"driven by the downhole speed the curve differs from that by the surface alone by at "
             f"most {below_surface:.1%}"
         )
-    x = ident.draws_of(chosen, settings.draws, settings.seed, settings.confidence, settings.floor)
+    x = ident.draws_of(chosen, settings.draws, settings.seed, settings.confidence, floor)
     draws = np.array([chosen.family.coefficients(row, at) for row in x])
     seen = ident.portrait(problem)
     every = slice(None, None, max(1, len(seen.speed) // DRAWN_POINTS))
@@ -282,21 +288,20 @@ def _refuse_foreign(problem: Problem, main: Fit) -> None:
     if own.quiet:
         return
     noise = 1.0 - own.explained
-    best, words = noise, ""
     if noise > FOREIGN and own.signal > ident.TELLING:
+        left = {}
         for factor, said in WRONG_UNITS:
             tracks = [replace(w.track, torque=w.track.torque / factor) for w in few.windows]
             scaled = replace(few, windows=tuple(
                 replace(w, track=one) for w, one in zip(few.windows, tracks, strict=True)
             ))  # fmt: skip
-            trial = ident.best_fit(scaled, main.family)
-            if 1.0 - trial.explained < best:
-                best, words = 1.0 - trial.explained, f"{said} would make it {1 / factor:.4g} times"
-        if words and best < min(0.25 * noise, 0.1):
+            left[said] = max(1.0 - ident.best_fit(scaled, main.family).explained, 0.0)
+        best = min(left.values())
+        if best < min(0.25 * noise, 0.1):
+            words = " or ".join(said for said, x in left.items() if x < 2.0 * best + FOREIGN)
             raise InputError(
-                f"the torque of this log is not that of this string: {noise:.1%} of the returning "
-                f"wave is unexplained, and {best:.1%} if the torque were in another unit ({words} "
-                "as large)",
+                f"torque and speed of this log are not those of this string: {noise:.1%} of the "
+                f"returning wave is unexplained, but {best:.1%} if {words}; name units in [log]",
                 "--log",
             )
     if own.explained < ident.POORLY:
@@ -395,7 +400,7 @@ def _not_told_apart(described: list[FittedLaw], fits: list[Fit]) -> list[FittedL
         for other, misfit in zip(fits, misfits, strict=True):
             if misfit <= own + CLEARLY:
                 apart = np.maximum(apart, np.abs(other.curve.torque(law.speed) - law.torque))
-        half = np.hypot(law.high - law.torque, apart)
+        half = np.maximum(law.high - law.torque, BEYOND * apart)
         results.append(replace(law, low=law.torque - half, high=law.torque + half))
     return results
 
@@ -465,7 +470,7 @@ def _findings(
                 "log says"
             )
     if len(main.sticks) < 2:
-        findings.append("one window alone: its scatter is not known, the band is a guess of 5 %")
+        findings.append("one window alone: its scatter is hardly known, the band is a guess")
     if not known:
         findings.append(
             f"the weight on bit is not in the log: the curve is torque at its mean weight, and the "

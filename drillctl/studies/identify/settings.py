@@ -17,8 +17,8 @@ class Settings(Table):
     the design; the others are checked. `law`: the one to write, by default the best in predicting
     the next window. `window`: length of a window, by default three cycles; `windows`, most of them.
     `torque_lag`, `speed_lag`: how late the signals are, by filters of the drive. `floor`: least
-    half width of the band, relative, for what scatter between windows does not show. `draws`: rows
-    of the file of joint samples.
+    half width of the band, relative, for what scatter between windows does not show; 0.6 of it
+    from 20 samples a second. `draws`: rows of the file of joint samples.
     """
 
     free: tuple[Literal["travel_time", "impedance", "bit_inertia", "drive_inertia"], ...] = ()
