@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import units
 from drillctl.design import Design, to_toml
+from drillctl.design.validation import validated
 from drillctl.store.json_files import replaced, write_text
 
 if TYPE_CHECKING:
@@ -59,8 +60,8 @@ def identified(result: Identification) -> Design:
     slow, stiff = fitted.get("travel_time", 1.0), fitted.get("impedance", 1.0)
     if slow != 1.0 or stiff != 1.0:
         values |= _scaled(result.design, stiff / slow, stiff * slow)
-    made = Design(result.design.name, result.design.tables, tree, result.design.origin)
-    return made.replace(values)
+    name, origin = result.design.name, result.design.origin
+    return Design(name, validated(tree, origin), tree, origin).replace(values)
 
 
 def _scaled(design: Design, stiffer: float, heavier: float) -> dict[str, Any]:
