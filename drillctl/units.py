@@ -138,7 +138,8 @@ _SPELLED: dict[str, dict[str, str]] = {
         "Nm": "N*m", "N-m": "N*m", "N.m": "N*m", "N m": "N*m",
     },
     "m": {
-        **dict.fromkeys(('"', "\u2033", "\u201d", "''", "inch", "inches", "IN", "in."), "in"),
+        **dict.fromkeys(('"', "\u2033", "\u201d", "''", "inch", "inches", "in."), "in"),
+        **dict.fromkeys(("IN", "In", "INCH"), "in"),
         **dict.fromkeys(("'", "\u2032", "\u2019", "feet", "FT", "ft."), "ft"),
     },
     "kg/m^3": {"ppg": "lb/gal", "lbm/gal": "lb/gal", "SG": "g/cm^3", "sg": "g/cm^3"},

@@ -219,6 +219,8 @@ class _Line:
         if units.bare(text) and unit:
             text = f"{text} {unit}"
         problem = problem_of(text, kind)
+        if problem and not problem_of(text.lower(), kind):  # in capitals
+            return text.lower()
         if problem:
             hint = "" if unit or not units.bare(text) else "; the column gives no unit either"
             raise InputError(problem + hint, cell.where)

@@ -237,13 +237,14 @@ def _head(text: str) -> Head:
         words, unit = words[: bracket.start()], bracket[1].strip()
     else:
         last = re.search(r"(?<=[\w.\"])[\s,_/]+([^\s,_]+)$", words)
-        if last and _is_unit(last[1]):
+        if last and (_is_unit(last[1]) or _is_unit(last[1].lower())):
             words, unit = words[: last.start()], last[1]
     plain = re.sub(r"[\s._\-/]+", " ", words.lower()).strip()
     for field, about in FIELDS.items():
         if re.search(about.heads, plain):
             if field == "weight" and (not unit) and plain in ("ppf", "lb ft"):
                 unit = "lb/ft"
+            unit = _small(unit, about.kind)
             used = field if field != "not used" and _fits(unit, about.kind) else ""
             return Head(text.strip(), {"length of a piece": "length"}.get(used, used), unit)
     return Head(text.strip(), "", unit)
@@ -264,6 +265,11 @@ def _fits(unit: str, kind: units.Kind | None) -> bool:
     return not unit or kind is None or not problem_of(f"1 {unit}", kind)
 
 
+def _small(unit: str, kind: units.Kind | None) -> str:
+    """A unit, in small letters where it is one in these alone."""
+    return unit if _fits(unit, kind) or not _fits(unit.lower(), kind) else unit.lower()
+
+
 def problem_of(text: str, kind: units.Kind) -> str:
     """What is wrong with a quantity; empty for nothing."""
     try:
@@ -282,7 +288,7 @@ def with_units_row(
     pairs = list(zip(columns, row, strict=False))
     measured = [(c, cell) for c, cell in pairs if c.field and FIELDS[c.field].kind is not None]
     given = [(c, cell) for c, cell in measured if cell.lower() not in NOTHING]
-    if not given or not all(_fits(cell, FIELDS[c.field].kind) for c, cell in given):
+    units_of = {c: _small(cell, FIELDS[c.field].kind) for c, cell in given}
+    if not given or not all(_fits(unit, FIELDS[c.field].kind) for c, unit in units_of.items()):
         return columns, rows
-    made = [c._replace(unit=cell) if (c, cell) in given else c for c, cell in pairs]
-    return made, rows[1:]
+    return [c._replace(unit=units_of.get(c, c.unit)) for c in columns], rows[1:]

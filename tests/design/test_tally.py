@@ -257,6 +257,15 @@ PIPE = {"name": "Drill pipe", "pipe": "5 in 19.5 lb/ft", "tool_joints": True}
             "Bit,8.5 in,,1,0.3\n,,,32.5,9.9\n",
             {**PIPE, "length": "31' 6\""},
         ),
+        (  # capitals
+            "NO.,ITEM,QTY,LENGTH (M),OD (IN),ID (IN)\n1,Drill pipe,300,9.45,5,4.276\n"
+            "2,BIT,1,0.3 M,8.5 INCH,\n",
+            {**PIPE, "repeat": 300, "length": "9.45 m"},
+        ),
+        (  # capitals under the heads
+            "ITEM,LENGTH,OD,ID\n,M,MM,MM\nDrill pipe,950,127,108.6\nBIT,0.3,215.9,\n",
+            {**PIPE, "length": "950 m"},
+        ),
         (  # lines of a table in a text
             "| Name | OD (in) | ID (in) | Length (m) |\n|---|:--|---|---|\n"
             "| Drill pipe | 5 | 4.276 | 2 850 |\n| Bit | 8.5 | | 0.3 |\n",
@@ -268,7 +277,8 @@ PIPE = {"name": "Drill pipe", "pipe": "5 in 19.5 lb/ft", "tool_joints": True}
             {**PIPE, "length": "3500 m", "joint_spacing": "9.14 m"},
         ),
     ],
-    ids=["merged", "counted", "stands", "names", "comma", "feet", "text", "average"],
+    ids=["merged", "counted", "stands", "names", "comma", "feet", "capitals", "below", "text",
+         "average"],
 )  # fmt: skip
 def test_tallies_as_they_are_found(tmp_path, lines, first):
     made = read(lines, "top", tmp_path)
