@@ -9,8 +9,9 @@ import numpy as np
 
 import drillctl
 from drillctl import plots, units
-from drillctl.linear.regenerative import growth_map
 from drillctl.plots import style
+from drillctl.studies import loop_map
+from drillctl.studies.loop.compute import thinned
 
 HERE = Path(__file__).parent
 GAINS = [
@@ -77,17 +78,12 @@ def speed_and_weight() -> None:
     """J1 of the shipped case over speed and weight, and the growth of its fastest root."""
     design = drillctl.load("richard-detournay-2dof", **{"map.audit_cells": 0})
     result = drillctl.stability_map(design)
-    speeds, weights = (axis.values[::4] for axis in result.axes)
-    _, growth = growth_map(design, speeds, weights)
+    roots = loop_map(design, tuple(map(thinned, result.axes)), ("growth", "unstable_roots"))
+    growth = roots.values["growth"]
     figure = style.figure(13.0, 5.2)
     left, right = figure.subplots(1, 2)
     plots.stability_map(result, ax=left)
-    image = right.pcolormesh(
-        speeds / units.RPM, weights / 1e3, growth.T, shading="nearest", cmap="viridis"
-    )
-    bar = figure.colorbar(image, ax=right)
-    bar.set_label("growth of the rightmost root (1/s)", fontsize=style.LABEL)
-    style.dress(right, "set speed (rpm)", "weight on bit (kN)", "Before any simulation")
+    plots.loop_map(roots, "growth", ax=right)
     say("growth", np.nanmin(growth), np.nanmax(growth))
     figure.savefig(HERE / "cutting-speed-weight.png", dpi=110)
 

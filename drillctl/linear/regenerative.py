@@ -6,10 +6,11 @@ any string,
 .. math:: \chi(s) = 1 + n \frac{1 - e^{-s \tau}}{s} (K_a Y_a(s) - r K_t Y_t(s)) = 0,
           \qquad \tau = \frac{2 \pi}{n \Omega},
 
-Y the velocity at the bit per force on it, along the axis and in torsion with the drive, r the rate
-of penetration over the speed. The mobilities are passive: all their poles are in the left
-half-plane or on the axis, so that roots on the right are counted by the turns of chi about zero
-along a contour.
+where the hook holds its force; one that follows the bit speed, by H(s) per speed, adds
+H K_t Y_a Y_t to the bracket. Y is the velocity at the bit per force on it, along the axis and in
+torsion with the drive, r the rate of penetration over the speed. The mobilities are passive: all
+their poles are in the left half-plane or on the axis, so that roots on the right are counted by the
+turns of chi about zero along a contour.
 """
 
 from __future__ import annotations
@@ -29,11 +30,13 @@ from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_model import loop_poles
 from drillctl.rig.axial import AxialString
 from drillctl.rig.bit_rock.richard_detournay import RichardDetournay
+from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed, RealWeight
 from drillctl.store.codec import label
 
 FAR = 0.5  # |chi - 1| beyond which there may be roots
 AXIS = 1e-9  # real part of the contour beside the axis, over the cutting frequency
 TURN = 0.4  # largest turn of chi between two points of a contour (rad)
+POINTS = 1200  # of the grid over frequency on which roots are looked for
 MOST = 400_000  # points of a contour
 
 
@@ -77,6 +80,7 @@ class Characteristic:
         self.ratio = self.depth_of_cut / (2.0 * math.pi) if coupled else 0.0
         self.force, self.torque = float(rock.force_per_depth), float(rock.torque_per_depth)
         self.speed = design.speed
+        self._weight = weight_transfer(design)
         self._ends, self._drive = ends_of(design.string), design.linear_drive
         self._poles = loop_poles(design.string, *design.linear_drive.gains(), 0.0)
 
@@ -100,14 +104,36 @@ class Characteristic:
         """Force at the bit per cut, n K Y / s: the open loop without its delay."""
         result = self.force * axial_mobility(self.axial, s)
         if self.coupled:
-            at_top = self._drive.impedance(s)
-            result = result - self.ratio * self.torque / self._ends.bit_impedance(s, at_top)
+            turning = self.torque / self._ends.bit_impedance(s, self._drive.impedance(s))
+            along = self._weight(s) * result / self.force
+            result = result + (along - self.ratio) * turning
         return np.asarray(self.blades * result / s)
 
     def __call__(self, s: ComplexArray) -> ComplexArray:
         """Chi at complex frequencies (1/s)."""
         s = np.asarray(s, dtype=complex)
         return np.asarray(1.0 - np.expm1(-s * self.delay) * self.stiffness(s))
+
+
+def weight_transfer(design: Design) -> Any:
+    """Force of the hook per bit speed (N s/rad) as a function of s (1/s)."""
+    law: Any = design.weight_on_bit
+    if isinstance(law, ConstantWeight):
+        return lambda s: 0.0
+    if type(law) not in (FollowingSpeed, RealWeight) or getattr(law, "period", 0.0) > 0.0:
+        raise InputError(
+            "the roots of a cutting bit are found under a hook that holds its force or follows the "
+            "bit speed, at once or behind delay and lags: not under one that reads it at "
+            "intervals, by an observer or an alarm",
+            "weight_on_bit",
+        )
+    free = law.nominal + law.gain * (design.speed - law.set_speed)
+    gain = float(law.gain) if law.least < free < law.most else 0.0
+    if isinstance(law, FollowingSpeed):
+        return lambda s: gain
+    return lambda s: (
+        gain * np.exp(-s * law.delay) / ((1.0 + s * law.sensor) * (1.0 + s * law.hoist))
+    )
 
 
 def axial_mobility(string: AxialString, s: ComplexArray) -> ComplexArray:
@@ -159,7 +185,14 @@ def _roots(chi: Characteristic, limit: float) -> tuple[int, ComplexArray]:
     """Number of roots on the right, and those found, up to a frequency (rad/s)."""
     right = _right_edge(chi, limit)
     count = count_roots(chi, complex(AXIS * chi.scale, -limit), complex(right, limit))
-    return count, find_roots(chi, right, limit)
+    for points in (POINTS, 4 * POINTS):  # a root beside a pole hides between the points of a grid
+        found = find_roots(chi, right, limit, points=points)
+        positive = found[found.real > 0.0]
+        if (2 * (positive.imag > 0.0) + (positive.imag == 0.0)).sum() >= count:
+            break
+    if not len(found):
+        found = find_roots(chi, right, limit, left=-chi.scale)
+    return count, found
 
 
 def frequency_limit(chi: Characteristic, design: Design) -> tuple[float, bool]:
@@ -211,17 +244,21 @@ def count_roots(chi: Any, low: complex, high: complex) -> int:
     return round(total / (2.0 * math.pi))
 
 
-def find_roots(chi: Any, right: float, limit: float, left: float = -1.0) -> ComplexArray:
+def find_roots(
+    chi: Any, right: float, limit: float, left: float = -1.0, points: int = POINTS
+) -> ComplexArray:
     """Roots right of `left` (1/s) with a positive or no imaginary part, rightmost first."""
     found: list[complex] = []
     real = np.concatenate([np.linspace(left, 0.0, 12), right * np.geomspace(1e-3, 1.0, 48)])
-    imaginary = np.linspace(0.0, limit, 1200)
+    imaginary = np.linspace(0.0, limit, points)
     grid = real[:, None] + 1j * imaginary
     size = np.abs(chi(grid.ravel() + 1e-9)).reshape(grid.shape)
     padded = np.pad(size, 1, constant_values=np.inf)
     around = [padded[1 + i : padded.shape[0] - 1 + i, 1 + j : padded.shape[1] - 1 + j]
               for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]  # fmt: skip
     starts = grid[np.all([size <= other for other in around], axis=0)]
+    beside = 1j * chi.resonances[:, None] + (1.0 + 1.0j) * chi.scale * np.array([1e-4, 1e-3, 1e-2])
+    starts = np.concatenate([starts, beside.ravel()])
     for start in starts:
         root = _polished(chi, complex(start), max(abs(right), 1.0))
         if root is None or root.real < left or not -1e-9 <= root.imag <= limit:
@@ -279,20 +316,14 @@ def axial_boundary(design: Design) -> float | None:
     return max(speeds, default=None)
 
 
-def growth_map(design: Design, speeds: Array, weights: Array) -> tuple[Array, Array]:
-    """Number of roots on the right and largest real part (1/s), shape (speeds, weights)."""
-    from drillctl import units
+def rightmost(design: Design) -> tuple[float, float]:
+    """Number of roots on the right up to the frequency limit, and the largest real part (1/s).
 
-    counts = np.zeros((len(speeds), len(weights)), dtype=int)
-    growth = np.zeros(counts.shape)
-    for i, speed in enumerate(speeds):
-        for j, weight in enumerate(weights):
-            one = design.replace({
-                "operating_point.speed": units.SI(speed),
-                "operating_point.weight_on_bit": units.SI(weight),
-            })  # fmt: skip
-            chi = Characteristic(one)
-            limit, _ = frequency_limit(chi, one)
-            counts[i, j], found = _roots(chi, limit)
-            growth[i, j] = found[0].real if len(found) else math.nan
-    return counts, growth
+    NaN of a bit that does not drill.
+    """
+    chi = Characteristic(design)
+    if chi.depth_of_cut == 0.0:
+        return math.nan, math.nan
+    limit, _ = frequency_limit(chi, design)
+    count, found = _roots(chi, limit)
+    return count, float(found[0].real) if len(found) else math.nan

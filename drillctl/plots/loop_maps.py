@@ -33,6 +33,8 @@ NAMES = {
     "spectral_abscissa": "largest real part",
     "low_damping": "damping ratio of the low modes",
     "peak_sensitivity": "largest |S|",
+    "growth": "growth of the rightmost root",
+    "unstable_roots": "roots in the right half-plane",
 }
 """What the colour bar says; the unit comes from `displayed`."""
 REASONS = {"peak_sensitivity": "grey: loop not stable, or no steady drilling"}
@@ -49,7 +51,7 @@ class _Look:
 
 @style.picture(
     result="Over two parameters.",
-    quantity="One of `drillctl.studies.loop_mapping.compute.QUANTITIES` that was mapped.",
+    quantity="One of `QUANTITIES` or `CUTTING` of `drillctl.studies.loop_mapping.compute`.",
     boundary="Outline of the stable gains, drawn over a map of both gains.",
     raises="Not two parameters, a quantity that was not mapped, or a boundary of other parameters.",
 )
@@ -92,7 +94,7 @@ def _look(quantity: str, values: Array) -> _Look:
     plain = colours(0.2, 1.0)
     if quantity == "deciding_frequency" and low > 0.0:
         return _Look(LogNorm(low, max(high, 1.01 * low)), plain, ())
-    if quantity == "spectral_abscissa":
+    if quantity in ("spectral_abscissa", "growth"):
         # Undamped high modes sit at almost zero: what decays is all but white.
         reach = float(np.quantile(np.abs(finite), 0.95)) if finite.size else 1.0
         return _Look(Normalize(-reach or -1.0, reach or 1.0), "RdBu_r", ())
@@ -131,13 +133,18 @@ def _colour(
 
 
 def _stability(ax: Axes, result: LoopMap, x: Array, y: Array) -> None:
-    """The line at which the slope of the rock equals the margin."""
-    reserve = result.values["slope_margin"] - result.values["slope"]
+    """The line at which the slope of the rock equals the margin, or a root the imaginary axis."""
+    cuts = "growth" in result.values
+    reserve = (
+        -result.values["growth"] if cuts
+        else result.values["slope_margin"] - result.values["slope"]
+    )  # fmt: skip
     finite = reserve[np.isfinite(reserve)]
     if not (finite.size and finite.min() < 0.0 < finite.max() and min(reserve.shape) > 1):
         return
     ax.contour(x, y, reserve.T, levels=[0.0], colors=style.BLACK, linewidths=2.6)
-    ax.plot([], [], color=style.BLACK, linewidth=2.6, label="stability boundary, D* = D")
+    ax.plot([], [], color=style.BLACK, linewidth=2.6,
+            label="stability boundary" if cuts else "stability boundary, D* = D")  # fmt: skip
 
 
 def _outline(

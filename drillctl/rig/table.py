@@ -204,13 +204,16 @@ Damping = Annotated[float, units.DAMPING, _not_negative(1e6, units.DAMPING)]
 Drag = Annotated[float, units.DRAG, _not_negative(1e5, units.DRAG)]
 Slowness = Annotated[float, units.SLOWNESS, _not_negative(1e6, units.SLOWNESS)]
 WeightGain = Annotated[float, units.WEIGHT_GAIN, _not_negative(1e9, units.WEIGHT_GAIN)]
-ProportionalGain = Annotated[float, units.PROPORTIONAL_GAIN, _any(1e8, units.PROPORTIONAL_GAIN)]
-IntegralGain = Annotated[float, units.INTEGRAL_GAIN, _any(1e8, units.INTEGRAL_GAIN)]
+MOST_GAIN = 1e8  # (N m s/rad, N m/rad)
+ProportionalGain = Annotated[
+    float, units.PROPORTIONAL_GAIN, _any(MOST_GAIN, units.PROPORTIONAL_GAIN)
+]
+IntegralGain = Annotated[float, units.INTEGRAL_GAIN, _any(MOST_GAIN, units.INTEGRAL_GAIN)]
 PositiveProportionalGain = Annotated[
-    float, units.PROPORTIONAL_GAIN, _positive(1e-6, 1e8, units.PROPORTIONAL_GAIN)
+    float, units.PROPORTIONAL_GAIN, _positive(1e-6, MOST_GAIN, units.PROPORTIONAL_GAIN)
 ]
 PositiveIntegralGain = Annotated[
-    float, units.INTEGRAL_GAIN, _positive(1e-6, 1e8, units.INTEGRAL_GAIN)
+    float, units.INTEGRAL_GAIN, _positive(1e-6, MOST_GAIN, units.INTEGRAL_GAIN)
 ]
 
 # Limits: None where there is none.

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl.design.paths import tuned_ranges
 from drillctl.errors import InputError
 from drillctl.simulation import cutting
-from drillctl.simulation.lanes import Lanes, Start
+from drillctl.simulation.batch import prepare, run_batch
+from drillctl.simulation.lanes import Lanes, Start, lane_numbers, lanes_of
 from drillctl.units import SI
 
 UNIT = math.sqrt(116.0 / 938.0)  # s
@@ -72,6 +74,36 @@ def test_contact_is_lost_where_independent_codes_lose_it(design):
     assert times(run, "lost_contact")[0] == pytest.approx(6.5425, abs=1e-4)
     assert run.measures.lost_contact_time > 0.0
     assert run.energy.relative_residual < 1e-6
+
+
+LANDING = "9.938323814206907 rad/s"
+"""A start after which the bit comes down within the share of a step that its flat would stop it."""
+
+
+def test_a_bit_that_lands_keeps_its_motion(design):
+    """In fixed steps too, whatever the share of the step that it falls freely."""
+    one = design.replace(SECOND | {"start.bit_speed": LANDING, "simulation.duration": "5 s"})
+    exact, batch = drillctl.simulate(one), drillctl.simulate(one, "batch")
+    assert exact.measures.lost_contact_time > 0.5
+    for name in ("j1", "work_at_bit", "rate_of_penetration", "lost_contact_time",
+                 "peak_bit_speed", "min_bit_speed"):  # fmt: skip
+        value = getattr(exact.measures, name)
+        assert getattr(batch.measures, name) == pytest.approx(value, rel=2e-2), name
+
+
+def test_an_ensemble_of_starts_has_the_same_mean_in_both_engines(design):
+    """After loss of contact single runs are samples; their mean over small changes is not."""
+    one = design.replace(SECOND | {"simulation.duration": "8 s"})
+    shares = 1.0 + 1e-3 * np.linspace(-1.8, 1.8, 96)
+    numbers = {name: np.full(96, value) for name, value in lane_numbers(one).items()}
+    numbers["bit_speed"] = 9.952691 * shares
+    lanes = lanes_of(one, numbers)
+    drawn = run_batch(lanes, prepare(lanes, one.tables.simulation)).measures["j1"]
+    exact = [
+        drillctl.simulate(one.replace({"start.bit_speed": SI(9.952691 * share)})).measures.j1
+        for share in shares[::8]
+    ]
+    assert drawn.mean() == pytest.approx(np.mean(exact), rel=1e-2)
 
 
 def test_energy_of_drive_and_hook_is_that_of_rock_and_string(run, design):
@@ -223,6 +255,12 @@ def test_drives_programs_and_hooks_are_the_same_in_both_engines(design, name):
         limit = exact.measures.time_at_torque_limit
         assert limit > 0.3
         assert batch.measures.time_at_torque_limit == pytest.approx(limit, abs=0.02)
+
+
+def test_gains_of_a_drive_that_nothing_slows_down_have_bounds(design):
+    """So that searches over them begin: its inertia would allow more than a design can have."""
+    for path, (_, most) in tuned_ranges(design).items():
+        assert design.replace({path: most}).tables.controller.ki <= 1e8
 
 
 def test_what_it_does_not_go_with_is_refused(design):

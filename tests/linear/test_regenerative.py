@@ -17,6 +17,7 @@ from drillctl.linear.regenerative import (
     cutting_loop,
 )
 from drillctl.rig.axial import AxialTable, axial_string
+from drillctl.studies import Axis, loop_map
 from drillctl.units import SI
 
 UNIT = math.sqrt(116.0 / 938.0)
@@ -94,6 +95,44 @@ def test_a_string_of_elements_is_a_rod(top, share):
     answer = 1.0 / np.tanh(s * travel) if top == "force" else np.tanh(s * travel)
     assert axial_mobility(string, s) == pytest.approx(answer / impedance, rel=2e-3)
     assert string.impedance == pytest.approx(impedance)
+
+
+def test_a_hook_that_follows_the_speed_damps_as_its_root_says(design):
+    """The decay of a simulated swing, above the axial boundary."""
+    one = design.replace({
+        "bit_rock.wear_flat_length": "1.2 mm", "operating_point.weight_on_bit": "23.4093 kN",
+        "operating_point.speed": "22 rad/s", "start.bit_speed": "21.99 rad/s",
+        "weight_on_bit.law": "navarro-lopez-suarez", "weight_on_bit.gain": "1 kN*s/rad",
+        "weight_on_bit.minimum": "10 kN", "weight_on_bit.maximum": "40 kN",
+        "simulation.duration": "9 s",
+    })  # fmt: skip
+    root = cutting_loop(one).roots[0]
+    run = drillctl.simulate(one)
+    swing, period = np.abs(run.signals["bit_speed"] - 22.0), 2.0 * math.pi / root.imag
+    early, late = (swing[(run.time > a) & (run.time < a + period)].max()
+                   for a in (2.0, 2.0 + 2.0 * period))  # fmt: skip
+    assert math.log(late / early) / (2.0 * period) == pytest.approx(root.real, rel=0.02)
+    assert root.real < -0.3
+    with pytest.raises(InputError, match="at intervals"):
+        cutting_loop(one.replace({"weight_on_bit.path": {"sampling_period": "1 s"}}))
+
+
+def test_a_map_of_roots_holds_the_roots_of_its_cells(design):
+    axes = (Axis("operating_point.speed", "rad/s", np.array([8.0, 16.0])),
+            Axis("operating_point.weight_on_bit", "N", np.array([60e3, 80e3])))  # fmt: skip
+    found = loop_map(design, axes, ("growth", "unstable_roots"))
+    assert np.isnan(found.values["growth"][:, 0]).all()  # the wear flat bears it all
+    for row, speed in enumerate(axes[0].values):
+        alone = cutting_loop(design.replace({
+            "operating_point.speed": SI(speed), "operating_point.weight_on_bit": SI(80e3),
+        }))  # fmt: skip
+        assert found.values["growth"][row, 1] == pytest.approx(alone.roots[0].real, rel=1e-9)
+        assert found.values["unstable_roots"][row, 1] == alone.unstable_roots
+    # Above the axial boundary the slow root beside the pole of torsion is left.
+    assert found.values["unstable_roots"][:, 1].tolist() == [4, 2]
+    assert 0.0 < found.values["growth"][1, 1] < 0.01
+    with pytest.raises(InputError, match="no quantity 'growth'"):
+        loop_map(drillctl.load("monteiro-trindade-140kn"), quantities=("growth",))
 
 
 def test_a_loop_with_this_bit_tells_its_roots(design):

@@ -109,12 +109,14 @@ def _ranges(table: ConstantTorqueTable, string: Any) -> Ranges:
 def _pi_ranges(table: PITable, string: Any) -> Ranges:
     """Where the best gains of five rigs are: 2.1 to 4.5 zeta, 0.40 to 0.85 w_s^2 J_d; and beyond.
 
-    In place of the impedance that a lumped spring lacks stands k / w_s.
+    In place of the impedance that a lumped spring lacks stands k / w_s. Of a drive so heavy that
+    nothing slows it down, no more than the keys allow.
     """
     lumped = string.parts.sections[0].inertia == 0.0
     spring = string.static_stiffness / string.stick_slip_frequency
     impedance = spring if lumped else string.pipe_impedance
-    return {"kp": (0.0, 6.0 * impedance), "ki": (0.0, 1.5 * string.drive_spring)}
+    most = {"kp": 6.0 * impedance, "ki": 1.5 * string.drive_spring}
+    return {key: (0.0, min(value, q.MOST_GAIN)) for key, value in most.items()}
 
 
 LAWS = (

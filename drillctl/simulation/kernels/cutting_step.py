@@ -60,10 +60,10 @@ class CuttingStep(NamedTuple):
     start: Any  # shape (2 blocks, lanes): at the steady rate of time zero
 
 
-(FORCE, CUT, TOUCHING, HOLDS, OLDER, NEWEST, BASE, BEFORE_ANGLE, NEWEST_ANGLE, LEFT_ANGLE,
+(FORCE, CUT, TOUCHING, GAP, OLDER, NEWEST, BASE, BEFORE_ANGLE, NEWEST_ANGLE, LEFT_ANGLE,
  LEFT_DEPTH, RIGHT_ANGLE, RIGHT_DEPTH, PUSH, SHIFT) = (WIDTH * k for k in range(15))  # fmt: skip
-"""Rows of a block: mean force of the rock (N), depth of cut of a blade (m), 1 in contact, 1 where
-the bit neither sank nor rose; slots of the second point at hand and of the newest, where a lane's
+"""Rows of a block: mean force of the rock (N), depth of cut of a blade (m), 1 in contact, by how
+much the bit is off bottom (m); slots of the second point at hand and of the newest, where a lane's
 ring begins; angles (rad) and depths (m) of points; force of the step just taken (N), and what is
 to be added to the depth (m)."""
 OWN = 15
@@ -109,7 +109,6 @@ def begin_cutting(
     put(rows, FORCE, load)
     put(rows, CUT, cut)
     put(rows, TOUCHING, 1.0)
-    put(rows, HOLDS, pick(still, 1.0, 0.0))
     base = lane_number() * (2 * (memory.surface.shape[0] // (2 * WIDTH)))
     put(rows, BASE, base)
     begin = -FARTHEST * law.between
@@ -170,21 +169,25 @@ def cut_rock(
         push = pick(touches, base - stiffness * (inside - behind), base)
         return push, depth_free + by_depth * push, sinking_free + by_speed * push, touches
 
-    push_down, depth_down, sinking_down, touches_down = under(hook - was - law.flat)
     push_up, depth_up, sinking_up, touches_up = under(hook - was)
-    sinks = (sinking_down > 0.0) & (touching | touches_down)
-    leaves = (sinking_up < 0.0) | ~(touching | touches_up)
-    rests = (still & touching) | ~(sinks | leaves)
+    # A bit that comes down from above meets the rock with its wear flat for a share of the step.
+    lands = touches_up & ~touching
+    under_way = most(depth_up - behind, 0.0)
+    bearing = pick(lands, under_way / most(under_way + at(rows, GAP), TINY), 1.0)
+    push_down, depth_down, sinking_down, _ = under(hook - was - law.flat * bearing)
+    sinks = (sinking_down > 0.0) & (touching | lands)
+    leaves = (sinking_up < 0.0) | ~(touching | lands)
+    rests = (still & (touching | lands)) | ~(sinks | leaves)
     push_held = -sinking_free / by_speed
     depth_held = depth_free + by_depth * push_held
     push = pick(rests, push_held, pick(sinks, push_down, push_up))
     new_depth = pick(rests, depth_held, pick(sinks, depth_down, depth_up))
     new_sinking = pick(rests, 0.0, pick(sinks, sinking_down, sinking_up))
     touches = (new_depth >= behind) | (rests & still)
-    bears = touches | touching
+    bears = touches | touching | lands
     cutters = was + stiffness * most(new_depth - behind, 0.0)
     share = _within_one((hook - push - cutters) / most(law.flat, TINY))
-    share = pick(bears, pick(rests, share, pick(sinks, 1.0, 0.0)), 0.0)
+    share = pick(bears, pick(rests, share, pick(sinks, bearing, 0.0)), 0.0)
     # The torsional one.
     torque = law.arm * cutters + law.flat_torque * share
     moved = reduced.free - reduced.gain * torque
@@ -215,8 +218,8 @@ def cut_rock(
     ):
         put(work, row, at(work, row) + amount)
     for row, value in (
-        (FORCE, force), (CUT, new_cut), (TOUCHING, pick(touches, 1.0, 0.0)), (PUSH, push),
-        (SHIFT, shift),
+        (FORCE, force), (CUT, new_cut), (TOUCHING, pick(touches, 1.0, 0.0)),
+        (GAP, most(behind - new_depth, 0.0)), (PUSH, push), (SHIFT, shift),
     ):  # fmt: skip
         put(rows, row, value)
     put(work, r.TURNED, turned + way)

@@ -159,12 +159,17 @@ def remarks(result: LoopAnalysis, system: units.System) -> Iterator[str]:
 
 def notes(result: LoopAnalysis) -> Iterator[str]:
     """Why there is no map, or not all of it."""
-    from drillctl.studies.loop.compute import MOST_NODES, MappedLoop, large
+    from drillctl.studies.loop.compute import MOST_NODES, MOST_ROOTS, MappedLoop, large
 
     if not isinstance(result, MappedLoop):
         return
     if result.no_map:
         yield f"no map: {result.no_map}"
+    elif result.map is not None and result.design.axial is not None:
+        yield (
+            f"map of the roots over {MOST_ROOTS} points of an axis at most; in Python "
+            "drillctl.studies.loop_map takes any"
+        )
     elif result.map is not None and large(result.design):
         yield (
             f"map of the slope margin alone, no root locus: {result.design.string.nodes} nodes; up "
@@ -202,7 +207,7 @@ STUDY = Study(
             "loop", "The linear loop", ("loop", "slope-margin"), order=40,
             shows=("margins", "closed-loop-modes", "mobility", "closed-loop", "nyquist",
                    "nichols", "sensitivity", "boundary", "root-locus", "impedance",
-                   "slope-margin"),
+                   "slope-margin", "cutting-roots"),
         ),
     ),
 )  # fmt: skip

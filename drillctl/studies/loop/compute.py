@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from drillctl import plots, units
 from drillctl.arrays import Array
 from drillctl.design import Design
-from drillctl.ensemble.grid import axes_of
+from drillctl.ensemble.grid import Axis, axes_of
 from drillctl.errors import InputError
 from drillctl.linear.boundary import WINDOW, Window, gain_boundary, root_locus
 from drillctl.linear.ends import ends_of
@@ -24,13 +24,16 @@ from drillctl.linear.tuning import drive_impedance, stick_slip_frequency
 from drillctl.progress import Progress
 from drillctl.store.codec import label
 from drillctl.studies.base import Picture
-from drillctl.studies.loop_mapping.compute import LoopMap, loop_map
+from drillctl.studies.loop_mapping.compute import CUTTING, LoopMap, loop_map
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_NODES = 120
 """Nodes of a string up to which its poles are computed over and over, for maps and loci."""
+
+
+MOST_ROOTS = 9  # points of an axis over which the roots of a cutting bit are mapped
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +68,19 @@ def _map(design: Design, progress: Progress) -> tuple[LoopMap | None, str]:
         return None, str(error) if named else ""
     if len(axes) != 2:
         return None, f"it runs over 2 parameters, the design's [map] has {len(axes)}"
+    if design.axial is not None:
+        axes = tuple(thinned(axis) for axis in axes)
+        return loop_map(design, axes, ("slope_margin", *CUTTING), progress=progress), ""
     if large(design) or not design.simple_loop:
         return loop_map(design, axes, ("slope_margin",), progress=progress), ""
     return loop_map(design, axes, progress=progress), ""
+
+
+def thinned(axis: Axis) -> Axis:
+    """An axis with few points, the ends among them: its cells take a search for roots each."""
+    if len(axis) <= MOST_ROOTS:
+        return axis
+    return replace(axis, values=np.linspace(axis.values[0], axis.values[-1], MOST_ROOTS))
 
 
 def large(design: Design) -> bool:

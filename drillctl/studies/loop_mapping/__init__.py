@@ -38,8 +38,17 @@ def tables(result: LoopMap) -> Iterator[Table]:
 
 
 def pictures(result: LoopMap) -> Iterator[Picture]:
-    """The slope margin."""
+    """The slope margin, or the growth of a bit that cuts its own wake."""
     if len(result.axes) != 2:
+        return
+    if "growth" in result.values:
+        yield Picture(
+            "cutting-roots",
+            "Growth of the rightmost root of the cutting bit over the map, and where all decay.",
+            f"Map of the growth; in {int(result.stable.sum())} of {result.stable.size} cells no "
+            "root lies in the right half-plane.",
+            lambda system: plots.loop_map(result, "growth", system=system),
+        )  # fmt: skip
         return
     best = result.best
     largest = (

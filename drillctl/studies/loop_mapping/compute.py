@@ -14,6 +14,7 @@ from drillctl.ensemble.grid import (
     Axis,
     Group,
     axes_of,
+    cell_design,
     groups,
     other_axes,
     place_of,
@@ -39,6 +40,12 @@ QUANTITIES = {
     "peak_sensitivity": ("1", "largest sensitivity at the top torque"),
 }
 """Unit and meaning of what is mapped."""
+CUTTING = {
+    "growth": ("1/s", "largest real part of the roots of the cutting bit"),
+    "unstable_roots": ("1", "roots of the cutting bit in the right half-plane, up to a frequency"),
+}
+"""The same of a bit that cuts its own wake."""
+ALL = QUANTITIES | CUTTING
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +59,15 @@ class LoopMap(Result, kind="loop-map"):
     design: Design = label(means="what was varied")
     axes: tuple[Axis, ...] = label(means="parameters and their values")
     values: dict[str, Array] = label(
-        "axes", flat=True, unit=lambda name: QUANTITIES[name][0],
-        means=lambda name: QUANTITIES[name][1],
+        "axes", flat=True, unit=lambda name: ALL[name][0], means=lambda name: ALL[name][1],
     )  # fmt: skip
     total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def stable(self) -> Mask:
-        """Cells whose slope is under its margin, shape of the grid."""
+        """Cells whose slope is under its margin, shape of the grid; of a cutting bit, its roots."""
+        if "unstable_roots" in self.values:
+            return np.asarray(self.values["unstable_roots"] == 0.0)
         return np.asarray(self.values["slope"] < self.values["slope_margin"])
 
     @property
@@ -73,7 +81,7 @@ class LoopMap(Result, kind="loop-map"):
 
     def unit(self, quantity: str) -> str:
         """Unit of a quantity, SI."""
-        return QUANTITIES[quantity][0]
+        return ALL[quantity][0]
 
     def summary(self) -> dict[str, Any]:
         """Axes, stable cells, largest slope margin; strict JSON values, SI."""
@@ -108,7 +116,8 @@ def loop_map(
     axes : tuple of Axis, optional
         Instead of the design's own.
     quantities : tuple of str
-        What to map, of `QUANTITIES`; slope and slope margin always are.
+        What to map, of `QUANTITIES`, and of `CUTTING` for a bit that cuts its own wake; slope and
+        slope margin always are.
     progress : Progress
         Receives finished cells.
 
@@ -119,16 +128,19 @@ def loop_map(
     """
     begin = time.perf_counter()
     for name in quantities:
-        if name not in QUANTITIES:
-            raise InputError(f"no quantity {name!r}; allowed: {', '.join(QUANTITIES)}")
+        if name not in ALL or (name in CUTTING and design.axial is None):
+            allowed = QUANTITIES if design.axial is None else ALL
+            raise InputError(f"no quantity {name!r}; allowed: {', '.join(allowed)}")
     axes = axes_of(design) if axes is None else axes
     shape = shape_of(axes)
     wanted = {"slope", "slope_margin", "deciding_frequency", *quantities}
-    values = {name: np.full(int(np.prod(shape)), np.nan) for name in QUANTITIES if name in wanted}
+    values = {name: np.full(int(np.prod(shape)), np.nan) for name in ALL if name in wanted}
     progress.begin("analysing loops", values["slope"].size)
     for group in groups(design, axes):
         for name, result in _figures(design, axes, group, wanted).items():
             values[name][group.cells] = result
+        if wanted & CUTTING.keys():
+            _cut(design, axes, group, values)
         progress.advance(len(group.cells))
     seconds = time.perf_counter() - begin
     return LoopMap(design, axes, {k: v.reshape(shape) for k, v in values.items()}, seconds)
@@ -150,6 +162,17 @@ def _figures(
     if wanted & {"spectral_abscissa", "low_damping", "peak_sensitivity"}:
         results |= _of_poles(group, slope, slope < margin.slope, wanted)
     return results
+
+
+def _cut(design: Design, axes: tuple[Axis, ...], group: Group, values: dict[str, Array]) -> None:
+    """Roots of the cutting bit in the cells that share a string."""
+    from drillctl.linear.regenerative import rightmost
+
+    for cell in group.cells:
+        found = rightmost(cell_design(design, axes, int(cell)))
+        for name, value in zip(("unstable_roots", "growth"), found, strict=True):
+            if name in values:
+                values[name][cell] = value
 
 
 def _of_poles(group: Group, slope: Array, stable: Mask, wanted: set[str]) -> dict[str, Array]:
