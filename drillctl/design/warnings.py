@@ -20,6 +20,7 @@ from drillctl.rig.drillstring.mesh import off_the_line
 from drillctl.rig.top_drive import TopDriveLaw
 from drillctl.rig.top_drive.law import OFF_THE_CURVE
 from drillctl.rig.weight_on_bit import PATHS
+from drillctl.rig.well.survey import path_of, sharp_bends
 
 CHATTER = 0.03  # damping ratio that the rock may take from the fastest modes at the bit
 # Modes share the mobility of the bit: damping ends its chatter at a twentieth of what the rock
@@ -81,6 +82,7 @@ def warnings_of(
         _light_bit(parts, fall),
         _mesh(parts),
         _step(tables),
+        *_bends(tables),
     )
     return tuple(one for one in found if one is not None)
 
@@ -225,6 +227,17 @@ def _mesh(parts: Parts) -> DesignWarning | None:
             key, "left out: drillctl chooses",
         )  # fmt: skip
     return None
+
+
+def _bends(tables: DesignTables) -> Iterator[DesignWarning]:
+    """Sharp bends of the well."""
+    if tables.well.survey:
+        for depth, bend in sharp_bends(path_of(tables.well.survey)):
+            yield DesignWarning(
+                f"the well bends by {math.degrees(bend) * 30.0:.3g} deg/30 m below {depth:g} m: "
+                "more than 15, where a string without bending stiffness says little",
+                "well.survey", "stations between which the well bends by less",
+            )  # fmt: skip
 
 
 def _step(tables: DesignTables) -> DesignWarning | None:

@@ -42,6 +42,9 @@ def test_sharp_bends_are_found():
     assert sharp_bends(path_of(((0.0, 0.0, 0.0), (30.0, math.radians(14.9), 0.0)))) == []
     ((depth, bend),) = sharp_bends(path_of(((0.0, 0.0, 0.0), (30.0, math.radians(15.1), 0.0))))
     assert (depth, math.degrees(bend) * 30.0) == (0.0, pytest.approx(15.1))
+    survey = [["0 m", "0 deg", "0 deg"], ["30 m", "16 deg", "0 deg"]]
+    warnings = drillctl.load("well-a-off-bottom", **{"well.survey": survey}).warnings
+    assert any("16 deg/30 m" in str(one) for one in warnings)
 
 
 def test_well_a_in_air():

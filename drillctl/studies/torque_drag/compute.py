@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,6 @@ from drillctl.design.parts import torque_at_set_speed
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.rig.well.soft_string import Drag, Line, Motion, Run, drag, sinusoidal_limit
-from drillctl.rig.well.survey import sharp_bends
 from drillctl.store.codec import label
 from drillctl.store.result import Result
 
@@ -125,7 +123,6 @@ def torque_drag(design: Design, progress: Progress = SILENT) -> TorqueDrag:
         notes=(
             *_lumped(made),
             *_vertical(design),
-            *_bends(design),
             *_buckled(found, limit, placed),
         ),
     )
@@ -185,15 +182,6 @@ def _vertical(design: Design) -> list[str]:
     if design.tables.well.survey:
         return []
     return ["the well has no survey and is taken as vertical, where nothing rubs: give well.survey"]
-
-
-def _bends(design: Design) -> list[str]:
-    """Sharp bends of the well."""
-    return [
-        f"the well bends by {math.degrees(bend) * 30.0:.3g} deg/30 m below {depth:g} m: more than "
-        "15, where a string without bending stiffness says little"
-        for depth, bend in sharp_bends(well.path(design.tables))
-    ]
 
 
 def _buckled(found: dict[str, Drag], limit: Array, placed: Line) -> list[str]:
