@@ -421,6 +421,11 @@ def displayed(value: Any, si_unit: str, system: System = "si") -> tuple[Any, str
     return value / _KNOWN["m" if si_unit == DIAMETERS else si_unit][unit], _plain(unit)
 
 
+def file_unit(si_unit: str, system: System) -> str:
+    """The unit that people read in place of an SI unit, as a design file takes it."""
+    return _SHOWN[system].get(si_unit, si_unit)
+
+
 def unit_name(si_unit: str, system: System) -> str:
     """The unit that people read in place of an SI unit; empty for a number without."""
     return str(displayed(1.0, si_unit, system)[1])

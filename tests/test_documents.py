@@ -182,10 +182,10 @@ def test_examples_run(name, tmp_path):
 
 
 def test_nothing_speaks_of_where_it_was_made():
-    words = ("/wo" + "rk/", "sha" + "red/", "sess" + "ion")
+    words = ("/wo" + "rk/", "sha" + "red/", r"\bsess" + r"ions?\b")
     for folder in ("drillctl", "models", "designs", "docs", "examples", "benchmarks"):
         for path in (ROOT / folder).rglob("*"):
             if path.suffix in (".py", ".toml", ".md"):
                 text = path.read_text(encoding="utf-8")
                 for word in words:
-                    assert word not in text, f"{path}: {word}"
+                    assert not re.search(word, text), f"{path}: {word}"

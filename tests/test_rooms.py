@@ -18,7 +18,7 @@ GROUND = (
 )  # fmt: skip
 ROOMS = (
     "drillctl", "ground", "rig", "design", "store", "linear", "simulation", "logs", "ensemble",
-    "plots", "studies", "reporting", "cli", "__main__",
+    "plots", "studies", "reporting", "explorer", "cli", "__main__",
 )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ VERBS: dict[str, tuple[Callable[..., None], Group]] = {
     "show": (files.show, "Describe a rig"),
     "validate": (files.validate, "Describe a rig"),
     "log": (log, "Describe a rig"),
+    "explore": (files.explore, "Decide"),
     "report": (files.report, "Hand over"),
 }
 """Commands that are not studies, with their groups in the help."""

@@ -1,4 +1,4 @@
-"""Commands on files: list shipped ones, print, check or start a design, write its report."""
+"""Commands on files: list shipped ones, print, check or start a design, explore it, report it."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from drillctl.cli.options import (
     DesignName,
     Json,
     Sets,
+    Threads,
     Units,
     command_of,
+    common_options,
     loaded,
     warn,
     with_warnings,
@@ -234,6 +236,27 @@ def new(
         f"{sum(one.span for one in sections):.1f} m in all"
     )
     console.line(f"written: {path}")
+
+
+def explore(
+    design: DesignName,
+    sets: Sets = None,
+    port: Annotated[
+        int | None, typer.Option(min=1, max=65535, help="Use this port, not a random one.")
+    ] = None,
+    browser: Annotated[bool, typer.Option(help="Open a page in the browser.")] = True,
+    threads: Threads = None,
+    units: Units = None,
+    debug: Debug = False,
+) -> None:
+    """Turn gains on a local page and watch the region move."""
+    from drillctl.explorer.server import serve
+
+    common = common_options(threads=threads, units=units)
+    loaded_design = loaded(design, sets)
+    warn(loaded_design, common.units)
+    system = units or loaded_design.tables.units or "si"
+    serve(loaded_design, system, port, browser, console.line)
 
 
 OPTIONS = (

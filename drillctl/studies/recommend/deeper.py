@@ -28,6 +28,11 @@ def under_top(design: Design) -> float:
 
 def at_depth(design: Design, depth: float) -> Design:
     """The design with a string of that length (m), whose topmost section is shorter or longer."""
+    return design.replace(depth_changes(design, depth))
+
+
+def depth_changes(design: Design, depth: float) -> dict[str, Any]:
+    """What a string of that length (m) changes in a design, by path."""
     first, rest = design.tables.drillstring.sections[0], under_top(design)
     top = depth - rest
     if top <= 0.0:
@@ -41,4 +46,4 @@ def at_depth(design: Design, depth: float) -> Design:
         changed[f"{where}.repeat"] = 1
         if first.joint and first.inertia is None:
             changed[f"{where}.joint_spacing"] = units.SI(first.spacing)
-    return design.replace(changed)
+    return changed

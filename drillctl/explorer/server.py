@@ -1,0 +1,161 @@
+"""The server of the explorer: on this machine alone, at an address that nobody guesses.
+
+The address holds a token of 128 random bits: without it there is no page, no report and no
+connection. Scripts come from the server itself; no request leaves the machine.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import signal
+import socket
+import tempfile
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from drillctl import units
+from drillctl.design import Design
+from drillctl.errors import InputError
+
+HOST = "127.0.0.1"
+LEFT_AFTER = 2_000  # time (ms) without a connection after which a page counts as closed
+LOOK_EVERY = 1_000  # ms
+HERE = Path(__file__).parent
+
+
+def free_port(asked: int | None) -> socket.socket:
+    """A socket bound to a port, random by default; refused (`InputError`) if it is taken."""
+    made = socket.socket()
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        made.bind((HOST, asked or 0))
+        made.listen(128)  # from when the address is told, a browser may come
+    except OSError as error:
+        raise InputError(f"port {asked}: {error.strerror}", "--port") from None
+    return made
+
+
+def serve(
+    design: Design,
+    system: units.System = "si",
+    port: int | None = None,
+    browser: bool = True,
+    say: Callable[[str], None] = print,
+) -> None:
+    """Serve pages of a design until it is interrupted.
+
+    Parameters
+    ----------
+    design : Design
+        What pages open with.
+    system : {'si', 'field'}
+        Units that they open with.
+    port : int, optional
+        A random one by default.
+    browser : bool
+        Whether to open a page in the user's browser.
+    say : callable
+        Takes the address.
+
+    Raises
+    ------
+    InputError
+        Bokeh is not installed, or the port is taken.
+    """
+    try:
+        import bokeh  # noqa: F401
+    except ImportError:
+        raise InputError('needs Bokeh: pip install "drillctl[explore]"', "explore") from None
+    with tempfile.TemporaryDirectory(prefix="drillctl-explore-") as folder:
+        server = _Server(design, system, port, Path(folder))
+        say(f"explorer: {server.address}")
+        say("Ctrl-C ends it")
+        server.run(browser)
+
+
+class _Server:
+    def __init__(
+        self, design: Design, system: units.System, port: int | None, folder: Path
+    ) -> None:
+        import numba
+
+        from drillctl.explorer.work import Engine
+
+        self._bound = free_port(port)
+        self._token = secrets.token_urlsafe(16)
+        self.address = f"http://{HOST}:{self._bound.getsockname()[1]}/{self._token}"
+        self._engine = Engine(numba.get_num_threads())
+        from drillctl.explorer.reports import Reports
+
+        self._reports = Reports(folder, f"/{self._token}/reports")
+        self._design, self._system, self._folder = design, system, folder
+
+    def run(self, browser: bool) -> None:
+        """Serve until interrupted."""
+        asyncio.run(self._run(browser))
+
+    async def _run(self, browser: bool) -> None:
+        from bokeh.application import Application
+        from bokeh.application.handlers.function import FunctionHandler
+        from bokeh.server.tornado import BokehTornado
+        from tornado.httpserver import HTTPServer
+        from tornado.web import StaticFileHandler
+
+        logging.getLogger("bokeh").setLevel(logging.ERROR)
+        logging.getLogger("tornado.access").setLevel(logging.CRITICAL)
+        origin = f"{HOST}:{self._bound.getsockname()[1]}"
+        pages = Application(FunctionHandler(self._open))
+        tornado = BokehTornado(
+            {f"/{self._token}": pages},
+            extra_websocket_origins=[origin],
+            extra_patterns=[
+                (f"/{self._token}/reports/(.*)", StaticFileHandler, {"path": str(self._folder)})
+            ],
+            sign_sessions=True,
+            secret_key=secrets.token_urlsafe(32).encode(),
+            generate_session_ids=True,
+            use_index=False,
+            unused_session_lifetime_milliseconds=LEFT_AFTER,
+            check_unused_sessions_milliseconds=LOOK_EVERY,
+            session_token_expiration=24 * 3600,
+        )
+        http = HTTPServer(tornado, max_buffer_size=20 * 1024 * 1024)
+        self._bound.setblocking(False)
+        http.add_sockets([self._bound])
+        tornado.initialize(_loop())
+        tornado.start()
+        stop = asyncio.Event()
+        running = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            running.add_signal_handler(number, stop.set)
+        if browser:
+            webbrowser.open(self.address)
+        try:
+            await stop.wait()
+        finally:
+            self._reports.end()
+            self._engine.end()
+            http.stop()
+            tornado.stop()
+
+    def _open(self, document: Any) -> None:
+        """Fill the document of a page that is opened."""
+        from drillctl.explorer.page import Page
+
+        page = Page(document, self._design, self._system, self._engine, self._reports)
+        parts = {
+            name: (HERE / f"page.{name}").read_text(encoding="utf-8") for name in ("css", "js")
+        }
+        document.template = (HERE / "page.html").read_text(encoding="utf-8")
+        document.template_variables.update(parts)
+        document.on_session_destroyed(lambda context: page.close())
+
+
+def _loop() -> Any:
+    from tornado.ioloop import IOLoop
+
+    return IOLoop.current()

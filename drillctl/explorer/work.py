@@ -1,0 +1,159 @@
+"""Work of the open pages, slice by slice: the newest request counts, and pages take turns.
+
+A piece of work is a generator. What it yields is delivered to its page; between two slices another
+piece may have its turn, and a piece that a newer one of its kind has replaced goes no further. So a
+slider can be moved faster than a map is computed, and no page holds up another.
+
+Each queue has a thread. What follows the cross never waits for a map; maps run in as many threads
+of the kernels as the machine has, all else in one.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Hashable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from drillctl.arrays import own_errstate
+from drillctl.progress import Silent
+
+Slices = Iterator[Any]
+
+
+class Dropped(Exception):  # noqa: N818 - no error, but an end
+    """Work that nobody waits for any more."""
+
+
+class Until(Silent):
+    """Progress of long work that ends it once a newer one is asked for."""
+
+    def __init__(self) -> None:
+        self.dropped = False
+
+    def advance(self, done: int) -> None:
+        """Parts are done: go on, or stop here."""
+        if self.dropped:
+            raise Dropped
+
+
+@dataclass(eq=False)
+class Piece:
+    """Work of a page."""
+
+    owner: Hashable  # the page
+    kind: str  # the page wants the newest of each kind alone
+    rank: int  # what has less is done first
+    slices: Slices
+    deliver: Callable[[Any], None]  # takes what is yielded, in the thread of the work
+    failed: Callable[[Exception], None]
+    until: Until
+    turns: int = 0  # slices so far
+
+
+@dataclass(eq=False)
+class Queue:
+    """Pieces of work that wait for one thread."""
+
+    name: str
+    threads: int  # of the kernels
+    _waiting: dict[tuple[Hashable, str], Piece] = field(default_factory=dict)
+    _turns: dict[Hashable, int] = field(default_factory=dict)  # of each page
+    _changed: threading.Condition = field(default_factory=threading.Condition)
+    _ended: bool = False
+
+    def __post_init__(self) -> None:
+        threading.Thread(target=self._work, name=f"explorer {self.name}", daemon=True).start()
+
+    def put(self, piece: Piece) -> None:
+        """Take a piece of work, in place of an older one of its kind."""
+        with self._changed:
+            self._forget((piece.owner, piece.kind))
+            self._waiting[piece.owner, piece.kind] = piece
+            # A page that comes late has not the turns of all that went before it.
+            self._turns.setdefault(piece.owner, min(self._turns.values(), default=0))
+            self._changed.notify()
+
+    def drop(self, owner: Hashable, kind: str | None = None) -> None:
+        """Forget the work of a page, or one kind of it."""
+        with self._changed:
+            for key in [k for k in self._waiting if k[0] == owner and kind in (None, k[1])]:
+                self._forget(key)
+            if kind is None:
+                self._turns.pop(owner, None)
+
+    def end(self) -> None:
+        """Let the thread end after its slice."""
+        with self._changed:
+            self._ended = True
+            for key in list(self._waiting):
+                self._forget(key)
+            self._changed.notify()
+
+    def _forget(self, key: tuple[Hashable, str]) -> None:
+        piece = self._waiting.pop(key, None)
+        if piece is not None:
+            piece.until.dropped = True
+
+    def _next(self) -> Piece | None:
+        """The piece whose turn it is, once there is one; None at the end."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._ended)
+            if self._ended:
+                return None
+            order = lambda one: (one.rank, self._turns.get(one.owner, 0))  # noqa: E731
+            piece = min(self._waiting.values(), key=order)
+            self._turns[piece.owner] = self._turns.get(piece.owner, 0) + 1
+            return piece
+
+    def _work(self) -> None:
+        import numba
+
+        numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
+        with own_errstate():
+            while (piece := self._next()) is not None:
+                self._slice(piece)
+
+    def _slice(self, piece: Piece) -> None:
+        try:
+            value = next(piece.slices)
+        except (StopIteration, Dropped):
+            self._done(piece)
+        except Exception as error:
+            self._done(piece)
+            if not piece.until.dropped:
+                piece.failed(error)
+        else:
+            if not piece.until.dropped:
+                piece.deliver(value)
+
+    def _done(self, piece: Piece) -> None:
+        with self._changed:
+            if self._waiting.get((piece.owner, piece.kind)) is piece:
+                del self._waiting[piece.owner, piece.kind]
+
+
+class Engine:
+    """The queues that all pages share."""
+
+    def __init__(self, threads: int) -> None:
+        self.quick = Queue("cross", 1)
+        self.loops = Queue("loop", 1)
+        self.maps = Queue("maps", threads)
+        self.audits = Queue("audit", 1)
+        self.advice = Queue("recommendation", 1)
+
+    @property
+    def queues(self) -> tuple[Queue, ...]:
+        """All of them."""
+        return (self.quick, self.loops, self.maps, self.audits, self.advice)
+
+    def drop(self, owner: Hashable) -> None:
+        """Forget all work of a page."""
+        for queue in self.queues:
+            queue.drop(owner)
+
+    def end(self) -> None:
+        """End all work."""
+        for queue in self.queues:
+            queue.end()

@@ -1,0 +1,112 @@
+"""Numbers of a page are those of the commands, to the bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import drillctl
+from drillctl.ensemble.grid import axes_of
+from drillctl.explorer import computed
+from drillctl.explorer.work import Dropped, Until
+from drillctl.linear.loop_analysis import loop
+
+AXES = [
+    {"path": "controller.kp", "min": 300, "max": 700, "points": 14},
+    {"path": "controller.ki", "min": 50, "max": 250, "points": 13},
+]
+
+
+@pytest.fixture(scope="module")
+def design():
+    return drillctl.load("monteiro-trindade-140kn", **{"map.axes": AXES, "map.audit_cells": 4})
+
+
+@pytest.fixture(scope="module")
+def pictures(design):
+    return list(computed.mapped(design, axes_of(design), "stick_slip_index"))
+
+
+def test_a_map_is_coarse_first_and_then_that_of_the_command(design, pictures):
+    expected = drillctl.stability_map(design, measures=["stick_slip_index"])
+    assert pictures[0].whole is None
+    assert pictures[0].values.shape == (14, 13)
+    coarse = [computed.thinned(axis, computed.COARSE) for axis in axes_of(design)]
+    assert [len(axis) for axis in coarse] == [11, 11]
+    whole = pictures[-1].whole
+    for name, values in expected.measures.items():
+        assert whole.measures[name].tobytes() == values.tobytes(), name
+    assert whole.status.tobytes() == expected.status.tobytes()
+    # A coarse cell is the cell itself, where it is one.
+    own = expected.measures["stick_slip_index"]
+    i = np.searchsorted(axes_of(design)[0].values, coarse[0].values)
+    j = np.searchsorted(axes_of(design)[1].values, coarse[1].values)
+    assert pictures[0].values[np.ix_(i, j)].tobytes() == own[np.ix_(i, j)].tobytes()
+    (audit,) = computed.audited(whole, Until())
+    assert audit.cells.tolist() == expected.audit.cells.tolist()
+    assert audit.worst == expected.audit.worst
+
+
+def test_an_axis_of_the_string_gives_the_same(design):
+    axes = [AXES[0] | {"points": 3},
+            {"path": "drillstring.sections.pipe.length", "min": "2000 m", "max": "3000 m",
+             "points": 3}]  # fmt: skip
+    other = design.replace({"map.axes": axes})
+    expected = drillctl.stability_map(other, audit_cells=0, measures=["j1"])
+    *_, last = computed.mapped(other, axes_of(other), "j1")
+    assert last.whole.j1.tobytes() == expected.j1.tobytes()
+
+
+def test_slices_of_a_map_come_one_by_one(design, monkeypatch):
+    monkeypatch.setattr(computed, "SLICE", 1e-9)
+    monkeypatch.setattr(computed, "FIRST", 16)
+    parts = list(computed.mapped(design, axes_of(design), "j1"))
+    assert len(parts) == 1 + -(-14 * 13 // 16)
+    assert all(one.whole is None for one in parts[:-1])
+    known = [(one.values == parts[-1].values).sum() for one in parts]
+    assert known == sorted(known)
+
+
+def test_a_response_is_that_of_the_command(design):
+    (run,) = computed.response(design)
+    assert run.measures == drillctl.simulate(design, engine="batch").measures
+    assert run.time[-1] == 100.0
+
+
+@pytest.mark.parametrize("kp", [625.0, 200.0])
+def test_margins_are_those_of_the_command(design, kp):
+    at = design.replace({"controller.kp": kp})
+    *_, last = computed.loop(at)
+    expected = loop(at)
+    assert (last.slope_margin, last.margins) == (expected.slope_margin, expected.margins)
+    assert last.stable == expected.stable == (kp == 625.0)
+
+
+def test_the_share_of_rocks_is_that_of_uncertainty(design):
+    small = design.replace({"map.axes": [one | {"points": 4} for one in AXES]})
+    parts = list(computed.probability(small, axes_of(small), 30.0, 9))
+    assert parts[0].draws == computed.FEWEST
+    assert parts[-1].draws == 9
+    expected = drillctl.uncertainty(small, realizations=9, audit_cells=0)
+    found = expected.probability(30.0)
+    assert parts[-1].values.tobytes() == (found.counts / 9).tobytes()
+    assert 0.0 < parts[-1].values.max() <= 1.0
+
+
+def test_long_work_ends_when_it_is_dropped(pictures):
+    until = Until()
+    until.dropped = True
+    with pytest.raises(Dropped):
+        next(computed.audited(pictures[-1].whole, until))
+
+
+def test_the_boundary_is_that_of_the_loop(design):
+    *_, last = computed.boundary(design, axes_of(design))
+    x, y = np.meshgrid(*(axis.values for axis in last.axes), indexing="ij")
+    from drillctl.linear import gain_boundary
+
+    region = gain_boundary(design, window=((300, 700), (50, 250)))
+    inside = np.vectorize(region.contains)(x, y)
+    within = (slice(1, -1), slice(1, -1))  # the region ends with its window
+    assert ((last.ratio > 1.0) == inside)[within].all()
+    assert len(last.lines) >= 1
