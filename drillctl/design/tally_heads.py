@@ -179,10 +179,12 @@ def _ways(rows: list[tuple[int, list[str]]], last: int) -> Iterable[list[str]]:
         if above == 1 and not any(a and b for a, b in zip(upper[0], missing, strict=False)):
             yield own
         for spread in (True, False):
-            parts = [*(_filled(row, spread) for row in upper), own]
-            yield [
-                " ".join(row[k] for row in parts if k < len(row) and row[k]) for k in range(width)
-            ]
+            wide = [*(_filled(row, spread) for row in upper), own]
+            heads = []
+            for k, empty in enumerate(missing):  # a head is spread over columns with heads below
+                told = [*upper, own] if empty else wide
+                heads.append(" ".join(row[k] for row in told if k < len(row) and row[k]))
+            yield heads
     yield own
 
 

@@ -299,12 +299,17 @@ def test_a_workbook_with_a_cover_is_read_at_its_tally(tmp_path):
     book = openpyxl.Workbook()
     book.active.append(["Rig tally"])
     sheet = book.create_sheet("BHA")
-    for row in (["BHA 7"], [], ["Component", "Body"], ["", "OD (in)", "ID (in)", "Length (m)"]):
+    for row in (
+        ["BHA 7"], [], ["Component", "Body", "", "", "Qty"],
+        ["", "OD (in)", "ID (in)", "Length (m)"],
+        ["Drill pipe", 5, 4.276, 9.5, 300],
+    ):  # fmt: skip
         sheet.append(row)
-    sheet.merge_cells("B3:D3")
-    sheet.append(["Drill pipe", 5, 4.276, 2850])
+    for cells in ("A1:G1", "A3:A4", "B3:D3", "E3:E4"):
+        sheet.merge_cells(cells)
     book.save(tmp_path / "tally.xlsx")
-    assert read("tally.xlsx", "top", tmp_path).sections == ({**PIPE, "length": "2850 m"},)
+    found = read("tally.xlsx", "top", tmp_path).sections
+    assert found == ({**PIPE, "repeat": 300, "length": "9.5 m"},)
 
 
 def test_pipe_without_columns_for_it_has_the_joints_of_its_grade(tmp_path):
