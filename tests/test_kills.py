@@ -42,7 +42,7 @@ def begun(arguments):
 def killed_after(pid, moment):
     """Whether a process was killed after so much of its own time, or had ended before."""
     while (taken := processor_time(pid)) is not None and taken < moment:
-        time.sleep(0.002)
+        time.sleep(0.01)
     os.kill(pid, signal.SIGKILL)
     _, status = os.waitpid(pid, 0)
     assert os.WIFSIGNALED(status) or os.waitstatus_to_exitcode(status) in (0, 1)
