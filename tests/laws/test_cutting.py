@@ -147,7 +147,7 @@ def test_fixed_steps_are_of_second_order_through_sticks(design):
         errors.append(np.array(found) / exact.measures.j1 - 1.0)
     mean = np.sqrt((np.array(errors) ** 2).mean(axis=0))
     order = np.polyfit(np.log(steps), np.log(mean), 1)[0]
-    assert order > 1.7  # measured: 1.95
+    assert order > 1.7  # measured: 1.97
     assert mean[-1] < 3e-5
 
 
@@ -302,4 +302,4 @@ def test_engines_agree_over_random_sets_until_contact_is_lost(design):
         })  # fmt: skip
         exact, batch = drillctl.simulate(short), drillctl.simulate(short, "batch")
         worst = max(worst, abs(batch.measures.j1 / exact.measures.j1 - 1.0))
-    assert worst < 1e-3
+    assert worst < 1e-3  # measured: 7.6e-4
