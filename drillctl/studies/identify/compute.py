@@ -344,14 +344,16 @@ def _numbers(problem: Problem, main: Fit, checked: Fit | None, level: float) -> 
     for name in _of_string(line):
         fitted = name in problem.free
         source = main if fitted else checked
-        factor = half = np.nan
+        factor = half = bias = np.nan
         if source is not None:
             k = source.numbers + source.problem.free.index(name)
             factor = float(source.x[k])
             half = float(ident.interval(source.leave[:, k], level))
-            half += float(ident.noise_bias(source)[source.problem.free.index(name)])
+            bias = float(ident.noise_bias(source)[source.problem.free.index(name)])
+            half += bias
         apart = abs(factor - 1.0)
-        off = bool(apart > max(ident.OFF, 2.0 * half)) and not fitted
+        # What noise may have moved so far says nothing of the rig.
+        off = bool(apart > max(ident.OFF, 2.0 * half, 4.0 * bias)) and not fitted
         value = design[name]
         results.append(
             StringNumber(name, *words[name], value, factor * value, half * value, fitted, off)
