@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from pydantic import BeforeValidator
@@ -138,9 +139,7 @@ def values_of(table: Table) -> list[Parameter]:
 
 
 def _collect(table: Table, prefix: str, result: list[Parameter]) -> None:
-    for key, info in type(table).model_fields.items():
-        if key in _HIDDEN:
-            continue
+    for key, number_of in _keys(type(table)).items():
         value = getattr(table, key)
         path = f"{prefix}{key}"
         if isinstance(value, Table):
@@ -151,10 +150,25 @@ def _collect(table: Table, prefix: str, result: list[Parameter]) -> None:
         elif path == "bit_rock.points":
             for number, point in enumerate(value, start=1):
                 _collect(point, f"{path}.{number}.", result)
-        elif _is_number(info.annotation) and not isinstance(value, tuple):
-            whole = _is_number(info.annotation, int) and not _is_number(info.annotation, float)
-            kind = kind_of(info) or table.kind_by_key(key)
-            result.append(Parameter(path, kind, value, whole, _check_of(info)))
+        elif number_of is not None and not isinstance(value, tuple):
+            whole, kind, check = number_of
+            kind = kind or table.kind_by_key(key)
+            result.append(Parameter(path, kind, value, whole, check))
+
+
+@cache
+def _keys(table: type[Table]) -> dict[str, tuple[bool, Kind | None, BeforeValidator | None] | None]:
+    """Keys of a table, and of those that take numbers whether whole ones, their kind and check."""
+    return {
+        key: _number_of(info) if _is_number(info.annotation) else None
+        for key, info in table.model_fields.items()
+        if key not in _HIDDEN
+    }
+
+
+def _number_of(info: Any) -> tuple[bool, Kind | None, BeforeValidator | None]:
+    whole = _is_number(info.annotation, int) and not _is_number(info.annotation, float)
+    return whole, kind_of(info), _check_of(info)
 
 
 def _is_number(annotation: Any, *types: type) -> bool:

@@ -137,7 +137,7 @@ class Boundary:
     lines: tuple[Array, ...] | None  # exact boundary over both gains, (points, 2) each; else None
 
 
-ROWS = 4  # rows of the overlay that a slice computes
+ROWS = 2  # rows of the overlay that a slice computes
 
 
 def boundary(design: Design, axes: Axes) -> Iterator[Boundary | None]:

@@ -211,7 +211,7 @@ class Page:
             self._put("loops", "loop", 0, computed.loop(at), self._draw_loop)
 
     def _map(self, design: Design, axes: tuple[Axis, Axis], new: State) -> None:
-        self._engine.audits.drop(self, "audit")
+        self._engine.checks.drop(self, "audit")
         self._engine.advice.drop(self, "recommendation")
         self._shown.pop("audit", None)
         self._say(chip={"text": "audit: waiting", "kind": "none"}, stale=self._asked_advice)
@@ -221,7 +221,7 @@ class Page:
             self._put("maps", "map", 1, work, self._draw_share)
         else:
             self._put("maps", "map", 0, computed.mapped(design, axes, new.measure), self._draw_map)
-        self._put("maps", "boundary", 2, computed.boundary(design, axes), self._draw_boundary)
+        self._put("checks", "boundary", 0, computed.boundary(design, axes), self._draw_boundary)
 
     def _keep(self, new: State, mapped: bool) -> None:
         case = new.case_a(self._base)
@@ -246,7 +246,7 @@ class Page:
         except InputError:  # the law of A has not what these axes run over
             self.map.keep(None, None)
         else:
-            self._put("maps", "map of A", 3, work, self._draw_map_of_a)
+            self._put("maps", "map of A", 2, work, self._draw_map_of_a)
 
     def _recommend(self) -> None:
         design = self.state.design(self._base)
@@ -339,7 +339,7 @@ class Page:
             until = Until()
             self._say(chip={"text": "audit: running", "kind": "none"})
             work = computed.audited(one.whole, until)
-            self._put("audits", "audit", 0, work, self._draw_audit, until)
+            self._put("checks", "audit", 1, work, self._draw_audit, until)
 
     def _map_said(self, one: Picture) -> str:
         if one.whole is None:

@@ -140,13 +140,13 @@ class Engine:
         self.quick = Queue("cross", 1)
         self.loops = Queue("loop", 1)
         self.maps = Queue("maps", threads)
-        self.audits = Queue("audit", 1)
+        self.checks = Queue("boundary and audit", 1)
         self.advice = Queue("recommendation", 1)
 
     @property
     def queues(self) -> tuple[Queue, ...]:
         """All of them."""
-        return (self.quick, self.loops, self.maps, self.audits, self.advice)
+        return (self.quick, self.loops, self.maps, self.checks, self.advice)
 
     def drop(self, owner: Hashable) -> None:
         """Forget all work of a page."""
