@@ -8,6 +8,7 @@ request never waits for long.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from drillctl.ensemble.sweeps import Sweep
     from drillctl.explorer.work import Until
     from drillctl.linear.loop_margins import Margins
+    from drillctl.linear.response import FrequencyResponse
     from drillctl.simulation import Simulation
     from drillctl.studies.recommend.compute import Recommendation
 
@@ -178,10 +180,9 @@ def response(design: Design) -> Iterator[Simulation]:
 class Loop:
     """The loop about steady drilling, as pictures need it."""
 
-    frequency: Array  # Hz
-    loop: ComplexArray  # L at the top torque
-    impedance: Array  # abs(Z) of the drive over that of the pipe; NaN without a pipe
-    reflection: Array  # abs(r)
+    # frequency (Hz), abs(Z) of the drive over that of the pipe (NaN without a pipe), and abs(r)
+    drive: dict[str, Array]
+    loop: ComplexArray  # L at the top torque, by rising frequency
     slope: float  # falling slope of the rock (N m s/rad)
     slope_margin: float  # that the loop tolerates (N m s/rad)
     margins: Margins | None  # None where the loop is not stable, or not known yet
@@ -193,43 +194,46 @@ class Loop:
 
 
 def loop(design: Design) -> Iterator[Loop]:
-    """Curves first, then the margins of `drillctl loop`."""
+    """Curves first, then smooth ones with the margins of `drillctl loop`."""
     from drillctl.linear.ends import bit_side, ends_of
     from drillctl.linear.loop_analysis import tolerated_slope
-    from drillctl.linear.loop_margins import margins
+    from drillctl.linear.loop_margins import margins, pole_grid
     from drillctl.linear.loop_model import loop_poles, model_poles
     from drillctl.linear.operating_point import operating_point
     from drillctl.linear.response import frequency_response, telling_frequencies
+    from drillctl.studies.loop.compute import smooth
+
+    point, string = operating_point(design), design.sliding_string
+    bit = bit_side(design, point.slope, point.speed)
+    path = None if bit.path is None or bit.path.observer is not None else bit.path
+    tolerated, _ = tolerated_slope(design, point.speed)
+
+    def opened(hertz: Array) -> FrequencyResponse:
+        return frequency_response(design, hertz, "open_loop", slope=bit.slope, path=path)
+
+    frequency = telling_frequencies(string)
+    drive, curve = _drive(design, frequency), opened(frequency)
+    result = Loop(drive, curve.between("speed_error", "top_speed"), point.slope, tolerated, None)
+    yield result
+    ends, gains = ends_of(string), design.linear_drive.gains()
+    simple = design.simple_loop
+    poles = loop_poles(string, *gains, point.slope) if simple else model_poles(design, bit)
+    curve = smooth(opened, pole_grid(ends, poles) / (2.0 * math.pi))
+    at_top = margins(ends, design.linear_drive, bit, poles) if result.stable else None
+    yield replace(result, loop=curve.between("speed_error", "top_speed"), margins=at_top)
+
+
+def _drive(design: Design, frequency: Array) -> dict[str, Array]:
+    """What the drive is to the pipe, over frequency."""
     from drillctl.linear.tuning import drive_impedance
 
-    point = operating_point(design)
-    bit = bit_side(design, point.slope, point.speed)
-    frequency = telling_frequencies(design.string)
-    seen = frequency_response(
-        design, frequency, "open_loop", slope=bit.slope,
-        path=None if bit.path is None or bit.path.observer is not None else bit.path,
-    )  # fmt: skip
     try:
         drive = drive_impedance(design, frequency)
-        impedance, reflection = np.abs(drive.impedance) / drive.pipe, np.abs(drive.reflection)
     except InputError:  # of a lumped spring
         impedance = reflection = np.full(len(frequency), np.nan)
-    tolerated, _ = tolerated_slope(design, point.speed)
-    result = Loop(
-        frequency, seen.between("speed_error", "top_speed"), impedance, reflection,
-        point.slope, tolerated, None,
-    )  # fmt: skip
-    yield result
-    if not result.stable:
-        return
-    gains = design.linear_drive.gains()
-    poles = (
-        loop_poles(design.string, *gains, point.slope)
-        if design.simple_loop
-        else model_poles(design, bit)
-    )
-    at_top = margins(ends_of(design.string), design.linear_drive, bit, poles)
-    yield replace(result, margins=at_top)
+    else:
+        impedance, reflection = np.abs(drive.impedance) / drive.pipe, np.abs(drive.reflection)
+    return {"frequency": frequency, "impedance": impedance, "reflection": reflection}
 
 
 @dataclass(frozen=True, eq=False)

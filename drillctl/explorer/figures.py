@@ -357,7 +357,7 @@ class LoopFigures:
         """The loop at the cross, or none."""
         columns = _loop_columns(loop)
         self.curve.data = columns[0]
-        self.mirror.data = {"re": columns[0]["re"], "im": [-v for v in columns[0]["im"]]}
+        self.mirror.data = {"re": columns[0]["re"], "im": -np.asarray(columns[0]["im"])}
         self.drive.data = columns[1]
         margins = None if loop is None else loop.margins
         alpha = 2.0 if margins is None else margins.disk
@@ -379,10 +379,7 @@ def _loop_columns(loop: Loop | None) -> tuple[dict[str, Any], dict[str, Any]]:
     if loop is None:
         return {"re": [], "im": []}, {k: [] for k in ("frequency", "impedance", "reflection")}
     near = np.where(np.abs(loop.loop) < FAR, loop.loop, np.nan)
-    return (
-        {"re": near.real, "im": near.imag},
-        {"frequency": loop.frequency, "impedance": loop.impedance, "reflection": loop.reflection},
-    )
+    return {"re": near.real, "im": near.imag}, dict(loop.drive)
 
 
 def every(*groups: Any) -> Iterator[Any]:

@@ -90,12 +90,13 @@ def _ranges(state: State, design: Design) -> Iterator[dict[str, Any]]:
 def readouts(
     runs: Sequence[Simulation | None], loops: Sequence[Loop | None], system: units.System
 ) -> list[list[str | None]]:
-    """Rows of a table: what it is, the number at the cross, and that of case A."""
+    """Rows of a table: what it is, its unit, the number at the cross, and that of case A."""
     rows: list[list[str | None]] = []
     for table, ones in ((_OF_RUN, runs), (_OF_LOOP, loops)):
         for label, (unit, value) in table.items():
+            shown = "" if unit == "1" else units.unit_name(unit, system)
             texts = (None if one is None else _text(value(one), unit, system) for one in ones)
-            rows.append([label, *texts])
+            rows.append([label, shown, *texts])
     return rows
 
 
@@ -104,7 +105,7 @@ def _text(value: Any, unit: str, system: units.System) -> str:
         return "none"
     if isinstance(value, str):
         return value.replace("_", " ")
-    return units.told(units.full(value, unit, 5), system)
+    return f"{units.displayed(value, unit, system)[0]:.5g}"
 
 
 def _margin(name: str) -> Callable[[Any], Any]:

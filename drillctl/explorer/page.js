@@ -87,7 +87,7 @@ const drillctl = (() => {
     const focused = document.activeElement && document.activeElement.id;
     form = told;
     by("title").textContent = "drillctl explorer: " + told.title;
-    by("title").title = told.warnings.join("\n");
+    by("title").title = [told.title, ...told.warnings].join("\n");
     const groups = ["Drilling", "Rock", "Drive", "Dynamic weight"].map(name => {
       const inside = told.ranges.filter(one => one.group === name).map(control);
       if (name === "Drive") inside.unshift(law("controller.law", "law", ...told.laws["controller.law"], "What the top drive does with the speed error"));
@@ -135,11 +135,11 @@ const drillctl = (() => {
   function clear() { for (const one of document.querySelectorAll(".error")) one.textContent = ""; }
 
   function readouts(rows) {
-    const compared = rows.some(row => row[2] !== null);
-    const line = (name, row, kind) => element("tr", {}, element("th", { scope: kind }, row[0]), element(name, { scope: name === "th" ? "col" : null }, row[1] ?? ""),
-      ...(compared ? [element(name, { class: "a" }, row[2] ?? "")] : []));
-    by("readouts").tHead.replaceChildren(...(compared ? [line("td", ["", "cross", "A"], "col")] : []));
-    by("readouts").tBodies[0].replaceChildren(...rows.map(row => line("td", row, "row")));
+    const compared = rows.some(row => row[3] !== null);
+    const line = ([label, unit, value, of_a]) => element("tr", {}, element("th", { scope: "row" }, label), element("td", {}, value ?? ""),
+      ...(compared ? [element("td", { class: "a" }, of_a ?? "")] : []), element("td", { class: "unit" }, unit));
+    by("readouts").tHead.replaceChildren(...(compared ? [line(["", "", "cross", "A"])] : []));
+    by("readouts").tBodies[0].replaceChildren(...rows.map(line));
   }
 
   function download(file) {

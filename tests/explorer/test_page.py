@@ -156,7 +156,7 @@ def seen(opened, file, tmp_path):
 def told(file, **values):
     """J1 at a point, as the page writes it."""
     run = drillctl.simulate(drillctl.load(file, **values), engine="batch")
-    return f"{run.measures.j1:.5g} s"
+    return f"{run.measures.j1:.5g}"
 
 
 def test_the_page_shows_the_numbers_of_the_commands(seen, file):
@@ -229,7 +229,7 @@ def test_a_case_is_kept_and_compared(seen, file):
     seen.shows("J1", told(file, **{"operating_point.weight_on_bit": "100 kN"}))
     seen.shows("J1", told(file), 1)
     seen.page.click("#keep")
-    seen.until("() => document.querySelector('#readouts tbody tr').cells.length === 2")
+    seen.until("() => document.querySelector('#readouts tbody tr').cells.length === 3")
 
 
 def test_a_page_is_saved_and_opened(seen, file, tmp_path):

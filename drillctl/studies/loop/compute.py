@@ -138,7 +138,7 @@ def _of_loop(result: LoopAnalysis) -> Iterator[Picture]:
     @cache
     def opened() -> FrequencyResponse:
         grid = pole_grid(ends_of(design.sliding_string), result.poles) / (2.0 * math.pi)
-        return _smooth(
+        return smooth(
             lambda f: frequency_response(design, f, "open_loop", slope=bit.slope, path=bit.path),
             grid,
         )
@@ -174,7 +174,7 @@ TURN = np.radians(4.0)  # largest turn of a Nyquist curve between two frequencie
 REFINEMENTS = 6
 
 
-def _smooth(respond: Callable[[Array], FrequencyResponse], grid: Array) -> FrequencyResponse:
+def smooth(respond: Callable[[Array], FrequencyResponse], grid: Array) -> FrequencyResponse:
     """A response with more frequencies where its Nyquist curve would show corners."""
     result = respond(grid)
     for _ in range(REFINEMENTS):
