@@ -35,6 +35,7 @@ Axes = tuple[Axis, Axis]
 COARSE = 11  # points of an axis of the first map
 BETWEEN = 21  # points of an axis of the linear overlays
 SLICE = 0.06  # time (s) that a slice of a map should take: a newer request waits for one at most
+BETWEEN_PICTURES = 0.3  # time (s): a browser takes a good part of it to draw one
 FIRST = 128  # lanes of the first slice, before it is known how long one takes
 SAMPLES = 800  # of a response, as many as a picture has points along it
 
@@ -63,7 +64,7 @@ def spread(values: Array, coarse: tuple[Axis, ...], axes: Axes) -> Array:
     return values[np.ix_(*places)]
 
 
-def mapped(design: Design, axes: Axes, measure: str) -> Iterator[Picture]:
+def mapped(design: Design, axes: Axes, measure: str) -> Iterator[Picture | None]:
     """The map of `drillctl map`: coarse, then cell by cell, then whole."""
     from drillctl.ensemble.sweeps import kept_measures, sweep
 
@@ -78,7 +79,7 @@ def mapped(design: Design, axes: Axes, measure: str) -> Iterator[Picture]:
 
 def _refined(
     design: Design, axes: Axes, names: tuple[str, ...], shown: Array, begin: float
-) -> Iterator[Picture]:
+) -> Iterator[Picture | None]:
     from drillctl.ensemble.audit import unaudited
     from drillctl.ensemble.sweeps import Cells, Sweep
 
@@ -97,10 +98,14 @@ def _refined(
         status[part], known[part] = block.status.ravel(), True
         schemes |= block.schemes
         seconds += block.seconds
-        if time.perf_counter() - since > SLICE and not known.all():
-            since = time.perf_counter()
-            now = np.where(job.over_grid(known), job.over_grid(rows[names[-1]]), shown)
-            yield Picture(axes, now)
+        if known.all():
+            break
+        if time.perf_counter() - since < BETWEEN_PICTURES:
+            yield None
+            continue
+        since = time.perf_counter()
+        now = np.where(job.over_grid(known), job.over_grid(rows[names[-1]]), shown)
+        yield Picture(axes, now)
     step, modes = next(iter(schemes)) if len(schemes) == 1 else (None, None)
     whole = Sweep(
         design=design, axes=axes, levels=design.tables.map.levels,
@@ -139,7 +144,7 @@ class Boundary:
     lines: tuple[Array, ...] | None  # exact boundary over both gains, (points, 2) each; else None
 
 
-ROWS = 2  # rows of the overlay that a slice computes
+ROWS = 1  # rows of the overlay that a slice computes
 
 
 def boundary(design: Design, axes: Axes) -> Iterator[Boundary | None]:

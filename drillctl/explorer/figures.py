@@ -11,7 +11,6 @@ import numpy as np
 from bokeh.models import (
     ColorBar,
     ColumnDataSource,
-    HoverTool,
     LinearColorMapper,
     Range1d,
     Span,
@@ -91,6 +90,7 @@ def _plot(name: str, x: str, y: str, **more: Any) -> Any:
         axis.axis_label_text_font_style = "normal"
         axis.axis_label_standoff = 2
         axis.minor_tick_line_color = None
+        axis.ticker.desired_num_ticks = 5  # labels are most of what a browser draws
     plot.xgrid.grid_line_alpha = plot.ygrid.grid_line_alpha = 0.5
     return plot
 
@@ -126,7 +126,7 @@ class MapFigure:
         self.of_a = _source("x", "y")
         self.x_range, self.y_range = Range1d(0, 1), Range1d(0, 1)
         plot = _plot("map", " ", " ", x_range=self.x_range, y_range=self.y_range)
-        image = plot.image(
+        plot.image(
             "image",
             "x",
             "y",
@@ -151,7 +151,14 @@ class MapFigure:
         plot.scatter("x", "y", source=self.best, marker="star", size=14, fill_color=VERMILLION,
                      line_color="white")  # fmt: skip
         self.spans = [
-            Span(dimension=d, location=0, line_color="black", line_width=1, line_alpha=0.6)
+            Span(
+                dimension=d,
+                location=0,
+                line_color="black",
+                line_width=1,
+                line_alpha=0.6,
+                level="overlay",
+            )  # which is drawn again without the map under it
             for d in ("height", "width")
         ]
         for one in self.spans:
@@ -159,14 +166,13 @@ class MapFigure:
         plot.scatter("x", "y", source=self.of_a, marker="square_cross", size=12, fill_color=None,
                      line_color=PURPLE, line_width=2)  # fmt: skip
         plot.scatter("x", "y", source=self.cross, marker="circle_cross", size=18, line_width=2,
-                     fill_color="white", fill_alpha=0.6, line_color="black")  # fmt: skip
+                     fill_color="white", fill_alpha=0.6, line_color="black",
+                     level="overlay")  # fmt: skip
         bar = ColorBar(color_mapper=self.colours, width=10, padding=4,
                        major_label_text_font_size="10px")  # fmt: skip
         plot.add_layout(bar, "right")
         plot.title.align, plot.title.text_font_size = "right", "11px"
         plot.title.text_font_style = "normal"
-        self.hover = HoverTool(renderers=[image], tooltips=[("value", "@image{0.0000}")])
-        plot.add_tools(self.hover)
         _legend(plot, "top_left")
         self.plot, self.entries = plot, [_entry(plot)]
 
@@ -263,61 +269,66 @@ def contours_of_nothing() -> dict[str, list[Any]]:
 
 
 class ResponseFigures:
-    """Speeds, torques and phase portrait of the run at the cross, and of case A."""
+    """Speeds, torques and phase portrait of the run at the cross, and of case A.
+
+    Their colours are explained beside them in the page: a legend costs a browser as much as the
+    curves.
+    """
 
     def __init__(self) -> None:
-        self.run = _source("time", "bit", "top", "torque", "pipe", "twist")
-        self.kept = _source("time", "bit", "top", "torque", "pipe", "twist")
+        self.speeds, self.torques = _source("time", "bit", "top", "twist"), _source(*TORQUES)
+        self.kept, self.kept_torques = _source("time", "bit", "top", "twist"), _source(*TORQUES)
         self.times = Range1d(0, 100)
         speed = _plot("speed", "", "speed (rpm)", x_range=self.times)
         self.set_speed = Span(dimension="width", location=0, line_color=GREY, line_dash="dotted")
         speed.add_layout(self.set_speed)
-        speed.line("time", "bit", source=self.kept, color=PURPLE, alpha=0.7, legend_label="bit, A")
-        speed.line("time", "top", source=self.run, color=ORANGE, legend_label="top")
-        speed.line("time", "bit", source=self.run, color=BLUE, width=1.5, legend_label="bit")
-        _legend(speed)
-        speed.legend.orientation = "horizontal"
+        speed.line("time", "bit", source=self.kept, color=PURPLE, alpha=0.7)
+        speed.line("time", "top", source=self.speeds, color=ORANGE)
+        speed.line("time", "bit", source=self.speeds, color=BLUE, width=1.5)
         torque = _plot("torque", "time (s)", "torque", x_range=self.times)
-        torque.line("time", "torque", source=self.kept, color=PURPLE, alpha=0.7,
-                    legend_label="drive, A")  # fmt: skip
-        torque.line("time", "pipe", source=self.run, color=SKY, legend_label="top of the pipe")
-        torque.line("time", "torque", source=self.run, color=VERMILLION, legend_label="drive")
-        _legend(torque, "bottom_right")
-        torque.legend.orientation = "horizontal"
+        torque.line("time", "drive", source=self.kept_torques, color=PURPLE, alpha=0.7)
+        torque.line("time", "pipe", source=self.torques, color=SKY)
+        torque.line("time", "drive", source=self.torques, color=VERMILLION)
         phase = _plot("phase", "twist (rev)", "bit speed (rpm)")
-        phase.line("twist", "bit", source=self.kept, color=PURPLE, alpha=0.6, legend_label="A")
-        phase.line("twist", "bit", source=self.run, color=BLUE)
-        _legend(phase)
+        phase.line("twist", "bit", source=self.kept, color=PURPLE, alpha=0.6)
+        phase.line("twist", "bit", source=self.speeds, color=BLUE)
         self.plots = (speed, torque, phase)
-        self.entries = [_entry(plot) for plot in self.plots]
 
-    def show(self, run: Simulation, system: units.System) -> None:
-        """The run at the cross."""
-        self.run.data = self._columns(run, system)
+    def show(self, run: Simulation) -> None:
+        """Speeds and phase portrait of the run at the cross."""
+        self.speeds.data = _speeds(run)
         self.times.end = float(run.time[-1])
         self.set_speed.location = run.design.speed / units.RPM
+
+    def show_torques(self, run: Simulation, system: units.System) -> None:
+        """Torques of that run."""
+        self.torques.data = _torques(run, system)
         self.plots[1].yaxis.axis_label = f"torque ({units.unit_name('N*m', system)})"
 
     def keep(self, run: Simulation | None, system: units.System) -> None:
         """The run of case A, or none."""
-        self.kept.data = (
-            {k: [] for k in self.kept.data} if run is None else self._columns(run, system)
+        empty = {k: [] for k in self.kept.data}, {k: [] for k in TORQUES}
+        self.kept.data, self.kept_torques.data = (
+            empty if run is None else (_speeds(run), _torques(run, system))
         )
-        for one in self.entries:
-            one.visible = run is not None
 
-    @staticmethod
-    def _columns(run: Simulation, system: units.System) -> dict[str, Array]:
-        signals = run.signals
-        torque = shown_unit("N*m", system)[0]
-        return {
-            "time": run.time,
-            "bit": signals["bit_speed"] / units.RPM,
-            "top": signals["top_speed"] / units.RPM,
-            "torque": signals["top_torque"] / torque,
-            "pipe": signals["pipe_torque"] / torque,
-            "twist": signals["twist"] / (2.0 * math.pi),
-        }
+
+TORQUES = ("time", "drive", "pipe")
+
+
+def _speeds(run: Simulation) -> dict[str, Array]:
+    return {
+        "time": run.time,
+        "bit": run.signals["bit_speed"] / units.RPM,
+        "top": run.signals["top_speed"] / units.RPM,
+        "twist": run.signals["twist"] / (2.0 * math.pi),
+    }
+
+
+def _torques(run: Simulation, system: units.System) -> dict[str, Array]:
+    one = shown_unit("N*m", system)[0]
+    drive, pipe = run.signals["top_torque"], run.signals["pipe_torque"]
+    return {"time": run.time, "drive": drive / one, "pipe": pipe / one}
 
 
 class LoopFigures:
@@ -334,14 +345,13 @@ class LoopFigures:
                         x_range=Range1d(-NEAR, NEAR - 1.0), y_range=Range1d(-NEAR, NEAR),
                         match_aspect=True)  # fmt: skip
         nyquist.patch("x", "y", source=self.disk, fill_color=ORANGE, fill_alpha=0.35,
-                      line_color=ORANGE, legend_label="disk margin")  # fmt: skip
+                      line_color=ORANGE)  # fmt: skip
         angle = np.linspace(0.0, 2.0 * np.pi, 121)
         nyquist.line(np.cos(angle), np.sin(angle), color=GREY, line_dash="dotted")
         nyquist.line("re", "im", source=self.kept, color=PURPLE, alpha=0.7)
         nyquist.line("re", "im", source=self.mirror, color=SKY, line_dash="dashed")
-        nyquist.line("re", "im", source=self.curve, color=BLUE, width=1.5, legend_label="L")
+        nyquist.line("re", "im", source=self.curve, color=BLUE, width=1.5)
         nyquist.scatter([-1.0], [0.0], marker="x", size=9, color=VERMILLION, line_width=2)
-        _legend(nyquist, "top_right")
         impedance = _plot("impedance", "frequency (Hz)", "|Z| / pipe", x_axis_type="log",
                           y_axis_type="log", y_range=Range1d(0.03, 300.0))  # fmt: skip
         impedance.add_layout(Span(dimension="width", location=1.0, line_color=GREY,

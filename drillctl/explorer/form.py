@@ -12,6 +12,7 @@ from drillctl.explorer import controls
 from drillctl.simulation.measures import BATCH_MEASURES, MEASURES
 
 if TYPE_CHECKING:
+    from drillctl.ensemble.grid import Axis
     from drillctl.explorer.computed import Loop
     from drillctl.explorer.state import State
     from drillctl.simulation import Simulation
@@ -44,7 +45,7 @@ def described(state: State, base: Design) -> dict[str, Any]:
     }
 
 
-def _axis(one: Any, system: units.System) -> dict[str, Any]:
+def _axis(one: Axis, system: units.System) -> dict[str, Any]:
     factor, unit = controls.shown_unit(one.unit, system)
     low, high = (float(f"{value / factor:.6g}") for value in (one.values[0], one.values[-1]))
     return {"path": one.path, "unit": unit, "low": low, "high": high}
@@ -57,6 +58,15 @@ def values(state: State, base: Design) -> dict[str, Any]:
         "level": state.level, "draws": state.draws, "measure": state.measure,
         "units": state.units, "kept": state.kept is not None,
     }  # fmt: skip
+
+
+def crossed(state: State, axes: Sequence[Axis]) -> dict[str, float]:
+    """The same of a cross that has moved, alone."""
+    results = {}
+    for one, value in zip(axes, state.cross, strict=True):
+        factor, _ = controls.shown_unit(one.unit, state.units)
+        results[one.path] = float(f"{value / factor:.5g}")
+    return results
 
 
 def _ranges(state: State, design: Design) -> Iterator[dict[str, Any]]:

@@ -2,13 +2,16 @@
 // The page beside its pictures: the form, keys, files, light and dark. What it asks for goes to the
 // server as one text, `asked`; answers come back as texts. Pictures are changed by Bokeh itself.
 const drillctl = (() => {
-  let asked, drawn, count = 0;
+  let asked, drawn, count = 0, answered = 0, held = null;
   let units = "si", form = null;
   const waiting = [];
   const by = id => document.getElementById(id);
 
+  // While something is dragged, the newest place waits until the one before has been answered.
   function ask(what) {
     if (!asked) { waiting.push(what); return; }
+    if (what.settled === false && answered < count) { held = what; return; }
+    held = null;
     count += 1;
     document.body.dataset.asked = count;
     document.dispatchEvent(new CustomEvent("asked", { detail: count }));
@@ -115,6 +118,7 @@ const drillctl = (() => {
         if (target && value !== undefined && target !== document.activeElement) target.value = value;
         else if (target && target.type === "range" && Math.abs(target.value - value) > Number(target.step)) target.value = value;
     }
+    if (told.units === undefined) return; // of a cross that has moved
     units = told.units;
     by("units").value = told.units;
     by("measure").value = told.measure;
@@ -124,6 +128,7 @@ const drillctl = (() => {
     if (told.draws) by("draws").value = told.draws;
     by("level").value = told.level;
     by("keep").setAttribute("aria-pressed", told.kept);
+    for (const one of document.querySelectorAll(".a-only")) one.hidden = !told.kept;
     by("keep").textContent = told.kept ? "Forget A" : "Keep as A";
   }
 
@@ -161,7 +166,10 @@ const drillctl = (() => {
     redo: can => { by("redo").disabled = !can; },
     fine: () => clear(),
     drew: kinds => document.dispatchEvent(new CustomEvent("drew", { detail: kinds })),
-    answered: number => { document.body.dataset.answered = number; },
+    answered: number => {
+      document.body.dataset.answered = answered = number;
+      if (held && answered >= count) ask(held);
+    },
     error: told => error(told.at, told.said),
     problem: told => { const target = by("problem-" + told.of); if (target) target.textContent = told.said; },
     map: told => { by("map-said").textContent = told.said; document.body.dataset.map = told.whole ? "whole" : "coarse"; },

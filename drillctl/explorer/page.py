@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import json
 import logging
+import math
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from bokeh.events import Pan, PanEnd, PanStart, Tap
@@ -45,7 +48,8 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger("drillctl")
 MOST_UNDONE = 200  # states that can be gone back to
-AHEAD = 2  # results sent that the browser has not drawn yet
+LOOPS = 0.2  # time (s) between two pictures of the loop while the cross is dragged
+AHEAD = 1  # results sent that the browser has not drawn yet
 
 
 class Page:
@@ -57,12 +61,15 @@ class Page:
     ) -> None:  # fmt: skip
         self._document, self._base, self._engine, self._reports = document, base, engine, reports
         self.state = states.first_state(base, system)
+        self._axes = self.state.grid(base)  # of the map that is shown
         self._history, self._undone = [self.state], list["State"]()
         self.map, self.response, self.loop = MapFigure(), ResponseFigures(), LoopFigures()
         self._asked, self._answer = ColumnDataSource({"json": [""]}), ColumnDataSource({"json": []})
         self._drawn, self._sent = ColumnDataSource({"n": [0]}), ColumnDataSource({"n": [0]})
         self._said: list[str] = []  # answers that are not sent yet
         self._drawing = self._asked_advice = False
+        self._settled = True  # whether nothing is being dragged
+        self._loop_is_rough, self._loop_at = False, -math.inf
         self._ready: dict[str, Callable[[], None]] = {}  # results that wait for the browser
         self._shown: dict[str, Any] = {}  # newest result of each kind
         self._made_by: dict[str, int] = {}  # number of the request that it answers
@@ -142,17 +149,20 @@ class Page:
         self._compute(None, self.state)
 
     def _undo(self) -> None:
+        self._settled = True
         if len(self._history) > 1:
             self._undone.append(self._history.pop())
             self._change(self._history[-1])
 
     def _redo(self) -> None:
+        self._settled = True
         if self._undone:
             self._history.append(self._undone.pop())
             self._change(self._history[-1])
 
     def _take(self, new: State, settled: bool) -> None:
         """Show a new state; one that is settled can be gone back to."""
+        self._settled = settled
         if settled and new != self._history[-1]:
             self._history = [*self._history, new][-MOST_UNDONE:]
             self._undone.clear()
@@ -164,10 +174,15 @@ class Page:
             self._place()
         if _form(new) != _form(old):
             self._describe()
+        elif new == replace(old, cross=new.cross):
+            self._say(values=form.crossed(new, self._axes), **self._undoable())
         else:
             self._say(values=form.values(new, self._base), **self._undoable())
         self._move()
         self._compute(old, new)
+        if self._settled and "response" in self._shown:
+            self._ready.setdefault("torques", partial(self._draw_torques, self._shown["response"]))
+            self._draw_ready()
 
     def _save(self) -> None:
         name = f"{self._base.name}-explorer.json"
@@ -195,20 +210,27 @@ class Page:
         base = self._base
         mapped = old is None or _mapped(new) != _mapped(old)
         moved = mapped or old is None or new.cross != old.cross or new.units != old.units
-        design = new.design(base)
-        axes = new.grid(design)
         if old is not None and new.kept != old.kept:
             self._keep(new, mapped=True)
         elif mapped and new.kept is not None:
             self._keep(new, mapped=old is None or _mapped(new)[1:] != _mapped(old)[1:])
         if mapped:
-            self._map(design, axes, new)
+            design = new.design(base)
+            self._map(design, new.grid(design), new)
         elif old is not None and new.units != old.units:
             self._paint_again()
         if moved:
             at = new.at_cross(base)
             self._put("quick", "response", 0, computed.response(at), self._draw_response)
-            self._put("loops", "loop", 0, computed.loop(at), self._draw_loop)
+        if (moved or self._loop_is_rough) and (self._settled or self._loop_is_due):
+            slices = computed.loop(new.at_cross(base))
+            self._loop_is_rough, self._loop_at = not self._settled, time.monotonic()
+            rough = islice(slices, 1) if self._loop_is_rough else slices
+            self._put("loops", "loop", 0, rough, self._draw_loop)
+
+    @property
+    def _loop_is_due(self) -> bool:
+        return time.monotonic() - self._loop_at > LOOPS
 
     def _map(self, design: Design, axes: tuple[Axis, Axis], new: State) -> None:
         self._engine.checks.drop(self, "audit")
@@ -218,8 +240,10 @@ class Page:
         self.map.check(None, axes, new.units)
         if new.draws:
             work = computed.probability(design, axes, new.level, new.draws)
-            self._put("maps", "map", 1, work, self._draw_share)
+            self._engine.maps.drop(self, "map")
+            self._put("shares", "map", 0, work, self._draw_share)
         else:
+            self._engine.shares.drop(self, "map")
             self._put("maps", "map", 0, computed.mapped(design, axes, new.measure), self._draw_map)
         self._put("checks", "boundary", 0, computed.boundary(design, axes), self._draw_boundary)
 
@@ -246,7 +270,7 @@ class Page:
         except InputError:  # the law of A has not what these axes run over
             self.map.keep(None, None)
         else:
-            self._put("maps", "map of A", 2, work, self._draw_map_of_a)
+            self._put("maps", "map of A", 1, work, self._draw_map_of_a)
 
     def _recommend(self) -> None:
         design = self.state.design(self._base)
@@ -368,8 +392,7 @@ class Page:
         self.map.mark(one, self.state.units)
 
     def _draw_audit(self, one: Audit) -> None:
-        axes = self.state.grid(self.state.design(self._base))
-        self.map.check(one, axes, self.state.units)
+        self.map.check(one, self._axes, self.state.units)
         worst = "" if one.worst is None else f", worst difference {one.worst:.1e}"
         text = f"audit: {one.verdict}, {len(one.cells)} cells{worst}"
         self._say(chip={"text": text, "kind": one.verdict, "more": one.sentence("cells")})
@@ -377,8 +400,14 @@ class Page:
             self._recommend()
 
     def _draw_response(self, run: Simulation) -> None:
-        self.response.show(run, self.state.units)
+        self.response.show(run)
         self._say(problem={"of": "response", "said": ""})
+        if self._settled:
+            self._draw_torques(run)
+
+    def _draw_torques(self, run: Simulation) -> None:
+        """What is drawn when the cross rests: torques, and the numbers."""
+        self.response.show_torques(run, self.state.units)
         self._readouts()
 
     def _draw_response_of_a(self, run: Simulation) -> None:
@@ -405,11 +434,10 @@ class Page:
 
     def _on_map(self, values: dict[str, float]) -> tuple[float, float] | None:
         """Where values (SI, by path) are on the map, in the units that are shown."""
-        state = self.state
-        axes = state.grid(self._base.replace(state.settings))
-        if any(axis.path not in values for axis in axes):
+        if any(axis.path not in values for axis in self._axes):
             return None
-        x, y = (values[a.path] / controls.shown_unit(a.unit, state.units)[0] for a in axes)
+        system = self.state.units
+        x, y = (values[a.path] / controls.shown_unit(a.unit, system)[0] for a in self._axes)
         return x, y
 
     def _draw_sentence(self, one: Recommendation) -> None:
@@ -441,12 +469,12 @@ class Page:
     def _place(self) -> None:
         """Put the map where its axes are."""
         state = self.state
-        self.map.place(state.grid(self._base.replace(state.settings)), state.units)
+        self._axes = state.grid(self._base.replace(state.settings))
+        self.map.place(self._axes, state.units)
         self._move()
 
     def _move(self) -> None:
-        state = self.state
-        self.map.move(state.cross, state.grid(self._base.replace(state.settings)), state.units)
+        self.map.move(self.state.cross, self._axes, self.state.units)
 
     def _undoable(self) -> dict[str, bool]:
         return {"undo": len(self._history) > 1, "redo": bool(self._undone)}

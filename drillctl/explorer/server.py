@@ -7,11 +7,14 @@ connection. Scripts come from the server itself; no request leaves the machine.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import secrets
 import signal
 import socket
+import sys
 import tempfile
+import threading
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +27,23 @@ from drillctl.errors import InputError
 HOST = "127.0.0.1"
 LEFT_AFTER = 2_000  # time (ms) without a connection after which a page counts as closed
 LOOK_EVERY = 1_000  # ms
+SWITCH = 5e-4  # longest time (s) that a computation keeps a page from being heard
 HERE = Path(__file__).parent
+
+
+def keep_no_memory() -> None:
+    """Return memory to the system once it is free, where the allocator of glibc would keep it.
+
+    Threads come and go with each computation; each would get an arena of its own, which keeps the
+    largest run that it ever held.
+    """
+    import ctypes
+
+    arenas, mapped_from = -8, -3  # M_ARENA_MAX, M_MMAP_THRESHOLD of malloc.h
+    with contextlib.suppress(OSError, AttributeError):  # another C library
+        library = ctypes.CDLL(None)
+        library.mallopt(arenas, 2)
+        library.mallopt(mapped_from, 2**20)
 
 
 def free_port(asked: int | None) -> socket.socket:
@@ -70,6 +89,7 @@ def serve(
         import bokeh  # noqa: F401
     except ImportError:
         raise InputError('needs Bokeh: pip install "drillctl[explore]"', "explore") from None
+    keep_no_memory()
     with tempfile.TemporaryDirectory(prefix="drillctl-explore-") as folder:
         server = _Server(design, system, port, Path(folder))
         say(f"explorer: {server.address}")
@@ -93,6 +113,18 @@ class _Server:
 
         self._reports = Reports(folder, f"/{self._token}/reports")
         self._design, self._system, self._folder = design, system, folder
+        # While the browser loads its scripts; what fails here is told by the page.
+        threading.Thread(target=self._warm_up, daemon=True).start()
+
+    def _warm_up(self) -> None:
+        """Load what the first map needs."""
+        from drillctl.explorer import computed
+        from drillctl.explorer.state import first_state
+
+        with contextlib.suppress(Exception):
+            state = first_state(self._design, self._system)
+            at = state.design(self._design)
+            next(computed.mapped(at, state.grid(at), "j1"))
 
     def run(self, browser: bool) -> None:
         """Serve until interrupted."""
@@ -128,6 +160,8 @@ class _Server:
         http.add_sockets([self._bound])
         tornado.initialize(_loop())
         tornado.start()
+        # Computations hold the interpreter for 5 ms at a time by default, each of them.
+        sys.setswitchinterval(SWITCH)
         stop = asyncio.Event()
         running = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -137,6 +171,8 @@ class _Server:
         try:
             await stop.wait()
         finally:
+            # Pages that are still open break off in the middle of a message.
+            logging.getLogger("tornado.application").setLevel(logging.CRITICAL)
             self._reports.end()
             self._engine.end()
             http.stop()

@@ -156,6 +156,8 @@ def changed(state: State, asked: dict[str, Any], base: Design) -> State:
         raise
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"a request {action!r} that cannot be read ({error})") from None
+    if replace(result, cross=state.cross) == state:  # what follows holds as before
+        return result
     at = result.design(base)
     for one in result.grid(at):
         if len(one) < 2:

@@ -10,7 +10,9 @@ of the kernels as the machine has, all else in one.
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,6 +21,9 @@ from drillctl.arrays import own_errstate
 from drillctl.progress import Silent
 
 Slices = Iterator[Any]
+
+FOREVER = 3600.0  # s: a condition takes no infinite time
+PATIENCE = 0.1  # time (s) that what follows the cross lets a coarse map go first
 
 
 class Dropped(Exception):  # noqa: N818 - no error, but an end
@@ -49,21 +54,24 @@ class Piece:
     failed: Callable[[Exception], None]
     until: Until
     turns: int = 0  # slices so far
+    since: float = field(default_factory=time.monotonic)  # when it was asked for (s)
 
 
-@dataclass(eq=False)
 class Queue:
     """Pieces of work that wait for one thread."""
 
-    name: str
-    threads: int  # of the kernels
-    _waiting: dict[tuple[Hashable, str], Piece] = field(default_factory=dict)
-    _turns: dict[Hashable, int] = field(default_factory=dict)  # of each page
-    _changed: threading.Condition = field(default_factory=threading.Condition)
-    _ended: bool = False
-
-    def __post_init__(self) -> None:
-        threading.Thread(target=self._work, name=f"explorer {self.name}", daemon=True).start()
+    def __init__(
+        self, name: str, threads: int, changed: threading.Condition,
+        after: tuple[Queue, ...] = (), behind: tuple[Queue, ...] = (), patience: float = math.inf,
+    ) -> None:  # fmt: skip
+        self.name, self._threads = name, threads  # of the kernels
+        self._changed = changed  # one for all queues that look at each other
+        # this one waits until those have begun with all that they hold, or have none of it left
+        self._after, self._behind, self._patience = after, behind, patience  # s
+        self._waiting: dict[tuple[Hashable, str], Piece] = {}
+        self._turns: dict[Hashable, int] = {}  # of each page
+        self._ended = False
+        threading.Thread(target=self._work, name=f"explorer {name}", daemon=True).start()
 
     def put(self, piece: Piece) -> None:
         """Take a piece of work, in place of an older one of its kind."""
@@ -72,7 +80,7 @@ class Queue:
             self._waiting[piece.owner, piece.kind] = piece
             # A page that comes late has not the turns of all that went before it.
             self._turns.setdefault(piece.owner, min(self._turns.values(), default=0))
-            self._changed.notify()
+            self._changed.notify_all()
 
     def drop(self, owner: Hashable, kind: str | None = None) -> None:
         """Forget the work of a page, or one kind of it."""
@@ -81,6 +89,7 @@ class Queue:
                 self._forget(key)
             if kind is None:
                 self._turns.pop(owner, None)
+            self._changed.notify_all()
 
     def end(self) -> None:
         """Let the thread end after its slice."""
@@ -88,28 +97,40 @@ class Queue:
             self._ended = True
             for key in list(self._waiting):
                 self._forget(key)
-            self._changed.notify()
+            self._changed.notify_all()
 
     def _forget(self, key: tuple[Hashable, str]) -> None:
         piece = self._waiting.pop(key, None)
         if piece is not None:
             piece.until.dropped = True
 
+    @property
+    def _has_its_turn(self) -> bool:
+        late = time.monotonic() - self._patience
+        begun = all(
+            one.turns or one.since < late
+            for queue in self._after
+            for one in queue._waiting.values()
+        )
+        return bool(self._waiting) and begun and not any(one._waiting for one in self._behind)
+
     def _next(self) -> Piece | None:
         """The piece whose turn it is, once there is one; None at the end."""
         with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._ended)
+            while not (self._ended or self._has_its_turn):
+                self._changed.wait(min(self._patience, FOREVER))
             if self._ended:
                 return None
-            order = lambda one: (one.rank, self._turns.get(one.owner, 0))  # noqa: E731
-            piece = min(self._waiting.values(), key=order)
+            piece = min(
+                self._waiting.values(), key=lambda one: (one.rank, self._turns.get(one.owner, 0))
+            )
             self._turns[piece.owner] = self._turns.get(piece.owner, 0) + 1
             return piece
 
     def _work(self) -> None:
         import numba
 
-        numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
+        numba.set_num_threads(min(self._threads, numba.config.NUMBA_NUM_THREADS))
         with own_errstate():
             while (piece := self._next()) is not None:
                 self._slice(piece)
@@ -124,6 +145,9 @@ class Queue:
             if not piece.until.dropped:
                 piece.failed(error)
         else:
+            with self._changed:
+                piece.turns += 1
+                self._changed.notify_all()
             if not piece.until.dropped:
                 piece.deliver(value)
 
@@ -131,22 +155,31 @@ class Queue:
         with self._changed:
             if self._waiting.get((piece.owner, piece.kind)) is piece:
                 del self._waiting[piece.owner, piece.kind]
+            self._changed.notify_all()
 
 
 class Engine:
-    """The queues that all pages share."""
+    """The queues that all pages share.
+
+    What follows the cross lets coarse maps go first, but not for long. Loops wait for them, and
+    shares of draws and checks for the whole ones.
+    """
 
     def __init__(self, threads: int) -> None:
-        self.quick = Queue("cross", 1)
-        self.loops = Queue("loop", 1)
-        self.maps = Queue("maps", threads)
-        self.checks = Queue("boundary and audit", 1)
-        self.advice = Queue("recommendation", 1)
+        changed = threading.Condition()
+        self.maps = Queue("maps", threads, changed)
+        self.quick = Queue("cross", 1, changed, after=(self.maps,), patience=PATIENCE)
+        self.loops = Queue("loop", 1, changed, after=(self.maps,))
+        self.shares = Queue("drawn rocks", threads, changed, behind=(self.maps,))
+        self.checks = Queue(
+            "boundary and audit", 1, changed, behind=(self.quick, self.maps, self.loops)
+        )
+        self.advice = Queue("recommendation", 1, changed)
 
     @property
     def queues(self) -> tuple[Queue, ...]:
         """All of them."""
-        return (self.quick, self.loops, self.maps, self.checks, self.advice)
+        return (self.quick, self.maps, self.loops, self.shares, self.checks, self.advice)
 
     def drop(self, owner: Hashable) -> None:
         """Forget all work of a page."""

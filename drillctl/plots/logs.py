@@ -152,12 +152,14 @@ def identified_window(
 
 
 @style.picture()
-def identified_profile(result: Identification, ax: Sequence[Axes] | None = None) -> Figure:
+def identified_profile(
+    result: Identification, ax: Sequence[Axes] | None = None, system: units.System = "si"
+) -> Figure:
     """Rise of the misfit over each coefficient, the others fitted anew."""
     count = len(result.profile)
     figure, panels = style.grid_or_new(ax, 1, count, 3.0 * count + 0.8, 3.0, share_y=True)
     for panel, (name, (values, rises)) in zip(panels, result.profile.items(), strict=True):
+        values, unit = units.displayed(values, "s/rad" if name == "beta" else "m", system)
         panel.plot(values, np.maximum(rises, 0.0), marker="o", markersize=3.5, **style.look(0, 1.2))
-        unit = "s/rad" if name == "beta" else "m"
         style.dress(panel, f"{name} ({unit})", "rise of the misfit" if panel is panels[0] else "")
     return figure

@@ -316,6 +316,9 @@ def test_every_verb_on_every_design(call, name):
         if verb == "loop" and nodes > 120:
             note += f"map of the slope margin alone, no root locus: {nodes} nodes; up to 120 the "
             note += "poles are computed for every cell\n"
+        if verb == "loop" and drillctl.load(name).axial is not None:
+            note += "map of the roots over 9 points of an axis at most; in Python "
+            note += "drillctl.studies.loop_map takes any\n"
         note += "".join(f"warning: {one}\n" for one in drillctl.load(name).warnings)
         assert (code, err) == (0, f"{note}results: runs/{name}-{verb}-1\n")
         assert parsed(out)

@@ -12,7 +12,7 @@ from drillctl.explorer.work import Dropped, Piece, Queue, Until
 
 @pytest.fixture
 def queue():
-    made = Queue("test", 1)
+    made = Queue("test", 1, threading.Condition())
     yield made
     made.end()
 
@@ -133,3 +133,26 @@ def test_a_failure_is_told_and_the_thread_goes_on(queue):
     other.let(3)
     until(lambda: len(errors) == 1 and other.got == [0, 1, 2])
     assert str(errors[0]) == "no"
+
+
+def test_a_queue_waits_for_those_before_it():
+    changed = threading.Condition()
+    maps = Queue("maps", 1, changed)
+    loops = Queue("loops", 1, changed, after=(maps,))
+    checks = Queue("checks", 1, changed, behind=(maps, loops))
+    whole, loop, check = Asked(kind="map"), Asked(kind="loop"), Asked(kind="check")
+    for one in (loop, check):
+        one.let(3)
+    with changed:  # as if all were asked for at one moment
+        for queue, one in ((checks, check), (loops, loop), (maps, whole)):
+            queue.put(one.piece)
+    time.sleep(0.1)
+    assert (loop.got, check.got) == ([], [])
+    whole.let()
+    until(lambda: loop.got == [0, 1, 2])  # the coarse map is there
+    time.sleep(0.1)
+    assert check.got == []
+    whole.let(2)
+    until(lambda: check.got == [0, 1, 2])
+    for queue in (maps, loops, checks):
+        queue.end()

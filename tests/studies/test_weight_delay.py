@@ -11,6 +11,7 @@ import pytest
 
 import drillctl
 from drillctl import units
+from drillctl.design.validation import validated
 from drillctl.ensemble.cases import Runs, crossing, first_not_negative, share_interval
 from drillctl.errors import InputError
 from drillctl.rig.weight_on_bit import FollowingSpeed, ObservedWeight, RealWeight
@@ -315,7 +316,7 @@ def test_limits_are_the_last_delay_that_ends_it_and_the_next(result, delays, at,
 def test_a_design_whose_own_weight_follows_is_taken_as_it_is(short):
     own = short.replace({**LAW, "weight_on_bit.gain": "3 kN*s/rad"})
     tree = {**own.tree, "weight_delay": {}}
-    bare = type(own)(own.name, own.tables.model_copy(), tree, own.origin).replace({})
+    bare = type(own)(own.name, validated(tree, own.origin), tree, own.origin)
     assert not bare.tables.weight_delay.values
     assert following_design(bare).weight_on_bit.hoist == 0.5
     one, other = (weight_delay(d, [6e3], [0.1, 0.5], 2) for d in (bare, short))

@@ -138,7 +138,7 @@ def pictures(result: Identification) -> Iterator[Picture]:
         yield Picture(
             "identified-profile", "Misfit over each coefficient, the others fitted anew.",
             "Profiles of the objective over the coefficients of the law.",
-            lambda system: plots.identified_profile(result),
+            lambda system: plots.identified_profile(result, system=system),
         )  # fmt: skip
 
 
