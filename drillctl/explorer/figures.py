@@ -307,10 +307,11 @@ class ResponseFigures:
 
     def keep(self, run: Simulation | None, system: units.System) -> None:
         """The run of case A, or none."""
-        empty = {k: [] for k in self.kept.data}, {k: [] for k in TORQUES}
-        self.kept.data, self.kept_torques.data = (
-            empty if run is None else (_speeds(run), _torques(run, system))
-        )
+        if run is None:
+            self.kept.data = {name: [] for name in self.kept.data}
+            self.kept_torques.data = {name: [] for name in TORQUES}
+        else:
+            self.kept.data, self.kept_torques.data = _speeds(run), _torques(run, system)
 
 
 TORQUES = ("time", "drive", "pipe")
