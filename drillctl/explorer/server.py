@@ -9,12 +9,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import os
 import secrets
 import signal
 import socket
 import sys
 import tempfile
 import threading
+import warnings
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
@@ -27,6 +29,7 @@ from drillctl.errors import InputError
 HOST = "127.0.0.1"
 LEFT_AFTER = 2_000  # time (ms) without a connection after which a page counts as closed
 LOOK_EVERY = 1_000  # ms
+LAST = 5.0  # time (s) that running work has to end once it is interrupted
 SWITCH = 5e-4  # longest time (s) that a computation keeps a page from being heard
 HERE = Path(__file__).parent
 
@@ -95,6 +98,10 @@ def serve(
         say(f"explorer: {server.address}")
         say("Ctrl-C ends it")
         server.run(browser)
+        ended = server.ended()
+    if not ended:  # a thread inside compiled code cannot be taken down with the interpreter
+        sys.stdout.flush()
+        os._exit(0)
 
 
 class _Server:
@@ -114,7 +121,13 @@ class _Server:
         self._reports = Reports(folder, f"/{self._token}/reports")
         self._design, self._system, self._folder = design, system, folder
         # While the browser loads its scripts; what fails here is told by the page.
-        threading.Thread(target=self._warm_up, daemon=True).start()
+        self._warming = threading.Thread(target=self._warm_up, daemon=True)
+        self._warming.start()
+
+    def ended(self) -> bool:
+        """Whether all threads have ended, for which they have some seconds."""
+        self._warming.join(LAST)
+        return self._engine.ended(LAST) and not self._warming.is_alive()
 
     def _warm_up(self) -> None:
         """Load what the first map needs."""
@@ -173,6 +186,7 @@ class _Server:
         finally:
             # Pages that are still open break off in the middle of a message.
             logging.getLogger("tornado.application").setLevel(logging.CRITICAL)
+            warnings.simplefilter("ignore", RuntimeWarning)
             self._reports.end()
             self._engine.end()
             http.stop()

@@ -71,7 +71,8 @@ class Queue:
         self._waiting: dict[tuple[Hashable, str], Piece] = {}
         self._turns: dict[Hashable, int] = {}  # of each page
         self._ended = False
-        threading.Thread(target=self._work, name=f"explorer {name}", daemon=True).start()
+        self.thread = threading.Thread(target=self._work, name=f"explorer {name}", daemon=True)
+        self.thread.start()
 
     def put(self, piece: Piece) -> None:
         """Take a piece of work, in place of an older one of its kind."""
@@ -190,3 +191,10 @@ class Engine:
         """End all work."""
         for queue in self.queues:
             queue.end()
+
+    def ended(self, within: float) -> bool:
+        """Whether all threads have ended after so long a time (s)."""
+        last = time.monotonic() + within
+        for queue in self.queues:
+            queue.thread.join(max(0.0, last - time.monotonic()))
+        return not any(queue.thread.is_alive() for queue in self.queues)
