@@ -65,6 +65,9 @@ class Page:
 
     def slide(self, path: str, value: float) -> tuple[float, float]:
         """Times (ms) to the first picture and to the whole map."""
+        self.page.wait_for_function(
+            "document.body.dataset.asked === document.body.dataset.answered"
+        )
         count = self.page.evaluate(SLIDE, [path, value])
         mine = f"window.seen.drew.filter(d => d.kind === 'map' && d.count === {count})"
         self.page.wait_for_function(f"{mine}.some(d => d.whole)", timeout=60_000)
