@@ -2,6 +2,7 @@
 
 import ctypes
 import hashlib
+import importlib.util
 import json
 import os
 import sys
@@ -138,3 +139,39 @@ def permissions_count():
     yield
     held[0] = all_of_them
     assert libc.capset(head, held) == 0
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium, where there is one."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    from drillctl.reporting.pages import browser as installed
+
+    with playwright.sync_playwright() as started:
+        found = started.chromium.launch(
+            executable_path=installed(), args=["--no-sandbox", "--disable-gpu", "--disable-quic"]
+        )
+        yield found
+        found.close()
+
+
+AXE = """axe.run({ resultTypes: ['violations'] }).then(found => [
+  found.passes.length,
+  found.violations.filter(one => ['serious', 'critical'].includes(one.impact))
+    .map(one => [one.id, one.nodes.slice(0, 3).map(node => node.html.slice(0, 120))]),
+])"""
+
+
+@pytest.fixture
+def serious():
+    """Give what Deque's own rules find of a page: how many hold, and what is serious."""
+    axe = importlib.util.find_spec("axe_playwright_python")
+    if axe is None:
+        pytest.skip("no axe")
+    rules = Path(axe.origin).with_name("axe.min.js").read_text(encoding="utf-8")
+
+    def _serious(page):
+        page.evaluate(rules)
+        return page.evaluate(AXE)
+
+    return _serious

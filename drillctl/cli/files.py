@@ -250,13 +250,15 @@ def explore(
     debug: Debug = False,
 ) -> None:
     """Turn gains on a local page and watch the region move."""
+    from drillctl.design import parse_setting
     from drillctl.explorer.server import serve
 
-    common = common_options(threads=threads, units=units)
-    loaded_design = loaded(design, sets)
-    warn(loaded_design, common.units)
-    system = units or loaded_design.tables.units or "si"
-    serve(loaded_design, system, port, browser, console.line)
+    common_options(threads=threads)
+    set_design = loaded(design, sets)  # refuses impossible values in words of the command line
+    system = units or set_design.tables.units or "si"
+    warn(set_design, system)
+    settings = dict(parse_setting(text) for text in sets or [])
+    serve(loaded(design, None), settings, system, port, browser, console.line)
 
 
 OPTIONS = (

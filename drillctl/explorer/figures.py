@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import contourpy
@@ -174,7 +174,7 @@ class MapFigure:
         plot.title.align, plot.title.text_font_size = "right", "11px"
         plot.title.text_font_style = "normal"
         _legend(plot, "top_left")
-        self.plot, self.entries = plot, [_entry(plot)]
+        self.plot, self.plots, self.of_kept = plot, (plot,), _entry(plot)
 
     def place(self, axes: tuple[Axis, Axis], system: units.System) -> None:
         """Axes of the map."""
@@ -252,7 +252,7 @@ class MapFigure:
         """Levels of case A and its cross, in the units that are shown; None for none."""
         self.kept.data = contours_of_nothing() if lines is None else lines
         self.of_a.data = _point(place)
-        self.entries[0].visible = lines is not None
+        self.of_kept.visible = lines is not None
 
     def star(self, place: tuple[float, float] | None) -> None:
         """The recommended setting, in the units that are shown; None where it is not on the map."""
@@ -391,9 +391,3 @@ def _loop_columns(loop: Loop | None) -> tuple[dict[str, Any], dict[str, Any]]:
         return {"re": [], "im": []}, {k: [] for k in ("frequency", "impedance", "reflection")}
     near = np.where(np.abs(loop.loop) < FAR, loop.loop, np.nan)
     return {"re": near.real, "im": near.imag}, dict(loop.drive)
-
-
-def every(*groups: Any) -> Iterator[Any]:
-    """Plots of groups of figures."""
-    for group in groups:
-        yield from getattr(group, "plots", ()) or (group.plot,)

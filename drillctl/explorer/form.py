@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -104,8 +105,13 @@ def readouts(
     rows: list[list[str | None]] = []
     for table, ones in ((_OF_RUN, runs), (_OF_LOOP, loops)):
         for label, (unit, value) in table.items():
-            shown = "" if unit == "1" else units.unit_name(unit, system)
-            texts = (None if one is None else _text(value(one), unit, system) for one in ones)
+            found = [None if one is None else value(one) for one in ones]
+            numbers = any(isinstance(v, (int, float)) and math.isfinite(v) for v in found)
+            shown = units.unit_name(unit, system) if numbers and unit != "1" else ""
+            texts = (
+                None if one is None else _text(v, unit, system)
+                for one, v in zip(ones, found, strict=True)
+            )  # fmt: skip
             rows.append([label, shown, *texts])
     return rows
 
@@ -115,7 +121,9 @@ def _text(value: Any, unit: str, system: units.System) -> str:
         return "none"
     if isinstance(value, str):
         return value.replace("_", " ")
-    return f"{units.displayed(value, unit, system)[0]:.5g}"
+    if math.isinf(value):
+        return "any"
+    return f"{units.displayed(value, unit, system)[0] + 0.0:.5g}"  # no -0
 
 
 def _margin(name: str) -> Callable[[Any], Any]:

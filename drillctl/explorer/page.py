@@ -30,7 +30,6 @@ from drillctl.explorer.figures import (
     MapFigure,
     ResponseFigures,
     contours,
-    every,
     shown,
 )
 from drillctl.explorer.work import Engine, Piece, Queue, Slices, Until
@@ -56,12 +55,11 @@ class Page:
     """A page from when it is opened until it is closed."""
 
     def __init__(
-        self, document: Document, base: Design, system: units.System, engine: Engine,
-        reports: Reports,
-    ) -> None:  # fmt: skip
+        self, document: Document, base: Design, first: State, engine: Engine, reports: Reports
+    ) -> None:
         self._document, self._base, self._engine, self._reports = document, base, engine, reports
-        self.state = states.first_state(base, system)
-        self._axes = self.state.grid(base)  # of the map that is shown
+        self.state = first
+        self._axes = first.grid(base.replace(first.settings))  # of the map that is shown
         self._history, self._undone = [self.state], list["State"]()
         self.map, self.response, self.loop = MapFigure(), ResponseFigures(), LoopFigures()
         self._asked, self._answer = ColumnDataSource({"json": [""]}), ColumnDataSource({"json": []})
@@ -80,7 +78,7 @@ class Page:
 
     def _lay_out(self) -> None:
         document = self._document
-        for plot in every(self.map, self.response, self.loop):
+        for plot in (*self.map.plots, *self.response.plots, *self.loop.plots):
             document.add_root(plot)
         given = {
             "asked": self._asked, "answer": self._answer, "drawn": self._drawn, "sent": self._sent,
@@ -235,7 +233,9 @@ class Page:
     def _map(self, design: Design, axes: tuple[Axis, Axis], new: State) -> None:
         self._engine.checks.drop(self, "audit")
         self._engine.advice.drop(self, "recommendation")
-        self._shown.pop("audit", None)
+        for kind in ("audit", "boundary", "recommendation"):
+            self._shown.pop(kind, None)
+            self._ready.pop(kind, None)
         self._say(chip={"text": "audit: waiting", "kind": "none"}, stale=self._asked_advice)
         self.map.check(None, axes, new.units)
         if new.draws:
@@ -346,17 +346,23 @@ class Page:
             LOG.error("%s failed", kind, exc_info=error)
             said = f"{type(error).__name__}: {error}"
         self._shown.pop(kind, None)
+        said = units.told(said, self.state.units)
         if kind == "loop":
             self.loop.show(None)
             self._readouts()
-        self._say(problem={"of": kind, "said": units.told(said, self.state.units)})
+        if kind == "recommendation":
+            self._say(sentence={"text": f"No recommendation: {said}", "old": False})
+        elif kind == "audit":
+            self._say(chip={"text": "audit failed", "kind": "check", "more": said})
+        else:
+            self._say(problem={"of": kind, "said": said})
 
     # Results.
 
     def _draw_map(self, one: Picture) -> None:
         state = self.state
-        levels = one.whole.levels if one.whole is not None else self._levels()
-        self.map.paint(one.axes, one.values, levels, state.measure, state.units, False)
+        self._clear_old()
+        self.map.paint(one.axes, one.values, self._levels(), state.measure, state.units, False)
         self._say(problem={"of": "map", "said": ""},
                   map={"whole": one.whole is not None, "said": self._map_said(one)})  # fmt: skip
         if one.whole is not None and len(one.whole.measures):
@@ -364,6 +370,13 @@ class Page:
             self._say(chip={"text": "audit: running", "kind": "none"})
             work = computed.audited(one.whole, until)
             self._put("checks", "audit", 1, work, self._draw_audit, until)
+
+    def _clear_old(self) -> None:
+        """Take what belongs to the map before off this one."""
+        if "boundary" not in self._shown:
+            self.map.mark(None, self.state.units)
+        if "recommendation" not in self._shown:
+            self.map.star(None)
 
     def _map_said(self, one: Picture) -> str:
         if one.whole is None:
@@ -382,6 +395,7 @@ class Page:
         return self._base.tables.map.levels
 
     def _draw_share(self, one: Share) -> None:
+        self._clear_old()
         self.map.paint(one.axes, one.values, (0.05, 0.5, 0.95), "j1", self.state.units, True)
         self._say(map={"whole": one.draws >= self.state.draws,
                        "said": f"share of {one.draws} of {self.state.draws} rocks with J1 of "

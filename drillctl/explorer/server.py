@@ -18,13 +18,16 @@ import tempfile
 import threading
 import warnings
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drillctl import units
 from drillctl.design import Design
 from drillctl.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctl.explorer.state import State
 
 HOST = "127.0.0.1"
 LEFT_AFTER = 2_000  # time (ms) without a connection after which a page counts as closed
@@ -34,7 +37,7 @@ SWITCH = 5e-4  # longest time (s) that a computation keeps a page from being hea
 HERE = Path(__file__).parent
 
 
-def keep_no_memory() -> None:
+def return_freed_memory() -> None:
     """Return memory to the system once it is free, where the allocator of glibc would keep it.
 
     Threads come and go with each computation; each would get an arena of its own, which keeps the
@@ -63,6 +66,7 @@ def free_port(asked: int | None) -> socket.socket:
 
 def serve(
     design: Design,
+    settings: Mapping[str, Any] | None = None,
     system: units.System = "si",
     port: int | None = None,
     browser: bool = True,
@@ -74,6 +78,8 @@ def serve(
     ----------
     design : Design
         What pages open with.
+    settings : mapping, optional
+        Values laid over it first, by dotted path, as in a file.
     system : {'si', 'field'}
         Units that they open with.
     port : int, optional
@@ -86,15 +92,18 @@ def serve(
     Raises
     ------
     InputError
-        Bokeh is not installed, or the port is taken.
+        Bokeh is not installed, the port is taken, or a value is impossible.
     """
     try:
         import bokeh  # noqa: F401
     except ImportError:
         raise InputError('needs Bokeh: pip install "drillctl[explore]"', "explore") from None
-    keep_no_memory()
+    from drillctl.explorer.state import first_state
+
+    return_freed_memory()
     with tempfile.TemporaryDirectory(prefix="drillctl-explore-") as folder:
-        server = _Server(design, system, port, Path(folder))
+        first = first_state(design, system, settings)
+        server = _Server(design, first, port, Path(folder))
         say(f"explorer: {server.address}")
         say("Ctrl-C ends it")
         server.run(browser)
@@ -105,21 +114,18 @@ def serve(
 
 
 class _Server:
-    def __init__(
-        self, design: Design, system: units.System, port: int | None, folder: Path
-    ) -> None:
+    def __init__(self, design: Design, first: State, port: int | None, folder: Path) -> None:
         import numba
 
+        from drillctl.explorer.reports import Reports
         from drillctl.explorer.work import Engine
 
         self._bound = free_port(port)
         self._token = secrets.token_urlsafe(16)
         self.address = f"http://{HOST}:{self._bound.getsockname()[1]}/{self._token}"
         self._engine = Engine(numba.get_num_threads())
-        from drillctl.explorer.reports import Reports
-
         self._reports = Reports(folder, f"/{self._token}/reports")
-        self._design, self._system, self._folder = design, system, folder
+        self._design, self._first, self._folder = design, first, folder
         # While the browser loads its scripts; what fails here is told by the page.
         self._warming = threading.Thread(target=self._warm_up, daemon=True)
         self._warming.start()
@@ -132,12 +138,10 @@ class _Server:
     def _warm_up(self) -> None:
         """Load what the first map needs."""
         from drillctl.explorer import computed
-        from drillctl.explorer.state import first_state
 
         with contextlib.suppress(Exception):
-            state = first_state(self._design, self._system)
-            at = state.design(self._design)
-            next(computed.mapped(at, state.grid(at), "j1"))
+            at = self._first.design(self._design)
+            next(computed.mapped(at, self._first.grid(at), "j1"))
 
     def run(self, browser: bool) -> None:
         """Serve until interrupted."""
@@ -148,6 +152,7 @@ class _Server:
         from bokeh.application.handlers.function import FunctionHandler
         from bokeh.server.tornado import BokehTornado
         from tornado.httpserver import HTTPServer
+        from tornado.ioloop import IOLoop
         from tornado.web import StaticFileHandler
 
         logging.getLogger("bokeh").setLevel(logging.ERROR)
@@ -171,7 +176,7 @@ class _Server:
         http = HTTPServer(tornado, max_buffer_size=20 * 1024 * 1024)
         self._bound.setblocking(False)
         http.add_sockets([self._bound])
-        tornado.initialize(_loop())
+        tornado.initialize(IOLoop.current())
         tornado.start()
         # Computations hold the interpreter for 5 ms at a time by default, each of them.
         sys.setswitchinterval(SWITCH)
@@ -196,16 +201,10 @@ class _Server:
         """Fill the document of a page that is opened."""
         from drillctl.explorer.page import Page
 
-        page = Page(document, self._design, self._system, self._engine, self._reports)
+        page = Page(document, self._design, self._first, self._engine, self._reports)
         parts = {
             name: (HERE / f"page.{name}").read_text(encoding="utf-8") for name in ("css", "js")
         }
         document.template = (HERE / "page.html").read_text(encoding="utf-8")
         document.template_variables.update(parts)
         document.on_session_destroyed(lambda context: page.close())
-
-
-def _loop() -> Any:
-    from tornado.ioloop import IOLoop
-
-    return IOLoop.current()

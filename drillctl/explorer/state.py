@@ -10,7 +10,8 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ from drillctl.simulation.measures import BATCH_MEASURES
 VERSION = 1  # of the file that a state is saved to
 POINTS = 41  # of an axis that was chosen on the page
 MOST_DRAWS = 10_000
+GAINS = ("controller.kp", "controller.ki")
 
 
 class End(NamedTuple):
@@ -67,7 +69,7 @@ class State:
     level: float = 30.0  # of J1 (s)
     draws: int = 0  # of the rock; 0 for the rock of the design
     units: units.System = "si"
-    kept: Kept | None = field(default=None)
+    kept: Kept | None = None
 
     def design(self, base: Design) -> Design:
         """The design with what is set, and the map."""
@@ -106,22 +108,20 @@ def _exact(design: Design, path: str, value: float) -> str | float:
     return float(value) if kind is None else units.write(float(value), kind)
 
 
-def first_state(base: Design, system: units.System) -> State:
-    """The state that a page opens with: the design as it is."""
-    tables = axis_tables(base)[:2]
-    if len(tables) < 2:
-        only = {tables[0].path} if tables else set()
-        spare = next(r for p, r in controls.axis_ranges(base).items() if p not in only)
-        ends = [*(_end(one) for one in tables), _chosen(base, spare)]
-    else:
-        ends = [_end(one) for one in tables]
-    level = base.tables.map.levels[min(1, len(base.tables.map.levels) - 1)]
-    state = State({}, (ends[0], ends[1]), (0.0, 0.0), level=level, units=system)
-    return replace(state, cross=_at_design(base, state))
-
-
-def _end(table: AxisTable) -> End:
-    return End(table.path, table.min, table.max, table.points)
+def first_state(
+    base: Design, system: units.System, settings: Mapping[str, Any] | None = None
+) -> State:
+    """The state that a page opens with: the design as it is, with some values set."""
+    settings = dict(settings or {})
+    design = base.replace(settings)
+    ends = [End(one.path, one.min, one.max, one.points) for one in axis_tables(design)[:2]]
+    if len(ends) < 2:
+        known = controls.axis_ranges(design)
+        ends.append(_chosen(design, next(known[p] for p in known if p != ends[0].path)))
+    levels = design.tables.map.levels
+    level = levels[min(1, len(levels) - 1)]
+    state = State(settings, (ends[0], ends[1]), (0.0, 0.0), level=level, units=system)
+    return replace(state, cross=_at_design(design, state))
 
 
 def _chosen(design: Design, one: controls.Range) -> End:
@@ -185,7 +185,7 @@ def _law(state: State, asked: dict[str, Any], base: Design) -> State:
     table = path.partition(".")[0]
     before = base.replace(state.settings)
     if table == "controller":  # at the cross, which may hold both gains
-        before = before.replace({p: v for p, v in state.point(before).items() if p in _gains()})
+        before = before.replace({p: v for p, v in state.point(before).items() if p in GAINS})
     made = controls.law_settings(before, path, str(asked["value"]))
     settings = {
         key: value
@@ -205,10 +205,6 @@ def _law(state: State, asked: dict[str, Any], base: Design) -> State:
         axes[place] = _chosen(after, known[path])
     result = replace(state, settings=settings, axes=(axes[0], axes[1]))
     return replace(result, cross=_at_design(after, result)) if gone else result
-
-
-def _gains() -> tuple[str, str]:
-    return "controller.kp", "controller.ki"
 
 
 def _cross(state: State, asked: dict[str, Any], base: Design) -> State:
@@ -314,17 +310,22 @@ def read(text: str, base: Design) -> State:
     try:
         held = json.loads(text)
         version, name = held.pop("explorer"), held.pop("design")
-        axes = [End(*one.values()) if isinstance(one, dict) else End(*one) for one in held["axes"]]
-        kept = held["kept"]
-        kept = None if kept is None else Kept(*(kept.values() if isinstance(kept, dict) else kept))
-        held |= {"axes": (axes[0], axes[1]), "cross": tuple(held["cross"]), "kept": kept}
+        first, second = (End(*one) for one in held["axes"])
+        x, y = (float(one) for one in held["cross"])
+        if not math.isfinite(x * y):
+            raise ValueError
+        kept = None if held["kept"] is None else Kept(*held["kept"])
+        held |= {"axes": (first, second), "cross": (x, y), "kept": kept}
         state = State(**held)
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError):
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise InputError("not a file that a page of the explorer saved", "open") from None
     if version != VERSION:
         raise InputError(f"written by another version of the explorer ({version})", "open")
     if name != base.name:
         raise InputError(f"a page of the design {name!r}, not of {base.name!r}", "open")
+    for one in ("measure", "level", "draws", "units"):
+        state = _choose(state, {"name": one, "value": getattr(state, one)}, base)
+    state.case_a(base)
     return state
 
 

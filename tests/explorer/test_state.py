@@ -123,9 +123,12 @@ def test_a_saved_page_opens_as_it_was(base, first):
     assert s.read(text, base) == state
     assert ask(first, base, do="open", text=text) == state
     assert state.case_a(base).tables.drillstring == base.tables.drillstring
-    other = json.loads(text) | {"design": "another"}
-    with pytest.raises(InputError, match="another"):
-        s.read(json.dumps(other), base)
+    for wrong in (
+        {"design": "another"}, {"explorer": 0}, {"cross": [1.0, float("nan")]}, {"draws": -1},
+        {"measure": "j2"}, {"level": "high"}, {"units": "cubits"}, {"axes": [1, 2]},
+    ):  # fmt: skip
+        with pytest.raises(InputError):
+            s.changed(first, {"do": "open", "text": json.dumps(json.loads(text) | wrong)}, base)
 
 
 def test_commands_give_what_the_page_shows(base, first, capsys):
@@ -147,6 +150,28 @@ def test_commands_give_what_the_page_shows(base, first, capsys):
     told = json.loads(capsys.readouterr().out)
     own = drillctl.simulate(state.at_cross(base), engine="batch")
     assert told["measures"] == own.measures.as_dict()
+
+
+def test_values_of_the_command_line_stay_in_the_commands_of_a_page(base):
+    state = s.first_state(base, "si", {WEIGHT: "120 kN", "controller.kp": 300})
+    assert state.cross == (300.0, 125.0)
+    assert state.at_cross(base).tables.operating_point.weight_on_bit == 120e3
+    for words in (s.command(state, base), s.run_command(state, base)):
+        assert f"--set '{WEIGHT}=120 kN'" in words
+
+
+def test_the_command_of_drawn_rocks_gives_what_the_page_shows(base, first, capsys):
+    from drillctl.explorer.computed import probability
+
+    few = tuple(axis._replace(points=3) for axis in first.axes)
+    state = dataclasses.replace(first, axes=few, draws=5)
+    design = state.design(base)
+    *_, last = probability(design, state.grid(design), state.level, 5)
+    words = shlex.split(s.command(state, base))
+    assert run([*words[1:], "--audit", "0", "--out", "drawn"]) == 0
+    capsys.readouterr()
+    found = drillctl.open("drawn").maps[state.level]
+    assert (found.counts / 5).tolist() == last.values.tolist()
 
 
 @pytest.fixture(autouse=True)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pypdf
@@ -84,17 +82,6 @@ ACCESSIBLE = """
   return { wrong, checked, least };
 }
 """
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as started:
-        found = started.chromium.launch(
-            executable_path=pdf.browser(), args=["--no-sandbox", "--disable-gpu", "--disable-quic"]
-        )
-        yield found
-        found.close()
 
 
 class Seen:
@@ -202,21 +189,12 @@ def test_nothing_stands_in_the_way_of_reading(browser, small, scheme, width):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_serious(browser, small, scheme):
-    """Deque's own rules, in the open parts of the page."""
-    axe = importlib.util.find_spec("axe_playwright_python")
-    if axe is None:
-        pytest.skip("no axe")
+def test_axe_finds_nothing_serious(browser, small, scheme, serious):
+    """In the open parts of the page."""
     seen = Seen(browser, small, color_scheme=scheme, viewport={"width": 1280, "height": 900})
-    seen.page.evaluate(Path(axe.origin).with_name("axe.min.js").read_text(encoding="utf-8"))
-    found = seen.page.evaluate("axe.run({ resultTypes: ['violations'] })")
-    serious = [
-        (one["id"], one["impact"], [node["html"][:80] for node in one["nodes"][:3]])
-        for one in found["violations"]
-        if one["impact"] in ("serious", "critical")
-    ]
-    assert serious == []
-    assert len(found["passes"]) > 20
+    holding, found = serious(seen.page)
+    assert found == []
+    assert holding > 20
     seen.context.close()
 
 
