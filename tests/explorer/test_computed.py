@@ -7,7 +7,7 @@ import pytest
 
 import drillctl
 from drillctl.ensemble.grid import axes_of
-from drillctl.explorer import computed
+from drillctl.explorer import computed, form
 from drillctl.explorer.work import Dropped, Until
 from drillctl.linear.loop_analysis import loop
 
@@ -82,6 +82,27 @@ def test_margins_are_those_of_the_command(design, kp):
     expected = loop(at)
     assert (last.slope_margin, last.margins) == (expected.slope_margin, expected.margins)
     assert last.stable == expected.stable == (kp == 625.0)
+
+
+def test_the_table_has_each_number_under_its_name(design):
+    (run,) = computed.response(design)
+    *_, last = computed.loop(design)
+    told = {row[0]: row[1:] for row in form.readouts([run, None], [last, None], "si")}
+    expected = loop(design)
+    numbers = {
+        "J1": ("s", run.measures.j1),
+        "stick-slip index": ("", run.measures.stick_slip_index),
+        "time stuck": ("s", run.measures.stuck_time),
+        "peak torque": ("kN m", run.measures.peak_pipe_torque / 1e3),
+        "slope of rock": ("N m s", expected.operating_point.slope),
+        "slope tolerated": ("N m s", expected.slope_margin),
+        "disk margin": ("", expected.margins.disk),
+        "peak sensitivity": ("", expected.margins.peak_sensitivity),
+        "delay margin": ("s", expected.margins.delay),
+    }
+    for name, (unit, value) in numbers.items():
+        assert told.pop(name) == [unit, f"{value:.5g}", None]
+    assert told == {"ends as": ["", run.status, None], "settles in": ["", "none", None]}
 
 
 def test_the_share_of_rocks_is_that_of_uncertainty(design):
