@@ -157,12 +157,15 @@ def _reported(problem: Any, tree: Tree) -> InputError:
 def _keys_at(loc: tuple[str | int, ...]) -> list[str]:
     """Keys that the table at `loc` may hold."""
     model: Any = DesignTables
-    for step in loc:
+    steps = iter(loc)
+    for step in steps:
         if isinstance(step, int):
             continue
         fields = getattr(model, "model_fields", {})
         if step in fields:
             model = fields[step].annotation
+            if get_origin(model) is dict:
+                next(steps, None)  # the name of a table, which may be that of a field
         model = _table_class(model, step)
     return [f.alias or key for key, f in model.model_fields.items()]
 

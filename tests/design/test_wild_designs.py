@@ -25,11 +25,13 @@ from hypothesis import strategies as st
 
 import drillctl
 from drillctl.design import Design, to_toml
+from drillctl.design.tables import DesignTables
+from drillctl.design.validation import validated
 from drillctl.errors import DrillctlError
 from drillctl.progress import SILENT
 from drillctl.simulation.measures import STATUSES
 from drillctl.text import LONGEST_ERROR, clean, one_line
-from tests.design.wild import rigs, spoilt
+from tests.design.wild import misfits, rigs, spoilt
 
 RIGS = rigs()
 RIGS["monteiro-trindade-2012"]["bit_rock"]["outside_table"] = "extrapolate"
@@ -123,6 +125,14 @@ RANDOM = st.randoms(use_true_random=False)
 @given(random=RANDOM)
 def test_any_design_is_refused_in_words_or_comes_back_as_it_is(random, scratch):
     examined(spoilt(random, RIGS[random.choice(sorted(RIGS))]), scratch, deep=False)
+
+
+def test_every_key_refuses_what_does_not_fit():
+    for path, tree in misfits(DesignTables, RIGS[RIG]):
+        try:
+            attempted(lambda tree=tree: validated(tree, ""))
+        except Exception as error:
+            raise AssertionError(path) from error
 
 
 @often(100)

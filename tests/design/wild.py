@@ -6,6 +6,7 @@ import copy
 import datetime
 import math
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
 
@@ -24,6 +25,7 @@ JUNK: tuple[Any, ...] = (
     *TEXTS, True, -1, 0, 10**30, 1e300, -1e-300, math.nan, math.inf, [], [1, "a"], {}, {"law": 1},
     {"": 3}, [{}], datetime.date(2020, 1, 1), datetime.time(7, 32),
 )  # fmt: skip
+UNFIT: tuple[Any, ...] = ([], {}, "x", True, -1, [[]], [1, 2], {"a": 1})
 
 
 def rigs() -> dict[str, dict[str, Any]]:
@@ -58,6 +60,32 @@ def spoilt(
         info = DesignTables.model_fields["schema_version" if key == "schema" else key]
         tree[key] = _value(random, info, info.annotation, tree.get(key))
     return tree
+
+
+def misfits(table: type[Table], tree: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Each key at and below a table with each value that fits few keys; those of every law too."""
+    for name, info in table.model_fields.items():
+        key = info.alias or name
+        for value in UNFIT:
+            yield key, {**tree, key: value}
+        for inner in _tables_in(info.annotation):
+            old = tree.get(key)
+            old = old[0] if isinstance(old, list) and old else old
+            kept = isinstance(old, dict) and _law(inner) in ("", _law_of(old))
+            start = dict(old) if kept else {"law": _law(inner)} if _law(inner) else {}
+            for path, spoiled in misfits(inner, start):
+                each = [spoiled] if _is_list(info.annotation) else spoiled
+                yield f"{key}.{path}", {**tree, key: each}
+
+
+def _tables_in(annotation: Any) -> list[type[Table]]:
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return [annotation]
+    return [table for inside in get_args(annotation) for table in _tables_in(inside)]
+
+
+def _is_list(annotation: Any) -> bool:
+    return any(get_origin(one) is tuple for one in (annotation, *get_args(annotation)))
 
 
 def _value(random: Any, info: Any, annotation: Any, old: Any) -> Any:

@@ -106,6 +106,8 @@ class BitAggressivenessTable(RockTable):
         if not isinstance(data, dict) or data.get("aggressiveness") is not None:
             return data
         bit, rock = data.get("bit_type"), data.get("rock", "medium")
+        if not (isinstance(bit, str) and isinstance(rock, str)):
+            return data
         if bit not in SLIDING or rock not in STRENGTH:
             return data
         return {**data, "aggressiveness": typical(bit, rock).aggressiveness}

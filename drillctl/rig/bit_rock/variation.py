@@ -55,7 +55,8 @@ class VariationTable(Table):
     @model_validator(mode="before")
     @classmethod
     def _in_units_of_way(cls, data: Any) -> Any:
-        kind = UNITS.get(data.get("over", "depth")) if isinstance(data, dict) else None
+        over = data.get("over", "depth") if isinstance(data, dict) else None
+        kind = UNITS.get(over) if isinstance(over, str) else None
         if kind is None:
             return data
         read = {key: data[key] for key in ALONG if data.get(key) is not None}
