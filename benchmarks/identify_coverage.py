@@ -1,6 +1,6 @@
 """Coverage of the bands of `identify` on synthetic logs over random strings, gains, laws, sampling.
 
-    python benchmarks/identify_coverage.py [LOGS]
+    python benchmarks/identify_coverage.py [LOGS [FIRST]]
 
 Each log is made by characteristics (`tests/logs/synthetic.py`), 300 s with white noise of 200 N m
 and 0.02 rad/s, and fitted with its own string. Coverage: share of 21 speeds among those that the
@@ -63,11 +63,11 @@ def design_of(rig: Rig, length: float) -> drillctl.Design:
     })  # fmt: skip
 
 
-def main(count: int) -> None:
-    """Print coverage and width, of all logs and of each class."""
+def main(count: int = 100, first: int = 0) -> None:
+    """Print coverage and width, of all logs from number `first` on and of each class."""
     rows = []
     folder = Path(tempfile.mkdtemp())
-    for number in range(count):
+    for number in range(first, first + count):
         rig, length, law, rate = rig_of(number)
         motion = rig.run(320.0)
         if not np.isfinite(motion[3]).all() or np.abs(motion[3]).max() > 200.0:
@@ -107,4 +107,4 @@ def main(count: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100)
+    main(*(int(one) for one in sys.argv[1:]))

@@ -45,12 +45,35 @@ MOST_ELEMENTS = 10_000
 """Elements of a whole string: some metres each; beyond, matrices outgrow the memory."""
 
 
-# Thousands of draws of a rock share a string, which nothing changes once it is assembled.
-_assembled = lru_cache(maxsize=4)(assemble)
+_assembled = lru_cache(maxsize=4)(assemble)  # equal strings are one, which others remember
+
+
+class _OfTheString:
+    """Tables of a design; equal to others where all that the string comes from is shared.
+
+    Thousands of draws of a rock share a string, which is read, checked and assembled once.
+    """
+
+    def __init__(self, tables: DesignTables) -> None:
+        self.tables = tables
+        self.shared = (tables.drillstring, tables.top_drive, tables.bha, tables.well)
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(id, self.shared)))
+
+    def __eq__(self, other: object) -> bool:
+        assert isinstance(other, _OfTheString)
+        return all(a is b for a, b in zip(self.shared, other.shared, strict=True))
 
 
 def drillstring(tables: DesignTables) -> Drillstring:
     """Assemble the string of a design."""
+    return _drillstring(_OfTheString(tables))
+
+
+@lru_cache(maxsize=16)
+def _drillstring(of: _OfTheString) -> Drillstring:
+    tables = of.tables
     refuse_impossible_string(tables)
     made = parts_of(tables)
     count = sum(one.elements for one in made.sections)
@@ -164,7 +187,6 @@ def clearances(tables: DesignTables) -> Iterator[tuple[int, SectionTable, float,
         top = bottom
 
 
-@lru_cache(maxsize=256)  # each draw of a rock reads and checks its string anew
 def section(table: SectionTable) -> Section:
     """The physical section that a table describes; of one element where it does not say."""
     damping = table.stiffness_damping or 0.0
@@ -247,6 +269,12 @@ def refuse_impossible_string(tables: DesignTables) -> None:
     A node without inertia (its equation of motion would be singular), a section whose dimensions
     give a stiffness or inertia beyond the ranges of their keys, or more elements than fit.
     """
+    _refuse_impossible_string(_OfTheString(tables))
+
+
+@lru_cache(maxsize=16)
+def _refuse_impossible_string(of: _OfTheString) -> None:
+    tables = of.tables
     for table in pieces(tables):
         made = section(table)
         # That of a lumped spring is zero; its ends were checked with their keys.
