@@ -72,10 +72,18 @@ def page() -> str:
     return "\n".join([HEAD, _units(), *(_section(name, table) for table, name in tables().items())])
 
 
+UNITS = (
+    "Capitals count as small letters where that has no other meaning (`RPM`, `KN`); between force",
+    "and arm of a torque `-`, `.` or a space are as good as `*`. Numbers may be fractions",
+    "(`4 1/2`, `5½`) and have a decimal comma (`171,45 mm`) or marks between thousands",
+    "(`9,842.5 ft`, `4 500 m`); `13,360 ft`, which may be either, is refused.",
+)
+
+
 def _units() -> str:
     """Every spelling of a unit, by what is measured."""
     kinds = {kind.si: kind for kind in vars(units).values() if isinstance(kind, units.Kind)}
-    lines = ["## Units", "", "| quantity | read as |", "|---|---|"]
+    lines = ["## Units", "", *UNITS, "", "| quantity | read as |", "|---|---|"]
     for kind in kinds.values():
         written = ", ".join(f"`{unit}`" for unit in units.spellings(kind))
         lines.append(f"| {kind.name} | {written} |")

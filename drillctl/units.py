@@ -127,25 +127,34 @@ _KNOWN: dict[str, dict[str, float]] = {
 }  # fmt: skip
 
 # How drillers spell them, by what each is in SI; a thousand pounds are never a mass here.
+_POUNDS, _KIPS = ("lbf", "lb", "lbs"), ("klbf", "klb", "klbs", "kip", "kips", "k lbf", "k lbs")
+_SIGNS = re.compile(r"[-.\u00b7 ]+")  # between force and arm
 _SPELLED: dict[str, dict[str, str]] = {
-    "N": {"klb": "klbf", "klbs": "klbf", "kip": "klbf", "t": "tf", "tonf": "tf", "tonnef": "tf"},
-    "N*m": {
-        **dict.fromkeys(("lbf-ft", "ft-lbf", "ft-lb", "ft-lbs", "ft*lbf", "lbf.ft"), "lbf*ft"),
-        **dict.fromkeys(
-            ("klbf-ft", "kft-lbf", "kft-lb", "kft-lbs", "kft*lbf", "klbf.ft", "klb-ft"), "klbf*ft"
-        ),
-        "kNm": "kN*m", "kN-m": "kN*m", "kN.m": "kN*m", "kN m": "kN*m",
-        "Nm": "N*m", "N-m": "N*m", "N.m": "N*m", "N m": "N*m",
+    "rad/s": {"r/min": "rev/min", "revs/min": "rev/min", "rad/sec": "rad/s"},
+    "N": {
+        **dict.fromkeys(_KIPS, "klbf"),
+        **dict.fromkeys(("t", "te", "tonf", "tonnef", "tonne", "tonnes"), "tf"),
+    },
+    "N*m": {  # with `*` for the other signs between force and arm
+        **{one: "lbf*ft" for lb in _POUNDS for one in (f"{lb}*ft", f"ft*{lb}", f"ft{lb}")},
+        **{f"{lb}*ft": "klbf*ft" for lb in _KIPS},
+        **{f"{ft}*{lb}": "klbf*ft" for ft in ("kft", "k*ft") for lb in _POUNDS},
+        "Nm": "N*m", "kNm": "kN*m", "daNm": "daN*m",
     },
     "m": {
         **dict.fromkeys(('"', "\u2033", "\u201d", "''", "inch", "inches", "in."), "in"),
-        **dict.fromkeys(("IN", "In", "INCH"), "in"),
-        **dict.fromkeys(("'", "\u2032", "\u2019", "feet", "FT", "ft."), "ft"),
+        **dict.fromkeys(("'", "\u2032", "\u2019", "feet", "ft."), "ft"),
     },
-    "kg/m^3": {"ppg": "lb/gal", "lbm/gal": "lb/gal", "SG": "g/cm^3", "sg": "g/cm^3"},
-    "kg*m^2": dict.fromkeys(("lbm*ft^2", "lb-ft^2", "lb*ft2"), "lb*ft^2"),
+    "kg/m^3": {
+        "ppg": "lb/gal", "lbm/gal": "lb/gal", "sg": "g/cm^3", "s.g.": "g/cm^3", "pcf": "lb/ft^3",
+    },
+    "kg*m^2": {
+        **dict.fromkeys(("lbm*ft^2", "lb-ft^2", "lb*ft2", "lb-ft2"), "lb*ft^2"),
+        **dict.fromkeys(("kgm2", "kgm^2", "kg-m2", "kg-m^2"), "kg*m^2"),
+    },
     "kg/m": dict.fromkeys(("#", "#/ft", "ppf", "lbs/ft", "lbm/ft", "lbf/ft"), "lb/ft"),
-    "Pa*s": {"cp": "cP", "mPa.s": "mPa*s"},
+    "Pa*s": {"cps": "cP", "mPa.s": "mPa*s", "mPas": "mPa*s"},
+    "m/s": {"fph": "ft/h"},
 }  # fmt: skip
 
 _AMBIGUOUS = {
@@ -155,6 +164,7 @@ _AMBIGUOUS = {
     **dict.fromkeys(
         ("ton", "tons"), 'metric ton-force ("tf", 9.807 kN) or short ton-force, 2 klbf (8.896 kN)'
     ),
+    "mph": 'metres per hour ("m/h") or miles per hour ("mi/h")',
 }
 """Units of two meanings."""
 
@@ -167,6 +177,8 @@ _VULGAR = re.compile("[\u00bc-\u00be\u2150-\u215e]")  # fractions in one charact
 _FEET_AND_INCHES = re.compile(
     r"""^\s*(\d+)\s*(?:ft|'|\u2032|\u2019)[\s-]*(\d[\d\s./-]*?)\s*(?:in|"|\u2033|\u201d|'')\s*$"""
 )
+_SPACED = re.compile(r"^\s*[-+]?\d{1,3}(?:[ \u00a0\u202f]\d{3})+(?![\d/])")
+_COMMAS = re.compile(r"^\s*[-+]?\d{1,3}((?:,\d{3})+)(\.\d+)?(?![\d,])")
 _POWER = re.compile(r"\b((?:[kcmd]?m)|in|ft|s)([234])\b")
 
 
@@ -188,13 +200,24 @@ def registry() -> Any:
 @functools.lru_cache(maxsize=512)
 def factor(unit: str, kind: Kind) -> float:
     """SI value of one `unit`, refused (`InputError`) if it does not measure `kind`."""
-    if kind is SPEED and unit not in SPEED.examples:
+    if unit.lower() in _AMBIGUOUS:
+        raise InputError(f"{unit!r} has two meanings: {_AMBIGUOUS[unit.lower()]}")
+    known, spelled = _KNOWN[kind.si], _SPELLED.get(kind.si, {})
+    unit = _SIGNS.sub("*", unit) if kind is TORQUE else unit
+    name = spelled.get(unit, unit)
+    if name in known:
+        return known[name]
+    alike = [one for one in (*known, *spelled) if one != unit and one.lower() == unit.lower()]
+    if alike and (kind is SPEED or unit == unit.upper()):  # in capitals
+        return factor(alike[0], kind)
+    if kind is SPEED:
         raise InputError(f"a speed is given in {_join(SPEED.examples)}, not in {unit!r}")
-    if unit in _AMBIGUOUS:
-        raise InputError(f"{unit!r} has two meanings: {_AMBIGUOUS[unit]}")
-    unit = _SPELLED.get(kind.si, {}).get(unit, unit)
-    known = _KNOWN[kind.si].get(unit)
-    return _by_pint(unit, kind) if known is None else known
+    try:
+        return _by_pint(name, kind)
+    except InputError:
+        if alike:
+            return factor(alike[0], kind)
+        raise
 
 
 def _by_pint(unit: str, kind: Kind) -> float:
@@ -279,7 +302,7 @@ def parse(value: object, kind: Kind) -> float:
     if feet is not None:
         inches = parse(f"{feet[2]} in", kind)
         return float(feet[1]) * factor("ft", kind) + inches
-    match = _TEXT.match(_parted(value))
+    match = _TEXT.match(_parted(pointed(value)))
     if match is None:
         raise _no_quantity(value, kind)
     number = _magnitude(match, value)
@@ -293,8 +316,25 @@ def parse(value: object, kind: Kind) -> float:
 
 def bare(text: str) -> bool:
     """Whether a text is a number without a unit."""
-    match = _TEXT.match(_parted(text))
+    match = _TEXT.match(_parted(pointed(text)))
     return match is not None and not match["unit"]
+
+
+def pointed(text: str) -> str:
+    """A number without marks between its thousands, and a comma for a point as a point."""
+    text = _SPACED.sub(lambda one: re.sub(r"(?<=\d)\s", "", one[0]), text)
+    if re.match(r"\s*[-+]?\d+,(\d{1,2}|\d{4,})(?![\d,])", text):
+        return text.replace(",", ".", 1)
+    grouped = _COMMAS.match(text)
+    if grouped is None:
+        return text
+    if grouped[1].count(",") == 1 and grouped[2] is None:
+        number = grouped[0].strip()
+        raise InputError(
+            f"{text.strip()!r} may be {number.replace(',', '')} or {number.replace(',', '.')}; "
+            "write one of them"
+        )
+    return grouped[0].replace(",", "") + text[grouped.end() :]
 
 
 def _parted(text: str) -> str:

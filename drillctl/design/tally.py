@@ -42,6 +42,9 @@ SAME_BORE = 1e-3  # by how much (m) a bore may differ from that of the catalogue
 
 
 _SUM = re.compile(r"\b(sub-?)?(total|sum)s?\b")
+_REMARK = re.compile(
+    r":|\b(bha|assembly|string|drillstring|remarks?|notes?|date|page|end of|\w+ed by)\b"
+)
 _PIPE = re.compile(r"\bd\.?p\b|\bpipe|hw|heavy")
 
 
@@ -126,6 +129,8 @@ def _read(place: str, text: str, rows: list[tuple[int, list[str]]], begins: str)
             notes.append(
                 f"line {line.number}: {line.name or 'a line without name'!r} left out, a sum"
             )
+        elif line.is_remark:
+            notes.append(f"line {line.number}: {line.name!r} left out, a title or remark")
         elif line.cells:
             sections.append(line.section())
             notes += [f"line {line.number}, {line.name}: {note}" for note in line.notes]
@@ -164,6 +169,11 @@ class _Line:
     def adds_up(self) -> bool:
         """Whether it is called the sum of others."""
         return "od" not in self.cells and bool(_SUM.search(self.name.lower()))
+
+    @property
+    def is_remark(self) -> bool:
+        """Whether it is words between or below the components."""
+        return list(self.cells) == ["name"] and bool(_REMARK.search(self.name.lower()))
 
     def is_sum_of(self, sections: list[dict[str, Any]]) -> bool:
         """Whether it has no name and no more than the length of those before."""
@@ -204,23 +214,14 @@ class _Line:
         """Text with a unit, its own or that of its column."""
         cell, kind = self.cells[field], FIELDS[field].kind
         assert kind is not None
-        text = re.sub(r"^(\d{1,3})((?:[ \u00a0\u202f]\d{3})+)\b(?!/)", _closed, cell.text)
-        if re.search(r"^\D*\d+,(\d{1,2}|\d{4,})(?!\d|,)", text):
-            text = text.replace(",", ".")  # no group of thousands
-        elif re.search(r"\d,\d", text):
-            groups = re.fullmatch(r"(\d{1,3}(?:,\d{3})+)(\.\d+)?(\D.*)?", text)
-            if groups is None or (groups[2] is None and text.count(",") == 1):
-                plain, point = text.replace(",", ""), text.replace(",", ".")
-                raise InputError(
-                    f"{text!r} may be {plain} or {point}; write one of them", cell.where
-                )
-            text = text.replace(",", "")
         unit = self.columns[field].unit
+        try:
+            text = units.pointed(cell.text)
+        except InputError as error:
+            raise InputError(error.problem, cell.where) from None
         if units.bare(text) and unit:
             text = f"{text} {unit}"
         problem = problem_of(text, kind)
-        if problem and not problem_of(text.lower(), kind):  # in capitals
-            return text.lower()
         if problem:
             hint = "" if unit or not units.bare(text) else "; the column gives no unit either"
             raise InputError(problem + hint, cell.where)
@@ -244,7 +245,7 @@ class _Line:
                 )
             return {**keys, "length": self._quantity("length")}
         if total is None:
-            raise InputError("the component has no length", self.where)
+            raise InputError("the component has no length", self._at("length", "total length"))
         if count == 1:
             return {"length": self._quantity("total length")}
         return {**keys, "length": f"{total / count!r} m"}
@@ -290,7 +291,7 @@ class _Line:
         if _is_bit(self.name) and sizes:
             self.notes.append("no diameters: the size in its name, taken as solid")
             return {"outer_diameter": f"{sizes[0]:g} in", "inner_diameter": "0 mm"}
-        raise InputError("the component has no outer diameter", self.where)
+        raise InputError("the component has no outer diameter", self._at("od"))
 
     def _bore(self) -> tuple[float, str]:
         """An inner diameter (m) that no cell gives, and where it is from."""
@@ -311,7 +312,7 @@ class _Line:
         typical = typical_bore(self.name, outer)
         if typical is None:
             raise InputError(
-                'the component has no inner diameter ("0 mm" if it is solid)', self.where
+                'the component has no inner diameter ("0 mm" if it is solid)', self._at("id")
             )
         return typical, f"{typical * 1e3:.1f} mm, typical of its kind and size"
 
@@ -376,16 +377,15 @@ class _Line:
             SectionTable.model_validate(section)
         except ValidationError as error:
             problem = error.errors()[0]
-            key = str(problem["loc"][-1]) if problem["loc"] else ""
-            field = next((f for f, about in FIELDS.items() if about.key == key), "")
-            where = self.cells[field].where if field in self.cells else self.where
             text = str(problem.get("ctx", {}).get("error", problem["msg"]))
-            raise InputError(text, where) from None
+            key = str(problem["loc"][-1]) if problem["loc"] else text.partition(" ")[0]
+            field = next((f for f, about in FIELDS.items() if about.key == key), "")
+            raise InputError(text, self._at(field)) from None
 
-
-def _closed(match: re.Match[str]) -> str:
-    """A number without the spaces between its thousands."""
-    return re.sub(r"\s", "", match[0])
+    def _at(self, *fields: str) -> str:
+        """The line, and its column of one of some fields if there is one."""
+        heads = [self.columns[one].text for one in fields if one in self.columns]
+        return f"{self.where}, column {heads[0]!r}" if heads else self.where
 
 
 def _span(section: Mapping[str, Any]) -> float:

@@ -26,7 +26,10 @@ class Field(NamedTuple):
 
 _JOINT = r"(?=.*\b(tj|tool ?joints?|joint|connection|conn)\b).*"
 _OUTER, _INNER = r"\b(od|o d|outer|outside|external)\b", r"\b(id|i d|inner|inside|internal|bore)\b"
-_UNUSED = r"\b(cum\w*|accum\w*|running|depth|from|to|max|blade|gauge|neck|drift|remarks?)\b"
+_UNUSED = (
+    r"\b(cum\w*|accum\w*|running|depth|serial|sn|asset|part|fn|fish\w*|from|to|max|blade|gauge|"
+    r"neck|drift|remarks?)\b"
+)
 _EACH = r"length (per|of (a|each)) |length each|each length|avg length"
 _COUNT = r"\b(count|qty|quantity|number|no|nos|nr|joints|jts|pieces|pcs)\b|^#$"
 _PIPE_JOINT = r"\b(average|avg|mean|range) (joint|jt)s? (length|len)\b"
@@ -111,15 +114,17 @@ def _written(value: object) -> str:
 
 def rows_of(text: str) -> list[list[str]]:
     """Rows of cells; the delimiter is what most lines have, a comma where they have no other."""
-    lines = text.splitlines()
+    lines = text.splitlines(keepends=True)
     some = [line for line in lines[:40] if line.strip()]
     often = (one for one in ";\t|" if 2 * sum(line.count(one) > 1 for line in some) > len(some))
     most = max(",;\t|", key=lambda one: max(line.count(one) for line in lines[:10]))
     delimiter = next(often, most)
-    rows = [
-        [cell.strip() for cell in row] if row and not row[0].startswith("# ") else []
-        for row in csv.reader(lines, delimiter=delimiter)
-    ]
+    rows: list[list[str]] = []
+    reader = csv.reader(lines, delimiter=delimiter)
+    for row in reader:
+        rows += [[]] * (reader.line_num - len(rows) - 1)  # lines before the last of a row
+        cells = [" ".join(cell.split()) for cell in row]
+        rows.append(cells if cells and not cells[0].startswith("# ") else [])
     rows = [[] if all(re.fullmatch(r":?-*:?", cell) for cell in row) else row for row in rows]
     cells = [cell for row in rows for cell in row]
     if not any(re.search(r"\d,\d{3}\.\d", cell) for cell in cells) and (
@@ -219,7 +224,10 @@ def columns_of(heads: list[str], rows: list[list[str]], where: str) -> list[Head
             names = ", ".join(repr(c.text) for c in columns if c.text)
             raise InputError(f"no column is the {field} of a component; there are {names}", where)
     found: list[Head] = []
-    for column in columns:
+    for place, column in enumerate(columns):
+        twice = [one.field for one in columns].count(column.field) > 1
+        if twice and rows and not any(row[place] for row in rows if place < len(row)):
+            column = column._replace(field="")
         first = next((one for one in found if one.field and one.field == column.field), None)
         if first is not None:
             if column.field != "name" and (first.unit == column.unit or not column.unit):
@@ -246,7 +254,6 @@ def _head(text: str) -> Head:
         if re.search(about.heads, plain):
             if field == "weight" and (not unit) and plain in ("ppf", "lb ft"):
                 unit = "lb/ft"
-            unit = _small(unit, about.kind)
             used = field if field != "not used" and _fits(unit, about.kind) else ""
             return Head(text.strip(), {"length of a piece": "length"}.get(used, used), unit)
     return Head(text.strip(), "", unit)
@@ -267,11 +274,6 @@ def _fits(unit: str, kind: units.Kind | None) -> bool:
     return not unit or kind is None or not problem_of(f"1 {unit}", kind)
 
 
-def _small(unit: str, kind: units.Kind | None) -> str:
-    """A unit, in small letters where it is one in these alone."""
-    return unit if _fits(unit, kind) or not _fits(unit.lower(), kind) else unit.lower()
-
-
 def problem_of(text: str, kind: units.Kind) -> str:
     """What is wrong with a quantity; empty for nothing."""
     try:
@@ -290,7 +292,7 @@ def with_units_row(
     pairs = list(zip(columns, row, strict=False))
     measured = [(c, cell) for c, cell in pairs if c.field and FIELDS[c.field].kind is not None]
     given = [(c, cell) for c, cell in measured if cell.lower() not in NOTHING]
-    units_of = {c: _small(cell, FIELDS[c.field].kind) for c, cell in given}
-    if not given or not all(_fits(unit, FIELDS[c.field].kind) for c, unit in units_of.items()):
+    units_of = dict(given)
+    if not given or not all(_fits(unit, FIELDS[c.field].kind) for c, unit in given):
         return columns, rows
     return [c._replace(unit=units_of.get(c, c.unit)) for c in columns], rows[1:]

@@ -156,7 +156,12 @@ def test_ways_of_writing_the_same(tmp_path, lines, same):
     ("lines", "message"),
     [
         ("name,length,OD,ID\np,9 m,5,4 in\n", r"line 2, column 'OD': 5 has no unit.*5 in"),
-        ("name,length [m],OD [in],ID [in]\np,9,5,5.5\n", r"line 2.*must be less than"),
+        (
+            "name,length [m],OD [in],ID [in]\np,9,5,5.5\n",
+            r"line 2, column 'ID \[in\]': inner.*must be less than",
+        ),
+        ('name,"length\n[m]",OD [in],ID [in]\np,9,5,4\nJar,,5,3\n', "line 4, column"),
+        ("name,length [m],OD [in],ID [in]\np,9,5,4\nJar,,5,3\n", r"line 3, column 'length \[m\]'"),
         ("name,length [m],OD [in],ID [in]\np,x,5,4\n", r"line 2, column 'length \[m\]'"),
         ('name,length [ft],OD [in],ID [in]\np,"13,360",5,4\n', "13360 or 13.360"),
         ("name,length [m],OD [in],ID [in],count\np,9,5,4,some\n", "not a number of pieces"),
@@ -260,11 +265,11 @@ PIPE = {"name": "Drill pipe", "pipe": "5 in 19.5 lb/ft", "tool_joints": True}
         (  # capitals
             "NO.,ITEM,QTY,LENGTH (M),OD (IN),ID (IN)\n1,Drill pipe,300,9.45,5,4.276\n"
             "2,BIT,1,0.3 M,8.5 INCH,\n",
-            {**PIPE, "repeat": 300, "length": "9.45 m"},
+            {**PIPE, "repeat": 300, "length": "9.45 M"},
         ),
         (  # capitals under the heads
             "ITEM,LENGTH,OD,ID\n,M,MM,MM\nDrill pipe,950,127,108.6\nBIT,0.3,215.9,\n",
-            {**PIPE, "length": "950 m"},
+            {**PIPE, "length": "950 M"},
         ),
         (  # lines of a table in a text
             "| Name | OD (in) | ID (in) | Length (m) |\n|---|:--|---|---|\n"

@@ -80,6 +80,24 @@ def bits(value):
         ("20 cP", units.VISCOSITY, 0.02),
         ("16.6 lb/ft", units.LINEAR_MASS, 16.6 * 0.45359237 / 0.3048),
         ("16.6 ppf", units.LINEAR_MASS, 16.6 * 0.45359237 / 0.3048),
+        ("100 RPM", units.SPEED, 100 * RPM),
+        ("140 KN", units.FORCE, 140e3),
+        ("800 KW", units.POWER, 800e3),
+        ("30K lbs", units.FORCE, 30e3 * 4.4482216152605),
+        ("13 tonnes", units.FORCE, 13e3 * 9.80665),
+        ("12 kip-ft", units.TORQUE, 12e3 * 4.4482216152605 * 0.3048),
+        ("12 k ft-lb", units.TORQUE, 12e3 * 4.4482216152605 * 0.3048),
+        ("900 ft.lbs", units.TORQUE, 900 * 4.4482216152605 * 0.3048),
+        ("12 daN.m", units.TORQUE, 120.0),
+        ("1200 kgf-m", units.TORQUE, 1200 * 9.80665),
+        ("5½ in", units.DIAMETER, 5.5 * 0.0254),
+        ("12¼”", units.DIAMETER, 12.25 * 0.0254),
+        ("171,45 mm", units.DIAMETER, 0.17145),
+        ("9,842.5 ft", units.LENGTH, 9842.5 * 0.3048),
+        ("4 500 m", units.LENGTH, 4500.0),
+        ("75 pcf", units.DENSITY, 75 * 0.45359237 / 0.3048**3),
+        ("20 fph", units.VELOCITY, 20 * 0.3048 / 3600),
+        ("23 kgm2", units.INERTIA, 23.0),
     ],
 )
 def test_text_is_read_in_its_unit(text, kind, si):
@@ -110,12 +128,26 @@ def test_a_drillers_fraction_is_not_a_product():
     assert units.parse("4 1/2 in", units.DIAMETER) == 0.1143
 
 
-@pytest.mark.parametrize("text", ["1.667 Hz", "100 1/min", "1.667 1/s", "100 RPM", "10 m/s"])
+@pytest.mark.parametrize("text", ["1.667 Hz", "100 1/min", "1.667 1/s", "100 rps", "10 m/s"])
 def test_a_speed_comes_in_four_units_only(text):
     with pytest.raises(InputError) as caught:
         units.parse(text, units.SPEED)
     assert repr(text) in str(caught.value)
     assert "rpm, rev/min, rad/s or deg/s" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "message"),
+    [
+        ("13,360 ft", units.LENGTH, "may be 13360 or 13.360"),
+        ("20 mph", units.VELOCITY, "two meanings"),
+        ("13 Ton", units.FORCE, "two meanings"),
+        ("1,23,4 m", units.LENGTH, "not a known unit"),
+    ],
+)
+def test_what_may_be_read_in_two_ways_is_refused(text, kind, message):
+    with pytest.raises(InputError, match=message):
+        units.parse(text, kind)
 
 
 def test_a_mass_is_no_force():
