@@ -535,15 +535,17 @@ def refuse_weak_drive(
     if isinstance(tables.controller, ConstantTorqueTable):  # holds no speed
         return
     needed = torque + float(string.ground_damping.sum()) * speed + of_wall
+    curve = tables.top_drive.limits.curve
     for key, limit in (
         ("torque_limit", drive.torque_limit),
         ("power_limit", None if drive.power_limit is None else drive.power_limit / speed),
+        ("curve", np.interp(speed, *np.array(curve).T) if curve else None),
     ):
         if limit is not None and limit < needed:
             raise InputError(
                 f"gives {limit / 1e3:.4g} kN*m at the set speed, less than the "
                 f"{needed / 1e3:.4g} kN*m that rock and drag take there",
                 f"controller.drive.{key}"
-                if getattr(drive, key) == getattr(tables.controller.drive, key)
+                if getattr(drive, key) == getattr(tables.controller.drive, key, None)
                 else "top_drive",
             )

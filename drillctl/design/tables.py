@@ -295,7 +295,8 @@ class TopDriveTable(Table):
     limits are of one motor, or at the pipe. From motor to pipe torque counts `motors gear_ratio
     efficiency` times, speed one over `gear_ratio` times. `torque_speed`: points [speed, torque] of
     constant torque, then constant power, up to the maximum speed, beyond which the torque falls to
-    zero over a tenth of it; of other points the largest such curve under them.
+    zero over a tenth of it. Where no constant power goes through the points within 3 %, the limit
+    is straight between them.
     `intermittent_torque` limits the torque as well; `continuous_torque` is measured against.
     Narrower limits of `[controller.drive]` hold.
     """
@@ -326,7 +327,7 @@ class TopDriveTable(Table):
         """What it can give at the pipe."""
         ratio = (self.gear_ratio or 1.0) if self.limits_at == "motor" else 1.0
         gain = ratio * self.motors * self.efficiency if self.limits_at == "motor" else 1.0
-        curve = curve_limits([(w / ratio, gain * torque) for w, torque in self.torque_speed])
+        curve = curve_limits(tuple((w / ratio, gain * torque) for w, torque in self.torque_speed))
         intermittent, continuous = (
             math.inf if torque is None else gain * torque
             for torque in (self.intermittent_torque, self.continuous_torque)

@@ -19,6 +19,7 @@ from drillctl.rig.drillstring.frequencies import followed
 from drillctl.rig.drillstring.mesh import off_the_line
 from drillctl.rig.top_drive import TopDriveLaw
 from drillctl.rig.top_drive.law import OFF_THE_CURVE
+from drillctl.rig.top_drive.real_drive import KNOTS
 from drillctl.rig.weight_on_bit import PATHS
 from drillctl.rig.well.survey import path_of, sharp_bends
 
@@ -142,15 +143,15 @@ def _weak_drive(tables: DesignTables, static: float) -> DesignWarning | None:
 
 
 def _drive_curve(tables: DesignTables) -> DesignWarning | None:
-    """Points of a motor that no constant torque and constant power go through."""
-    share, speed = tables.top_drive.limits.lost
+    """More points of a motor than count."""
+    share, speed = tables.top_drive.limits.off
     if share <= OFF_THE_CURVE:
         return None
     return DesignWarning(
-        f"the torque-speed curve counts as constant torque, then constant power, under its points: "
-        f"{share:.0%} less than that at {units.full(speed, 'rad/s')} of the pipe",
+        f"the torque-speed curve counts as straight between {KNOTS} of its points, which is off by "
+        f"{share:.0%} of its torque at {units.full(speed, 'rad/s')} of the pipe",
         "top_drive.torque_speed",
-        "points of one constant torque and one constant power",
+        f"at most {KNOTS} points",
     )
 
 

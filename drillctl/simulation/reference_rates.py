@@ -114,7 +114,7 @@ over its pivots, accelerations per torque at the top with the bit held and free 
 DRIVE, ROCK, ROCK_BEFORE, WEIGHT, PRESENT, PATH, SPEED_PROGRAM, WEIGHT_PROGRAM = range(8)
 """Rows of `laws`: the numbers of each law, of the weight law at the nominal weight of the moment,
 of the path of the weight and of the programs of speed and weight."""
-MOST_NUMBERS = 40  # columns of `laws`
+MOST_NUMBERS = 44  # columns of `laws`
 DELAY, PERIOD, SENSOR, HOIST, RATE, WINDOW = range(6)  # of `PATH` (s; N/s)
 
 BEGIN, LENGTH, FIRST = 0, 1, 2

@@ -16,6 +16,7 @@ from drillctl.arrays import Array, own_errstate
 from drillctl.design import Design
 from drillctl.progress import SILENT, Progress
 from drillctl.rig.top_drive import RealDrive
+from drillctl.rig.top_drive.real_drive import curve_torque
 from drillctl.rig.well.wall import edges_of
 from drillctl.simulation import measures as m
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, stuck_between
@@ -244,7 +245,10 @@ def _strain(design: Design, time: Array, signals: dict[str, Array]) -> dict[str,
         return dict.fromkeys(names, 0.0) | {"peak_drive_power": None}
     torque = signals["top_torque"]
     power = torque * signals["top_speed"]
-    there = (torque >= m.AT_LIMIT * drive.most, power >= m.AT_LIMIT * drive.power,
+    most = drive.most
+    if math.isfinite(drive.curve):
+        most = np.minimum(most, curve_torque(drive, signals["top_speed"]))
+    there = (torque >= m.AT_LIMIT * most, power >= m.AT_LIMIT * drive.power,
              torque > drive.continuous)  # fmt: skip
     times = (float(np.trapezoid(one.astype(float), time)) for one in there)
     return dict(zip(names, times, strict=True)) | {"peak_drive_power": float(power.max())}

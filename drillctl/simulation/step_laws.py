@@ -39,10 +39,14 @@ def drive_step(drive: Any, step: float, string: Any) -> Any:
     """The kernel's form of a drive law on a string made ready; an ideal one as it is."""
     if not isinstance(drive, RealDrive):
         return drive
+    from drillctl.simulation.kernels.drive_step import CURVED, OF_A_CURVE
+
     if isinstance(drive, SampledDrive):
         made = _sampled_step(drive, step)
     else:
         made = _real_step(drive, step, string)
+    if np.isfinite(drive.curve).any():
+        made = CURVED[type(made)](*made, *(getattr(drive, key) for key in OF_A_CURVE))
     shape = drive.kp.shape
     return type(made)(*(np.ascontiguousarray(np.broadcast_to(x, shape), dtype=float) for x in made))
 

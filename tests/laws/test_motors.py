@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import drillctl
@@ -11,7 +12,7 @@ from drillctl import units
 from drillctl.errors import InputError
 from drillctl.rig.top_drive import PI, RealDrive
 from drillctl.rig.top_drive.law import curve_limits
-from drillctl.rig.top_drive.real_drive import limits
+from drillctl.rig.top_drive.real_drive import curve_torque, limits
 
 RPM = units.RPM
 GEAR = {
@@ -56,17 +57,55 @@ def test_the_curve_is_constant_torque_then_power_then_nothing():
         assert limits(drive, rpm * RPM)[1] == pytest.approx(torque, rel=1e-9)
     assert limits(drive, 157.5 * RPM)[1] == pytest.approx(0.5 * 5.4e3 * 150 / 157.5, rel=1e-6)
     assert limits(drive, 166 * RPM)[1] == 0.0
-    assert curve_limits([(5.0, 3.0), (10.0, 3.0), (10.5, 0.0)]).speed == 10.0
+    assert curve_limits(((5.0, 3.0), (10.0, 3.0), (10.5, 0.0))).speed == 10.0
 
 
-def test_other_points_count_as_the_largest_curve_under_them():
-    design = of_limits(limits_at="pipe", torque_speed=KINKED)
-    drive = design.top_drive
-    assert (drive.most, drive.power) == (9e3, pytest.approx(4e3 * 200 * RPM))
-    (said,) = (one for one in design.warnings if one.key == "top_drive.torque_speed")
-    assert "33% less than that at 150 rpm" in said.said("si")
+def test_other_points_limit_the_torque_as_they_are_given():
+    drive = of_limits(limits_at="pipe", torque_speed=KINKED).top_drive
+    assert (drive.most, drive.power, 1.0 / drive.slowness) == (9e3, math.inf, 200 * RPM)
+    given = {0: 9e3, 60: 9e3, 90: 9e3, 120: 8.5e3, 150: 8e3, 175: 6e3, 200: 4e3, 210: 2e3, 220: 0}
+    for rpm, torque in given.items():
+        for sign in (1, -1):
+            assert limits(drive, sign * rpm * RPM)[1] == pytest.approx(torque, abs=1e-8)
+    assert curve_torque(drive, np.array([120.0, 175.0]) * RPM) == pytest.approx([8.5e3, 6e3])
     rounded = of_limits(limits_at="pipe", torque_speed=[*CURVE[:2], ["150 rpm", "5.5 kN*m"]])
-    assert not [one for one in rounded.warnings if one.key == "top_drive.torque_speed"]
+    assert rounded.top_drive.curve == math.inf
+    closed = curve_limits(((0.0, 9.0), (10.0, 5.0), (20.0, 0.0)))
+    assert (closed.speed, closed.curve[-1]) == (20.0, (20.0, 0.0))
+
+
+def test_of_many_points_those_count_that_give_its_shape():
+    speeds = np.linspace(0.0, 20.0, 60)
+    torques = 9e3 - 20.0 * speeds**2
+    limited = curve_limits(tuple(zip(speeds.tolist(), torques.tolist(), strict=True)))
+    assert len(limited.curve) == 12
+    assert limited.off[0] < 5e-3
+    assert limited.curve[0] == (0.0, 9e3)
+    stairs = [[f"{5 * k} rpm", f"{45 - 3 * (k // 2)} kN*m"] for k in range(30)]
+    (said,) = (one for one in of_limits(limits_at="pipe", torque_speed=stairs).warnings
+               if one.key == "top_drive.torque_speed")  # fmt: skip
+    assert "straight between 12 of its points, which is off by 3%" in said.said("si")
+
+
+@pytest.mark.parametrize(
+    ("drive", "within"),
+    [
+        ({}, 1e-4),
+        # 2 % with limits at the speed that an unlimited torque leads to
+        ({"controller.law": "z-torque"}, 2e-3),
+        pytest.param({"controller.drive.sampling_period": "10 ms"}, 1e-4, marks=pytest.mark.slow),
+    ],
+    ids=["continuous", "fed back", "sampled"],
+)
+def test_both_engines_agree_along_the_points_of_a_curve(drive, within):
+    design = of_limits(limits_at="pipe", torque_speed=KINKED).replace(
+        {"simulation.duration": "20 s", **drive}
+    )
+    exact = drillctl.simulate(design, "reference").measures
+    batch = drillctl.simulate(design, "batch").measures
+    assert 2.0 < exact.time_at_torque_limit < 15.0
+    assert batch.time_at_torque_limit == pytest.approx(exact.time_at_torque_limit, abs=0.15)
+    assert batch.j1 == pytest.approx(exact.j1, rel=within)
 
 
 def test_the_narrower_limit_holds():

@@ -56,6 +56,13 @@ EVERYTHING = {
         },
     },
     "scenario.speed": {"start": "80 rpm", "begin": "0 s", "end": "4 s", "lag": "0.3 s"},
+    "top_drive.limits_at": "pipe",
+    "top_drive.torque_speed": [
+        ["10 rpm", "11.9 kN*m"],
+        ["60 rpm", "11 kN*m"],
+        ["100 rpm", "10.2 kN*m"],
+        ["150 rpm", "4 kN*m"],
+    ],
 }
 PLAIN = {"controller.kp": 300.0, "controller.drive": {"sampling_period": f"{PERIOD} s"}}
 

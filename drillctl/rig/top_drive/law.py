@@ -8,16 +8,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Literal, NamedTuple, Protocol
 
+import numpy as np
 from pydantic import model_validator
 
 from drillctl import registry
 from drillctl.errors import InputError
 from drillctl.rig import table as q
 from drillctl.rig.table import Table, law_name
-from drillctl.rig.top_drive.real_drive import RealDrive, SampledDrive
+from drillctl.rig.top_drive.real_drive import (
+    FADE,
+    KNOTS,
+    RealDrive,
+    SampledDrive,
+    curve_numbers,
+)
 
 SHORTEST_LAG = 0.01
 """Time constant (s) of a motor whose torque rate is limited, where the design gives a shorter
@@ -98,19 +105,19 @@ class DriveTable(Table):
 
         Its motor follows with the same lag: small motions of a run are those of the linear loop.
         """
-        return self.model_copy(
-            update={
-                "lag": self.motor_lag,
-                "torque_limit": None,
-                "minimum_torque": None,
-                "power_limit": None,
-                "maximum_speed": None,
-                "continuous_torque": None,
-                "torque_rate_limit": None,
-                "anti_windup": "back-calculation",
-                "tracking_time": None,
-            }
-        )
+        return DriveTable.model_construct(
+            lag=self.motor_lag, encoder_lag=self.encoder_lag, torque_lag=self.torque_lag,
+            sampling_period=self.sampling_period, one_sample_delay=self.one_sample_delay,
+        )  # fmt: skip
+
+
+Points = tuple[tuple[float, float], ...]  # of speed (rad/s) and torque (N m)
+
+
+class CurvedDriveTable(DriveTable):
+    """A drive with the curve of its motors, which is a key of the top drive; not of a file."""
+
+    curve: Points = ()
 
 
 class DriveLimits(NamedTuple):
@@ -120,8 +127,8 @@ class DriveLimits(NamedTuple):
     power: float = math.inf  # at higher speed (W)
     speed: float = math.inf  # (rad/s)
     continuous: float = math.inf  # torque that it bears for any time (N m)
-    # largest share of the torque of a given point that these limits leave out, and its speed
-    lost: tuple[float, float] = (0.0, 0.0)
+    curve: Points = ()  # in place of a power, where that does not go through what was given
+    off: tuple[float, float] = (0.0, 0.0)  # share by which a point is off it at most, its speed
 
     def within(self, drive: DriveTable) -> DriveTable:
         """The keys of a drive with these limits where they are narrower."""
@@ -130,38 +137,52 @@ class DriveLimits(NamedTuple):
             result = min(math.inf if own is None else own, other)
             return None if math.isinf(result) else result
 
-        return drive.model_copy(
-            update={
-                "torque_limit": least(drive.torque_limit, self.torque),
-                "power_limit": least(drive.power_limit, self.power),
-                "maximum_speed": least(drive.maximum_speed, self.speed),
-                "continuous_torque": least(drive.continuous_torque, self.continuous),
-            }
-        )
+        narrower = {
+            "torque_limit": least(drive.torque_limit, self.torque),
+            "power_limit": least(drive.power_limit, self.power),
+            "maximum_speed": least(drive.maximum_speed, self.speed),
+            "continuous_torque": least(drive.continuous_torque, self.continuous),
+        }
+        if not self.curve:
+            return drive.model_copy(update=narrower)
+        return CurvedDriveTable.model_construct(**dict(drive) | narrower, curve=self.curve)
 
 
 OFF_THE_CURVE = 0.03  # how far a point may lie from constant torque and constant power
 
 
-def curve_limits(points: list[tuple[float, float]]) -> DriveLimits:
-    """Largest constant torque, then constant power, under points of speed (rad/s) and torque (N m).
+@lru_cache(maxsize=16)
+def curve_limits(points: Points) -> DriveLimits:
+    """Constant torque, then constant power, where that goes through the points; else the points.
 
-    Within `OFF_THE_CURVE`: rounded points of such a curve lie on either side of it.
+    Within `OFF_THE_CURVE`, as rounded points of such a curve lie on either side of it.
     """
     key = "torque_speed"
-    while len(points) > 1 and points[-1][1] == 0.0:  # how a curve may be closed at its end
-        points = points[:-1]
     if not points:
         return DriveLimits()
     speeds, torques = zip(*points, strict=True)
     if list(speeds) != sorted(set(speeds)) or list(torques) != sorted(torques, reverse=True):
         raise InputError(f"{key}: speeds must rise and torques must not, from point to point")
-    if torques[-1] <= 0.0 or speeds[-1] == 0.0:
-        raise InputError(f"{key}: needs a speed and a torque above 0 at its end")
-    falling = [w * torque for w, torque in points if torque < torques[0] * (1.0 - OFF_THE_CURVE)]
+    if torques[0] <= 0.0 or speeds[-1] == 0.0:
+        raise InputError(f"{key}: needs a torque above 0 at its begin and a speed at its end")
+    while points[-1][1] == 0.0 and points[-1][0] <= (1.0 + FADE) * points[-2][0]:
+        points = points[:-1]  # how a curve may be closed at its end
+    torque, speed = points[0][1], points[-1][0]
+    falling = [w * one for w, one in points if one < torque * (1.0 - OFF_THE_CURVE)]
     power = min(falling, default=math.inf)
-    lost = max((1.0 - min(torques[0], power / max(w, 1e-9)) / torque, w) for w, torque in points)
-    return DriveLimits(torques[0], power, speeds[-1], lost=lost)
+    lost = max(one - min(torque, power / max(w, 1e-9)) - OFF_THE_CURVE * one for w, one in points)
+    if lost <= 0.0:
+        return DriveLimits(torque, power, speed)
+    kept = points
+    while len(kept) > KNOTS:  # without the point that is the least off the line past it
+        w, one = np.array(kept).T
+        past = one[:-2] + (one[2:] - one[:-2]) * (w[1:-1] - w[:-2]) / (w[2:] - w[:-2])
+        least = int(np.argmin(np.abs(past - one[1:-1]))) + 1
+        kept = kept[:least] + kept[least + 1 :]
+    w, one = np.array(points).T
+    share = np.abs(np.interp(w, *np.array(kept).T) - one) / torque
+    off = float(share.max()), float(w[share.argmax()])
+    return DriveLimits(torque, speed=speed, curve=kept, off=off)
 
 
 class Controller(NamedTuple):
@@ -244,6 +265,8 @@ def _real(controller: Controller, drive: DriveTable) -> RealDrive:
         "slowness": 0.0 if drive.maximum_speed is None else 1.0 / drive.maximum_speed,
         "continuous": math.inf if drive.continuous_torque is None else drive.continuous_torque,
     }
+    if isinstance(drive, CurvedDriveTable):
+        numbers |= curve_numbers(drive.curve)
     if drive.sampling_period == 0.0:
         return RealDrive(**numbers)
     late = float(drive.one_sample_delay)

@@ -28,7 +28,8 @@ class RealDrive(NamedTuple):
               c = T_0 + K_p e + K_i I, \quad
               \dot I = e + \frac{k_t}{K_i} (\mathrm{sat}\,c - c)
 
-    .. math:: \mathrm{sat}\,c = \max(T_{min}, -P/|\omega|) \ldots \min(T_{max}, P/|\omega|), \quad
+    .. math:: \mathrm{sat}\,c = \max(T_{min}, -P/|\omega|) \ldots
+              \min(T_{max}, P/|\omega|, T_c(|\omega|)), \quad
               \dot T = \frac{\mathrm{sat}\,c - T}{\tau_T}, \; |\dot T| \le R
 
     With `mobility` m = 0 it is a PI. With J_x the inertia of the drive x is the torque that the
@@ -69,6 +70,11 @@ class RealDrive(NamedTuple):
         none.
     continuous : float
         Torque that it bears for any time (N m): limits nothing, is measured against.
+    curve : float
+        Torque limit T_c at rest of a motor with a curve (N m), which falls from knot to knot;
+        infinite for none.
+    w1, ..., w12, c1, ..., c12 : float
+        Speeds at which its slope changes (rad/s), and by how much (N m s/rad).
     """
 
     feedforward: Any
@@ -89,6 +95,31 @@ class RealDrive(NamedTuple):
     late: Any = 0.0
     slowness: Any = 0.0
     continuous: Any = math.inf
+    curve: Any = math.inf
+    w1: Any = 0.0
+    w2: Any = 0.0
+    w3: Any = 0.0
+    w4: Any = 0.0
+    w5: Any = 0.0
+    w6: Any = 0.0
+    w7: Any = 0.0
+    w8: Any = 0.0
+    w9: Any = 0.0
+    w10: Any = 0.0
+    w11: Any = 0.0
+    w12: Any = 0.0
+    c1: Any = 0.0
+    c2: Any = 0.0
+    c3: Any = 0.0
+    c4: Any = 0.0
+    c5: Any = 0.0
+    c6: Any = 0.0
+    c7: Any = 0.0
+    c8: Any = 0.0
+    c9: Any = 0.0
+    c10: Any = 0.0
+    c11: Any = 0.0
+    c12: Any = 0.0
 
     def gains(self) -> tuple[Any, Any]:
         """Proportional (N m s/rad) and integral (N m/rad) gain of the speed controller."""
@@ -136,6 +167,7 @@ def _impedance(drive: RealDrive, s: Any, held: Any) -> Any:
     return given * seen * (1.0 - felt * drive.sensed_inertia * s) / (1.0 + given * felt)
 
 
+KNOTS = 12  # most points of a curve of torque over speed
 FADE = 0.1  # share of the maximum speed over which the largest torque falls to zero beyond it
 
 MEMORY = ("speed seen", "torque felt", "its slow part", "integral", "motor torque")
@@ -229,7 +261,36 @@ def limits(drive: RealDrive, speed: float) -> tuple[float, float]:
     """Least and largest torque (N m) that a drive gives at an absolute speed (rad/s)."""
     by_power = drive.power / max(abs(speed), 1e-9)
     share = clipped((1.0 + FADE - abs(speed) * drive.slowness) / FADE, 0.0, 1.0)
-    return max(drive.least, -by_power), min(drive.most, by_power) * share
+    most = min(drive.most, by_power)
+    if math.isfinite(drive.curve):
+        most = min(most, curve_torque(drive, speed))
+    return max(drive.least, -by_power), most * share
+
+
+def curve_torque(drive: Any, speed: Any) -> Any:
+    """Torque (N m) under a motor's curve at a speed (rad/s); its numbers are the last of `drive`.
+
+    Of floats, arrays and the rows of kernels.
+    """
+    torque, first = drive.curve + 0.0 * speed, len(drive) - 24  # twice KNOTS
+    for knot in range(12):
+        torque = torque + drive[first + 12 + knot] * above(abs(speed) - drive[first + knot])
+    return torque
+
+
+def above(value: Any) -> Any:
+    """The value where it is above zero, else zero."""
+    return 0.5 * (value + abs(value))
+
+
+def curve_numbers(points: tuple[tuple[float, float], ...]) -> dict[str, float]:
+    """Fields of a `RealDrive` for a curve straight between points, level before and after."""
+    speeds, torques = np.array(points).T
+    slopes = np.concatenate([[0.0], np.diff(torques) / np.diff(speeds), [0.0]])
+    results = {"curve": float(torques[0])}
+    for k, (speed, change) in enumerate(zip(speeds, np.diff(slopes), strict=True), 1):
+        results |= {f"w{k}": float(speed), f"c{k}": float(change)}
+    return results
 
 
 def clipped(value: float, low: float, high: float) -> float:

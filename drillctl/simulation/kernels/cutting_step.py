@@ -27,7 +27,7 @@ from drillctl.simulation.kernels.arithmetic import (
     most,
     scatter,
 )
-from drillctl.simulation.kernels.drive_step import RealStep, SampledStep
+from drillctl.simulation.kernels.drive_step import REAL, SAMPLED
 from drillctl.simulation.kernels.rock_step import Outcome
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.kernels.variation_step import varies
@@ -125,9 +125,9 @@ def begin_cutting(
 def _begin_drive(drive: Any, bit: Any, work: Any) -> None:
     """The drive gives what steady drilling takes: its integral, or its angle, holds that."""
     law = law_at(drive, work, r.DRIVE)
-    ki = law.ki if isinstance(drive, (RealStep, SampledStep)) else each(law.gains()[1])
+    ki = law.ki if isinstance(drive, REAL + SAMPLED) else each(law.gains()[1])
     steady = (bit.torque != 0.0) & (ki != 0.0)
-    if isinstance(drive, (RealStep, SampledStep)):
+    if isinstance(drive, REAL + SAMPLED):
         put(work, r.INTEGRAL, pick(steady, (bit.torque - law.feedforward) / ki, 0.0))
         for row in (r.MOTOR, r.FELT, r.SLOW, r.COMMAND, r.PENDING):
             put(work, row, pick(steady, bit.torque, at(work, row)))

@@ -15,9 +15,10 @@ torque of the last step; a limited torque is a number, its slopes are zero.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, NamedTuple
 
-from drillctl.rig.top_drive.real_drive import FADE
+from drillctl.rig.top_drive.real_drive import FADE, RealDrive, curve_torque
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import fma, law_at, most
 from drillctl.simulation.kernels.observer_step import ObserverStep
@@ -113,6 +114,13 @@ class SampledStep(NamedTuple):
     continuous: Any
 
 
+OF_A_CURVE = RealDrive._fields[RealDrive._fields.index("curve") :]
+CurvedStep: Any = namedtuple("CurvedStep", [*RealStep._fields, *OF_A_CURVE])  # type: ignore[misc]
+CurvedSampledStep: Any = namedtuple("CurvedSampledStep", [*SampledStep._fields, *OF_A_CURVE])  # type: ignore[misc]
+REAL, SAMPLED = (RealStep, CurvedStep), (SampledStep, CurvedSampledStep)
+CURVED: dict[Any, Any] = {RealStep: CurvedStep, SampledStep: CurvedSampledStep}
+"""Steps of a drive whose motor has a curve; all others are spared its numbers."""
+
 SLOWEST = 1e-9  # speed (rad/s) under which a limit of power no longer grows
 
 
@@ -132,9 +140,9 @@ class Reduced(NamedTuple):
 
 def begin_drive(drive: Any, string: Any, work: Any, rate: Any) -> None:
     """Memory at time zero, or constants of an ideal drive; the top speed is in its row."""
-    if isinstance(drive, RealStep):
+    if isinstance(drive, REAL):
         return _begin_real(drive, string, work, rate)
-    if isinstance(drive, SampledStep):
+    if isinstance(drive, SAMPLED):
         return _begin(work)
     return _begin_ideal(drive, string, work, rate)
 
@@ -192,14 +200,29 @@ def _limits(law: Any, speed: Any) -> Any:
     by_power = law.power / most(abs(speed), SLOWEST)
     low = pick(law.least > -by_power, law.least, -by_power)
     share = _clip((1.0 + FADE - abs(speed) * law.slowness) / FADE, 0.0, 1.0)
-    return low, pick(law.most < by_power, law.most, by_power) * share
+    high = _largest(law, speed)
+    return low, pick(high < by_power, high, by_power) * share
+
+
+def _largest(law: Any, speed: Any) -> Any:
+    """Limit of the torque but for power at an absolute speed (rad/s)."""
+    if type(law) not in CURVED.values():
+        return law.most
+    by_curve = curve_torque(law, speed)
+    return pick(law.most < by_curve, law.most, by_curve)
+
+
+def _limits_at(law: Any, string: Any, work: Any, turned: Any, torque: Any, rate: Any) -> Any:
+    """Limits at the mean speed of a step, in which the top turns by an angle and by its torque."""
+    speed = (turned + string.angle_by_top * torque) * rate
+    return _limits(law, speed + at(work, r.SET_SPEED))
 
 
 def eliminate(drive: Any, program: Any, string: Any, swing: Any, work: Any, rate: Any) -> Any:
     """What is left of string and drive for the bit: a `Reduced`; `rate` is 1 / step."""
-    if isinstance(drive, RealStep):
+    if isinstance(drive, REAL):
         return _by_real_drive(drive, string, swing, work, rate)
-    if isinstance(drive, SampledStep):
+    if isinstance(drive, SAMPLED):
         return _by_held_torque(drive, string, swing, work)
     if isinstance(program, NoProgram):
         return _by_ideal_drive(string, swing, work, at(work, r.ANGLE), swing.top_angle)
@@ -244,8 +267,9 @@ def _by_real_drive(drive: Any, string: Any, swing: Any, work: Any, rate: Any) ->
     angle_free = swing.top_angle - string.angle_by_top * drag - string.angle_by_bit * torque
     speed_free = swing.top_speed - string.top_speed_by_top * drag - string.top_speed_by_bit * torque
     forecast = (offset - slope * angle_free + speed_slope * speed_free) * law.forecast
-    speed = (angle_free + string.angle_by_top * forecast - angle) * rate
-    low, high = _limits(law, speed + at(work, r.SET_SPEED))
+    low, high = _limits_at(law, string, work, angle_free - angle, forecast, rate)
+    # Limits depend on the speed, and that on what they leave of the torque.
+    low, high = _limits_at(law, string, work, angle_free - angle, _clip(forecast, low, high), rate)
     put(work, r.LEAST, low)
     put(work, r.MOST, high)
     command = (forecast - law.mean * motor) * law.per_command
@@ -284,7 +308,7 @@ def _by_held_torque(drive: Any, string: Any, swing: Any, work: Any) -> Any:
 
 def sample_drive(drive: Any, work: Any, due: Any) -> None:
     """Let a sampled controller work, where it is due."""
-    if isinstance(drive, SampledStep):
+    if isinstance(drive, SAMPLED):
         with when(due):
             _sample(drive, work)
 
@@ -312,9 +336,9 @@ def _sample(drive: Any, work: Any) -> None:
 
 def follow_drive(drive: Any, work: Any, top_speed_before: Any, rate: Any) -> None:
     """Memory at the end of a step whose motion is known."""
-    if isinstance(drive, RealStep):
+    if isinstance(drive, REAL):
         _follow_real(drive, work, top_speed_before, rate)
-    elif isinstance(drive, SampledStep):
+    elif isinstance(drive, SAMPLED):
         _follow_sampled(drive, work, top_speed_before, rate)
     else:
         return
@@ -325,9 +349,10 @@ def _measure_strain(drive: Any, work: Any, step: Any) -> None:
     """Time of a step at the limits of the drive, and its power."""
     law = law_at(drive, work, r.DRIVE)
     torque = at(work, r.TOP_TORQUE) + at(work, r.DRAG)
-    power = torque * (at(work, r.TOP_SPEED) + at(work, r.SET_SPEED))
+    speed = at(work, r.TOP_SPEED) + at(work, r.SET_SPEED)
+    power = torque * speed
     for row, there in (
-        (r.AT_TORQUE_LIMIT, torque >= AT_LIMIT * law.most),
+        (r.AT_TORQUE_LIMIT, torque >= AT_LIMIT * _largest(law, speed)),
         (r.AT_POWER_LIMIT, power >= AT_LIMIT * law.power),
         (r.OVER_CONTINUOUS, torque > law.continuous),
     ):
@@ -382,7 +407,7 @@ def _follow_sampled(drive: Any, work: Any, before: Any, rate: Any) -> None:
 
 def top_torque_now(drive: Any, work: Any, speed: Any) -> Any:
     """Torque of the drive at the moment, top speed in the frame (rad/s) given."""
-    if isinstance(drive, (RealStep, SampledStep)):
+    if isinstance(drive, REAL + SAMPLED):
         return at(work, r.MOTOR)
     angle = at(work, r.ANGLE) - at(work, r.SHIFT)
     return law_at(drive, work, r.DRIVE).torque(angle, speed - at(work, r.LEAD))
@@ -390,7 +415,7 @@ def top_torque_now(drive: Any, work: Any, speed: Any) -> Any:
 
 def asks_for_top(drive: Any, observer: Any) -> bool:
     """Whether drive or observer need the top speed."""
-    return isinstance(drive, (RealStep, SampledStep)) or isinstance(observer, ObserverStep)
+    return isinstance(drive, REAL + SAMPLED) or isinstance(observer, ObserverStep)
 
 
 def move_top(drive: Any, observer: Any, string: Any, swing: Any, work: Any) -> None:

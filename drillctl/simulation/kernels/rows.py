@@ -46,10 +46,10 @@ def _next(rows: int = 1) -> int:
 
 # Law parameters, as many rows as the law of that kind with the most numbers needs.
 FRICTION = _next(32)
-DRIVE = _next(32)
+DRIVE = _next(56)
 WEIGHT = _next(16)
 PROGRAM = _next(52)
-MOST_FIELDS = {FRICTION: 32, DRIVE: 32, WEIGHT: 16, PROGRAM: 52}
+MOST_FIELDS = {FRICTION: 32, DRIVE: 56, WEIGHT: 16, PROGRAM: 52}
 """Most numbers that a law may have, by where its rows begin."""
 
 # Constants of a lane.

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 from drillctl.rig.bit_rock.law import Exp
 from drillctl.simulation.kernels import rows as r
 from drillctl.simulation.kernels.arithmetic import exp, fma, law_at, most, root, signed
-from drillctl.simulation.kernels.drive_step import RealStep, SampledStep, asks_for_top, eliminate
+from drillctl.simulation.kernels.drive_step import REAL, SAMPLED, asks_for_top, eliminate
 from drillctl.simulation.kernels.rows import WIDTH
 from drillctl.simulation.kernels.string_step import DriftString, Swing, WallString
 from drillctl.simulation.kernels.vectors import Variable, at, each, loop, pick, put
@@ -154,9 +154,9 @@ def _level(string: Any, speed: Any, before: Any, drift: Any = None) -> Any:
 
 def _closure(drive: Any, reduced: Any, work: Any, rate: Any) -> tuple[Any, Any]:
     """Top torque per fall of the top angle and per fall of the top speed at the end of a step."""
-    if isinstance(drive, SampledStep):
+    if isinstance(drive, SAMPLED):
         return each(0.0), each(0.0)
-    if not isinstance(drive, RealStep):
+    if not isinstance(drive, REAL):
         return -at(work, r.LINE_FORTH), each(0.0)
     law = law_at(drive, work, r.DRIVE)
     free = pick(reduced.share == 0.0, 0.0, at(work, r.SHRINK))

@@ -15,6 +15,7 @@ from drillctl import units
 from drillctl.rig.program import Path, Ramp
 from drillctl.rig.top_drive import SampledDrive
 from drillctl.rig.top_drive import real_drive as law
+from drillctl.rig.top_drive.real_drive import KNOTS
 from drillctl.studies.export.terms import Term, Value, choose, made, named, number, of_terms
 
 
@@ -65,6 +66,16 @@ PARAMETERS = {
     "period": Symbol("period", "sampling period", TIME),
     "slowness": Symbol("slowness", "one over the largest speed",
                        Dimension(0, -1, "1/{speed}", "s/rad")),
+    "curve": Symbol("curve_torque", "largest torque at rest by the motor's curve", TORQUE),
+    **{
+        f"w{k}": Symbol(f"curve_speed_{k}", "speed at which the slope of that curve changes", SPEED)
+        for k in range(1, KNOTS + 1)
+    },
+    **{
+        f"c{k}": Symbol(f"curve_slope_{k}", "by how much it changes there",
+                        Dimension(1, -1, "{torque}/{speed}", "N*m*s/rad"))
+        for k in range(1, KNOTS + 1)
+    },
     "ramp": Symbol("ramp", "largest change of the set speed in a second", SPEED),
     "set_speed_lag": Symbol("set_speed_lag", "time constant behind the set speed", TIME),
 }  # fmt: skip
@@ -247,7 +258,8 @@ def _controller(drive: Any, ramp: Term, lag: Term) -> Block:
     _, begin = _followed(idly, speed, speed, set_speed, drive, ramp, lag)
 
     def limits(drive: Any, speed: Term) -> tuple[Term, Term]:
-        least, most = of_terms(law.limits)(drive, speed)
+        curve = of_terms(law.curve_torque, above=lambda x: made("max", x, 0.0))
+        least, most = of_terms(law.limits, curve_torque=curve)(drive, speed)
         return names.give("least", least), names.give("most", most)
 
     def clipped(value: Term, least: Term, most: Term) -> Term:
@@ -258,7 +270,7 @@ def _controller(drive: Any, ramp: Term, lag: Term) -> Block:
         return of_terms(law._integral_rate)(drive, error, command, given)
 
     # Power limits by the speed itself, whatever the encoder shows.
-    limited = drive.power.fixed < math.inf or drive.slowness > 0.0
+    limited = min(drive.power.fixed, drive.curve.fixed) < math.inf or drive.slowness > 0.0
     by_limit = named("limit_speed") if drive.encoder > 0.0 and limited else speed
     filtered, slow, integral, pending, last = map(named, (
         "filtered_torque", "slow_torque", "integral", "next_command", "last_speed"
