@@ -113,6 +113,8 @@ def _parameter(option: Option) -> inspect.Parameter:
     more: dict[str, Any] = {} if option.metavar is None else {"metavar": option.metavar}
     if option.least is not None:
         more["min"] = option.least
+    if option.type is int and not option.sets:  # keys of a design have ranges of their own
+        more["max"] = 10**9
     flag = f"{option.flag}/--{option.opposite}" if option.opposite else option.flag
     flags = [flag, option.formerly] if option.formerly else [flag]
     note = typer.Option(*flags, help=f"{option.help.rstrip('.')}.", **more)

@@ -39,7 +39,7 @@ class Source:
 
 def open_source(path: Path) -> Source:
     """Open a file by its ending (`InputError` if it cannot be read)."""
-    catalog.regular_file(str(path))
+    path = catalog.regular_file(str(path))
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         known = ", ".join(_READERS)

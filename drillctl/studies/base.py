@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from drillctl import registry
+from drillctl.catalog import regular_file
 from drillctl.progress import SILENT, Progress
 from drillctl.store.tables import Column, Table, Told
 
@@ -263,7 +264,7 @@ class Study:
 
 def _stamped(files: Iterable[str | Path]) -> list[str]:
     """Files by name, size and date: what tells one content from another."""
-    held = [(Path(file), Path(file).stat()) for file in files if Path(file).is_file()]
+    held = [(file, file.stat()) for file in (regular_file(str(one)) for one in files)]
     return [f"{file.resolve()} {about.st_size} {about.st_mtime_ns}" for file, about in held]
 
 

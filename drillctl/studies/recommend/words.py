@@ -141,7 +141,9 @@ def others(result: Recommendation) -> list[str]:
         name = f"{one.name} ({NAMES.get(one.law, one.law)})" if one.name == PRESENT else one.name
         if one.missed:
             first = one.missed[0]
-            more = f", and {len(one.missed) - 1} more" if len(one.missed) > 1 else ""
+            left = len(one.missed) - 1
+            criteria = "criterion" if left == 1 else "criteria"
+            more = f"; it misses {left} other {criteria}" if left else ""
             stable = "stable, but " if first.name != "stable" and best.verdict == FAILS else ""
             texts.append(f"{name}: {stable}{first.said}{more}")
         else:
