@@ -250,8 +250,11 @@ def explore(
     debug: Debug = False,
 ) -> None:
     """Turn gains on a local page and watch the region move."""
+    try:
+        from drillctl.explorer.server import serve
+    except ImportError:
+        raise InputError('needs Tornado: pip install "drillctl[explore]"', "explore") from None
     from drillctl.design import parse_setting
-    from drillctl.explorer.server import serve
 
     common_options(threads=threads)
     set_design = loaded(design, sets)  # refuses impossible values in words of the command line

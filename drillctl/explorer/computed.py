@@ -45,6 +45,7 @@ class Picture:
     """A map as far as it is known."""
 
     axes: Axes
+    measure: str
     values: Array  # shape of the map; coarse where the cell itself is not known yet
     whole: Sweep | None = None  # once every cell is known
 
@@ -73,7 +74,7 @@ def mapped(design: Design, axes: Axes, measure: str) -> Iterator[Picture | None]
     coarse = thinned(axes[0], COARSE), thinned(axes[1], COARSE)
     first = sweep(design, coarse, 0, measures=names)
     values = spread(first.measures[measure], coarse, axes)
-    yield Picture(axes, values)
+    yield Picture(axes, measure, values)
     yield from _refined(design, axes, names, values, begin)
 
 
@@ -105,7 +106,7 @@ def _refined(
             continue
         since = time.perf_counter()
         now = np.where(job.over_grid(known), job.over_grid(rows[names[-1]]), shown)
-        yield Picture(axes, now)
+        yield Picture(axes, names[-1], now)
     step, modes = next(iter(schemes)) if len(schemes) == 1 else (None, None)
     whole = Sweep(
         design=design, axes=axes, levels=design.tables.map.levels,
@@ -113,7 +114,7 @@ def _refined(
         status=job.over_grid(status), audit=unaudited(), step=step, modes=modes,
         seconds=seconds, total_seconds=time.perf_counter() - begin,
     )  # fmt: skip
-    yield Picture(axes, whole.measures[names[-1]], whole)
+    yield Picture(axes, names[-1], whole.measures[names[-1]], whole)
 
 
 class _Strips:

@@ -1,31 +1,30 @@
 "use strict";
-// The page beside its pictures: the form, keys, files, light and dark. What it asks for goes to the
-// server as one text, `asked`; answers come back as texts. Pictures are changed by Bokeh itself.
-const drillctl = (() => {
-  let asked, drawn, count = 0, answered = 0, held = null;
-  let units = "si", form = null;
-  const waiting = [];
+// The page beside its pictures: the form, keys, files, light and dark. What it asks for and what it
+// is told are texts of a web socket.
+(() => {
+  let socket, count = 0, answered = 0, held = null, dragging = false;
+  let form = null;
   const by = id => document.getElementById(id);
+  const send = what => socket.send(JSON.stringify(what));
 
   // While something is dragged, the newest place waits until the one before has been answered.
   function ask(what) {
-    if (!asked) { waiting.push(what); return; }
     if (what.settled === false && answered < count) { held = what; return; }
     held = null;
     count += 1;
     document.body.dataset.asked = count;
     document.dispatchEvent(new CustomEvent("asked", { detail: count }));
-    asked.data = { json: [JSON.stringify({ ...what, count })] };
+    send({ ...what, count });
   }
 
-  // The server waits for this before it sends more.
-  function drawing(n) { requestAnimationFrame(() => { drawn.data = { n: [n] }; }); }
-
   // ---- the cross: drawn here at once, told to the server
-  function drag(x, y, how, map) {
-    const inside = (v, range) => Math.min(range.end, Math.max(range.start, v));
-    const at = { x: inside(x, map.x_range), y: inside(y, map.y_range) };
-    ask({ do: "cross", ...at, settled: how === "end" });
+  function drag(event) {
+    if (event.type === "pointerdown") { event.target.setPointerCapture(event.pointerId); dragging = true; }
+    if (!dragging) return;
+    dragging = event.type === "pointerdown" || event.type === "pointermove";
+    const [x, y] = pictures.under(event);
+    pictures.cross([x, y]);
+    ask({ do: "cross", x, y, settled: !dragging });
   }
 
   function keys(event) {
@@ -55,11 +54,6 @@ const drillctl = (() => {
 
   const idOf = path => "c-" + path.replace(/[^a-z0-9_]/gi, "-");
 
-  function nice(span) {
-    const raw = span / 200, ten = 10 ** Math.floor(Math.log10(raw));
-    return [1, 2, 5, 10].map(k => k * ten).find(step => step >= raw * .999);
-  }
-
   function control(one) {
     const id = idOf(one.path);
     const set = settled => event => {
@@ -73,7 +67,7 @@ const drillctl = (() => {
       element("label", { for: id }, one.label + (one.axis === null ? "" : one.axis === 0 ? " (across)" : " (up)")),
       element("input", { id, type: "number", step: "any", value: one.value, onchange: set(true), "aria-describedby": "error-" + id }),
       element("span", { class: "unit" }, one.unit),
-      element("input", { id: id + "-range", type: "range", min: one.low, max: one.high, step: nice(one.high - one.low),
+      element("input", { id: id + "-range", type: "range", min: one.low, max: one.high, step: pictures.step((one.high - one.low) / 200),
         value: one.value, oninput: set(false), onchange: set(true), "aria-label": one.label }),
       element("p", { class: "error", id: "error-" + id, role: "alert" }));
   }
@@ -119,7 +113,6 @@ const drillctl = (() => {
         else if (target && target.type === "range" && Math.abs(target.value - value) > Number(target.step)) target.value = value;
     }
     if (told.units === undefined) return; // of a cross that has moved
-    units = told.units;
     by("units").value = told.units;
     by("measure").value = told.measure;
     by("measure").disabled = told.draws > 0;
@@ -165,7 +158,13 @@ const drillctl = (() => {
     undo: can => { by("undo").disabled = !can; },
     redo: can => { by("redo").disabled = !can; },
     fine: () => clear(),
-    drew: kinds => document.dispatchEvent(new CustomEvent("drew", { detail: kinds })),
+    pictures: pictures.take,
+    cross: at => { if (!dragging) pictures.cross(at); },
+    // The server waits until this is on the screen before it sends more.
+    drew: kinds => {
+      document.dispatchEvent(new CustomEvent("drew", { detail: kinds }));
+      requestAnimationFrame(() => send({ do: "drawn" }));
+    },
     answered: number => {
       document.body.dataset.answered = answered = number;
       if (held && answered >= count) ask(held);
@@ -189,23 +188,24 @@ const drillctl = (() => {
     },
   };
 
-  function answer(text) {
-    for (const [name, told] of Object.entries(JSON.parse(text))) takes[name](told);
+  // Arrays of numbers come as the bytes of their doubles.
+  function unpacked(key, value) {
+    if (!value || value.f8 === undefined) return value;
+    const text = atob(value.f8), bytes = new Uint8Array(text.length);
+    for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k);
+    return new Float64Array(bytes.buffer);
+  }
+
+  function answer(event) {
+    for (const told of JSON.parse(event.data, unpacked))
+      for (const [name, one] of Object.entries(told)) takes[name](one);
   }
 
   // ---- light and dark
   function paint(dark) {
     document.documentElement.classList.toggle("dark", dark);
     by("scheme").setAttribute("aria-pressed", dark);
-    const ink = dark ? "#e6e9ed" : "#1b1f24", paper = dark ? "#14181d" : "#ffffff", line = dark ? "#3b444e" : "#d5d9df";
-    for (const model of Bokeh.documents[0]._all_models.values()) {
-      if (model.type === "Figure") Object.assign(model, { background_fill_color: paper, border_fill_color: paper, outline_line_color: line });
-      if (/Axis$/.test(model.type)) Object.assign(model, { axis_label_text_color: ink, major_label_text_color: ink, axis_line_color: line, major_tick_line_color: line });
-      if (model.type === "Grid") model.grid_line_color = line;
-      if (model.type === "Title") model.text_color = ink;
-      if (model.type === "Legend") Object.assign(model, { background_fill_color: paper, label_text_color: ink, border_line_color: line });
-      if (model.type === "ColorBar") Object.assign(model, { background_fill_color: paper, title_text_color: ink, major_label_text_color: ink });
-    }
+    pictures.again();
     try { localStorage.setItem("drillctl-dark", dark ? "1" : "0"); } catch (_) { /* private window */ }
   }
 
@@ -226,23 +226,24 @@ const drillctl = (() => {
     on("report", "click", () => ask({ do: "report" }));
     on("recommend", "click", () => ask({ do: "recommend" }));
     on("keep", "click", () => ask({ do: "keep", on: by("keep").getAttribute("aria-pressed") !== "true", settled: true }));
-    for (const name of ["units", "measure", "level"]) on(name, "change", e => ask({ do: "choose", name, value: e.target.value, settled: true }));
-    on("draws", "change", e => ask({ do: "choose", name: "draws", value: e.target.value, settled: true }));
+    for (const name of ["units", "measure", "level", "draws"]) on(name, "change", e => ask({ do: "choose", name, value: e.target.value, settled: true }));
     on("mode", "change", e => ask({ do: "choose", name: "draws", value: e.target.value, settled: true }));
     on("scheme", "click", () => paint(!document.documentElement.classList.contains("dark")));
     on("controls", "submit", e => e.preventDefault());
     document.addEventListener("keydown", keys);
+    for (const name of ["down", "move", "up", "cancel"]) by("map").addEventListener("pointer" + name, drag);
   }
 
-  function start(theirs, ours) {
-    asked = theirs; drawn = ours;
+  function start() {
     buttons();
     let dark = matchMedia("(prefers-color-scheme: dark)").matches;
     try { const held = localStorage.getItem("drillctl-dark"); if (held !== null) dark = held === "1"; } catch (_) { /* private window */ }
     paint(dark);
-    ask({ do: "ready" });
-    for (const one of waiting.splice(0)) ask(one);
+    socket = new WebSocket(`ws://${location.host}${location.pathname}/ws`);
+    socket.onopen = () => ask({ do: "ready" });
+    socket.onmessage = answer;
+    socket.onclose = () => error("", "The explorer has ended: start it again and reload this page.");
   }
 
-  return { start, answer, drag, drawing };
+  document.addEventListener("DOMContentLoaded", start);
 })();

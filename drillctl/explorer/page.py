@@ -1,122 +1,113 @@
 """One page: requests of the browser change its state, work is asked for, results are drawn.
 
-The browser tells when it has drawn what it was sent; until then the newest result of each kind
-waits. So a fast engine does not flood a slow browser, and what is dropped nobody would have seen.
+What goes to the browser is a text: a JSON list of answers, each a name of `takes` in `page.js` with
+its value, arrays as the bytes of their doubles. The browser tells when it has drawn pictures; until
+then the newest result of each kind waits. So a fast engine does not flood a slow browser, and what
+is dropped nobody would have seen.
 """
 
 from __future__ import annotations
 
+import base64
 import json
 import logging
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from bokeh.events import Pan, PanEnd, PanStart, Tap
-from bokeh.models import ColumnDataSource, CustomJS
+import numpy as np
 
 from drillctl import units
 from drillctl.design import Design, to_toml
 from drillctl.design.paths import USUAL_NAMES, parameter
 from drillctl.errors import DrillctlError, InputError
-from drillctl.explorer import computed, controls, form
+from drillctl.explorer import computed, controls, figures, form
 from drillctl.explorer import state as states
-from drillctl.explorer.figures import (
-    LoopFigures,
-    MapFigure,
-    ResponseFigures,
-    contours,
-    shown,
-)
 from drillctl.explorer.work import Engine, Piece, Queue, Slices, Until
 
 if TYPE_CHECKING:
-    from bokeh.document import Document
-
-    from drillctl.ensemble.audit import Audit
     from drillctl.ensemble.grid import Axis
-    from drillctl.explorer.computed import Boundary, Loop, Picture, Share
+    from drillctl.explorer.computed import Picture, Share
     from drillctl.explorer.reports import Reports
     from drillctl.explorer.state import State
-    from drillctl.simulation import Simulation
-    from drillctl.studies.recommend.compute import Recommendation
 
 LOG = logging.getLogger("drillctl")
 MOST_UNDONE = 200  # states that can be gone back to
 LOOPS = 0.2  # time (s) between two pictures of the loop while the cross is dragged
-AHEAD = 1  # results sent that the browser has not drawn yet
+PICTURES = {
+    "map": "map", "boundary": "map", "audit": "map", "recommendation": "map", "map of A": "map",
+    "response": "run", "response of A": "run", "loop": "loop", "loop of A": "loop",
+}  # fmt: skip
+"""Group of pictures that a kind of result is drawn in."""
+AT_CROSS = [kind for kind, group in PICTURES.items() if group != "map"]
 
 
 class Page:
     """A page from when it is opened until it is closed."""
 
     def __init__(
-        self, document: Document, base: Design, first: State, engine: Engine, reports: Reports
-    ) -> None:
-        self._document, self._base, self._engine, self._reports = document, base, engine, reports
+        self, send: Callable[[str], Any], soon: Callable[[Callable[[], None]], Any], base: Design,
+        first: State, engine: Engine, reports: Reports,
+    ) -> None:  # fmt: skip
+        self._send, self._soon = send, soon  # to the browser; from a thread of work
+        self._base, self._engine, self._reports = base, engine, reports
         self.state = first
         self._axes = first.grid(base.replace(first.settings))  # of the map that is shown
         self._history, self._undone = [self.state], list["State"]()
-        self.map, self.response, self.loop = MapFigure(), ResponseFigures(), LoopFigures()
-        self._asked, self._answer = ColumnDataSource({"json": [""]}), ColumnDataSource({"json": []})
-        self._drawn, self._sent = ColumnDataSource({"n": [0]}), ColumnDataSource({"n": [0]})
-        self._said: list[str] = []  # answers that are not sent yet
+        self._said: list[dict[str, Any]] = []  # answers that are not sent yet
         self._drawing = self._asked_advice = False
         self._settled = True  # whether nothing is being dragged
         self._loop_is_rough, self._loop_at = False, -math.inf
-        self._ready: dict[str, Callable[[], None]] = {}  # results that wait for the browser
         self._shown: dict[str, Any] = {}  # newest result of each kind
-        self._made_by: dict[str, int] = {}  # number of the request that it answers
+        # kinds that wait for the browser, with the request that each answers
+        self._ready: dict[str, int] = {}
         self._count = 0
-        self._lay_out()
+        self._owed = ""  # kind of the result that the newest request waits for
 
-    # What the browser is given.
+    # Messages.
 
-    def _lay_out(self) -> None:
-        document = self._document
-        for plot in (*self.map.plots, *self.response.plots, *self.loop.plots):
-            document.add_root(plot)
-        given = {
-            "asked": self._asked, "answer": self._answer, "drawn": self._drawn, "sent": self._sent,
-            "map": self.map.plot,
-        }  # fmt: skip
-        document.js_on_event(
-            "document_ready", CustomJS(args=given, code="drillctl.start(asked, drawn)")
-        )
-        self._answer.js_on_change(
-            "data", CustomJS(code="for (const one of cb_obj.data.json) drillctl.answer(one)")
-        )
-        self._sent.js_on_change("data", CustomJS(code="drillctl.drawing(cb_obj.data.n[0])"))
-        for event, name in ((PanStart, "start"), (Pan, "move"), (PanEnd, "end"), (Tap, "end")):
-            self.map.plot.js_on_event(
-                event,
-                CustomJS(args=given, code=f"drillctl.drag(cb_obj.x, cb_obj.y, '{name}', map)"),
-            )
-        self._asked.on_change("data", self._on_asked)
-        self._drawn.on_change("data", self._on_drawn)
-        document.title = f"{self._base.tables.title or self._base.name} - drillctl explorer"
+    def take(self, text: str) -> None:
+        """A request of the browser."""
+        asked = json.loads(text)
+        if asked["do"] == "drawn":
+            self._drawing = False
+            self._turn()
+        else:
+            self._turn(partial(self._answer, asked))
+
+    def _turn(self, call: Callable[[], None] = lambda: None) -> None:
+        """Do something, and send what it gives with the pictures that wait."""
+        call()
+        if self._ready and not self._drawing:
+            ready, self._ready, self._drawing = self._ready, {}, True
+            for kind in ready:
+                self._tell(kind)
+                self._pay(kind)
+            if not ready.keys().isdisjoint(AT_CROSS):
+                self._readouts()
+            self._say(pictures=self._pictures({PICTURES[kind] for kind in ready}), drew=ready)
+        if self._said:
+            said, self._said = self._said, []
+            self._send(json.dumps(said, default=_packed, allow_nan=False))
+
+    def _later(self, call: Callable[[], None]) -> None:
+        """Take a turn, from a thread of work."""
+        try:
+            self._soon(partial(self._turn, call))
+        except RuntimeError:  # the server has ended meanwhile
+            self._engine.drop(self)
 
     def _say(self, **answers: Any) -> None:
-        """Send the browser what is not a picture, at once or with the pictures it belongs to."""
-        self._say_later(**answers)
-        if not self._drawing:
-            self._send()
-
-    def _say_later(self, **answers: Any) -> None:
-        self._said.append(json.dumps(answers, allow_nan=False))
-
-    def _send(self) -> None:
-        self._answer.data, self._said = {"json": self._said}, []
+        self._said.append(answers)
 
     # Requests.
 
-    def _on_asked(self, attribute: str, old: Any, new: Any) -> None:
-        asked = json.loads(new["json"][0])
-        self._count = asked.get("count", 0)
+    def _answer(self, asked: dict[str, Any]) -> None:
+        self._count, self._owed = asked.get("count", 0), ""
         try:
             self._do(asked)
         except DrillctlError as error:
@@ -126,7 +117,8 @@ class Page:
         except Exception as error:  # the page survives what nobody thought of, and says it
             LOG.exception("a request failed")
             self._say(error={"at": "", "said": f"{type(error).__name__}: {error}"})
-        self._say(answered=self._count)
+        if self._settled or not self._owed:
+            self._say(answered=self._count)
 
     def _do(self, asked: dict[str, Any]) -> None:
         action = asked["do"]
@@ -142,9 +134,10 @@ class Page:
         self._say(fine=True)
 
     def _begin(self) -> None:
-        self._place()
         self._describe()
+        self._move()
         self._compute(None, self.state)
+        self._ready["map"] = self._count
 
     def _undo(self) -> None:
         self._settled = True
@@ -168,19 +161,20 @@ class Page:
 
     def _change(self, new: State) -> None:
         old, self.state = self.state, new
-        if (new.axes, new.units, new.settings) != (old.axes, old.units, old.settings):
-            self._place()
+        if (new.axes, new.settings) != (old.axes, old.settings):
+            self._axes = new.grid(self._base.replace(new.settings))
+        if [a.path for a in new.axes] != [a.path for a in old.axes]:
+            self._forget("map", "map of A")
+        self._compute(old, new)
+        if new.axes != old.axes:
+            self._ready["map"] = self._count
         if _form(new) != _form(old):
             self._describe()
-        elif new == replace(old, cross=new.cross):
-            self._say(values=form.crossed(new, self._axes), **self._undoable())
-        else:
-            self._say(values=form.values(new, self._base), **self._undoable())
+        else:  # while something is dragged, what moves with the cross alone
+            told = (form.values(new, self._base) if self._settled
+                    else form.crossed(new, self._axes))  # fmt: skip
+            self._say(values=told, **self._undoable())
         self._move()
-        self._compute(old, new)
-        if self._settled and "response" in self._shown:
-            self._ready.setdefault("torques", partial(self._draw_torques, self._shown["response"]))
-            self._draw_ready()
 
     def _save(self) -> None:
         name = f"{self._base.name}-explorer.json"
@@ -197,9 +191,7 @@ class Page:
     def _report(self) -> None:
         design = self.state.at_cross(self._base)
         self._say(report={"said": "Writing the report of this point ..."})
-        self._reports.write(
-            self, design, lambda said: self._next_tick(lambda: self._say(report=said))
-        )
+        self._reports.write(self, design, lambda said: self._later(lambda: self._say(report=said)))
 
     # Work.
 
@@ -207,24 +199,23 @@ class Page:
         """Ask for what a change makes necessary."""
         base = self._base
         mapped = old is None or _mapped(new) != _mapped(old)
-        moved = mapped or old is None or new.cross != old.cross or new.units != old.units
+        moved = mapped or old is None or new.cross != old.cross
         if old is not None and new.kept != old.kept:
-            self._keep(new, mapped=True)
-        elif mapped and new.kept is not None:
-            self._keep(new, mapped=old is None or _mapped(new)[1:] != _mapped(old)[1:])
+            self._keep(new)
+        elif old is not None and new.axes != old.axes:
+            self._map_of_a(new)
         if mapped:
             design = new.design(base)
             self._map(design, new.grid(design), new)
-        elif old is not None and new.units != old.units:
-            self._paint_again()
+        if old is not None and new.units != old.units:
+            self._ready |= dict.fromkeys(self._shown, self._count)
         if moved:
-            at = new.at_cross(base)
-            self._put("quick", "response", 0, computed.response(at), self._draw_response)
+            self._put("quick", "response", 0, computed.response(new.at_cross(base)))
         if (moved or self._loop_is_rough) and (self._settled or self._loop_is_due):
             slices = computed.loop(new.at_cross(base))
             self._loop_is_rough, self._loop_at = not self._settled, time.monotonic()
             rough = islice(slices, 1) if self._loop_is_rough else slices
-            self._put("loops", "loop", 0, rough, self._draw_loop)
+            self._put("loops", "loop", 0, rough)
 
     @property
     def _loop_is_due(self) -> bool:
@@ -233,109 +224,92 @@ class Page:
     def _map(self, design: Design, axes: tuple[Axis, Axis], new: State) -> None:
         self._engine.checks.drop(self, "audit")
         self._engine.advice.drop(self, "recommendation")
-        for kind in ("audit", "boundary", "recommendation"):
-            self._shown.pop(kind, None)
-            self._ready.pop(kind, None)
+        self._forget("audit", "boundary", "recommendation")
         self._say(chip={"text": "audit: waiting", "kind": "none"}, stale=self._asked_advice)
-        self.map.check(None, axes, new.units)
         if new.draws:
             work = computed.probability(design, axes, new.level, new.draws)
             self._engine.maps.drop(self, "map")
-            self._put("shares", "map", 0, work, self._draw_share)
+            self._put("shares", "map", 0, work)
         else:
             self._engine.shares.drop(self, "map")
-            self._put("maps", "map", 0, computed.mapped(design, axes, new.measure), self._draw_map)
-        self._put("checks", "boundary", 0, computed.boundary(design, axes), self._draw_boundary)
+            self._put("maps", "map", 0, computed.mapped(design, axes, new.measure))
+        self._put("checks", "boundary", 0, computed.boundary(design, axes))
 
-    def _keep(self, new: State, mapped: bool) -> None:
+    def _forget(self, *kinds: str) -> None:
+        for kind in kinds:
+            self._shown.pop(kind, None)
+            self._ready.pop(kind, None)
+
+    def _keep(self, new: State) -> None:
         case = new.case_a(self._base)
+        kinds = ("response of A", "loop of A", "map of A")
         if case is None:
-            for kind in ("response of A", "loop of A", "map of A"):
+            for kind in kinds:
                 for queue in self._engine.queues:
                     queue.drop(self, kind)
                 self._shown.pop(kind, None)
-            self.response.keep(None, new.units)
-            self.loop.keep(None)
-            self.map.keep(None, None)
-            self._readouts()
+            self._ready |= dict.fromkeys(kinds, self._count)
             return
-        self._put("quick", "response of A", 1, computed.response(case), self._draw_response_of_a)
-        self._put("loops", "loop of A", 1, computed.loop(case), self._draw_loop_of_a)
-        assert new.kept is not None
-        if not mapped:
+        self._put("quick", "response of A", 1, computed.response(case))
+        self._put("loops", "loop of A", 1, computed.loop(case))
+        self._map_of_a(new)
+
+    def _map_of_a(self, new: State) -> None:
+        if new.kept is None:
             return
         try:
             of_a = replace(new, settings=new.kept.settings).design(self._base)
             work = computed.mapped(of_a, new.grid(of_a), "j1")
         except InputError:  # the law of A has not what these axes run over
-            self.map.keep(None, None)
+            self._forget("map of A")
         else:
-            self._put("maps", "map of A", 1, work, self._draw_map_of_a)
+            self._put("maps", "map of A", 1, work)
 
     def _recommend(self) -> None:
         design = self.state.design(self._base)
         until = Until()
         self._asked_advice = True
         self._say(sentence={"text": "Searching for what to set ...", "old": True})
-        self._put(
-            "advice", "recommendation", 0, computed.recommended(design, until),
-            self._draw_sentence, until,
-        )  # fmt: skip
+        work = computed.recommended(design, until)
+        self._put("advice", "recommendation", 0, work, until)
 
     def _put(
-        self, queue: str, kind: str, rank: int, slices: Slices, draw: Callable[[Any], None],
-        until: Until | None = None,
-    ) -> None:  # fmt: skip
+        self, queue: str, kind: str, rank: int, slices: Slices, until: Until | None = None
+    ) -> None:
         """Ask for work, in place of what was asked of its kind before."""
         until = until or Until()
         self._ready.pop(kind, None)
         target: Queue = getattr(self._engine, queue)
         count = self._count
+        if kind in ("map", "response"):
+            self._owed = self._owed or kind
 
         def deliver(value: Any) -> None:
             if value is not None:
-                self._next_tick(partial(self._offer, kind, count, until, draw, value))
+                self._later(partial(self._offer, kind, count, until, value))
 
         def failed(error: Exception) -> None:
-            self._next_tick(partial(self._failed, kind, until, error))
+            self._later(partial(self._failed, kind, until, error))
 
         target.put(Piece(self, kind, rank, slices, deliver, failed, until))
 
-    def _next_tick(self, call: Callable[[], None]) -> None:
-        try:
-            self._document.add_next_tick_callback(call)
-        except Exception:  # the page has closed meanwhile
-            self._engine.drop(self)
-
-    def _offer(
-        self, kind: str, count: int, until: Until, draw: Callable[[Any], None], value: Any
-    ) -> None:
-        """Draw a result now, or once the browser has drawn what it has."""
+    def _offer(self, kind: str, count: int, until: Until, value: Any) -> None:
+        """A result, which is drawn as soon as the browser has drawn what it has."""
         if until.dropped:
             return
-        self._shown[kind], self._made_by[kind] = value, count
-        self._ready[kind] = partial(draw, value)
-        self._draw_ready()
+        self._shown[kind], self._ready[kind] = value, count
+        if kind == "map" and not isinstance(value, computed.Share) and value.whole is not None:
+            audit = Until()
+            self._say(chip={"text": "audit: running", "kind": "none"})
+            self._put("checks", "audit", 1, computed.audited(value.whole, audit), audit)
+        if kind == "audit" and not self._asked_advice:  # once by itself, when nothing else waits
+            self._recommend()
 
-    def _draw_ready(self) -> None:
-        if not self._ready or self._sent.data["n"][0] - self._drawn.data["n"][0] >= AHEAD:
-            return
-        self._document.hold("combine")
-        self._drawing = True
-        kinds = dict(self._ready)
-        self._ready.clear()
-        try:
-            for draw in kinds.values():
-                draw()
-        finally:
-            self._drawing = False
-            self._say_later(drew={kind: self._made_by.get(kind, 0) for kind in kinds})
-            self._sent.data = {"n": [self._sent.data["n"][0] + 1]}
-            self._send()
-            self._document.unhold()
-
-    def _on_drawn(self, attribute: str, old: Any, new: Any) -> None:
-        self._draw_ready()
+    def _pay(self, kind: str) -> None:
+        """Answer a request that waits for this: what is dragged sends its newest place then."""
+        if kind == self._owed and not self._settled:
+            self._owed = ""
+            self._say(answered=self._count)
 
     def _failed(self, kind: str, until: Until, error: Exception) -> None:
         if until.dropped:
@@ -346,10 +320,10 @@ class Page:
             LOG.error("%s failed", kind, exc_info=error)
             said = f"{type(error).__name__}: {error}"
         self._shown.pop(kind, None)
+        self._pay(kind)
         said = units.told(said, self.state.units)
         if kind == "loop":
-            self.loop.show(None)
-            self._readouts()
+            self._ready[kind] = self._count
         if kind == "recommendation":
             self._say(sentence={"text": f"No recommendation: {said}", "old": False})
         elif kind == "audit":
@@ -359,94 +333,40 @@ class Page:
 
     # Results.
 
-    def _draw_map(self, one: Picture) -> None:
-        state = self.state
-        self._clear_old()
-        self.map.paint(one.axes, one.values, self._levels(), state.measure, state.units, False)
-        self._say(problem={"of": "map", "said": ""},
-                  map={"whole": one.whole is not None, "said": self._map_said(one)})  # fmt: skip
-        if one.whole is not None and len(one.whole.measures):
-            until = Until()
-            self._say(chip={"text": "audit: running", "kind": "none"})
-            work = computed.audited(one.whole, until)
-            self._put("checks", "audit", 1, work, self._draw_audit, until)
+    def _pictures(self, groups: set[str]) -> dict[str, Any]:
+        got, system = self._shown.get, self.state.units
+        made: dict[str, Any] = {}
+        if "map" in groups:
+            levels = self._base.tables.map.levels
+            made["map"] = figures.stability(self._axes, system, got("map"), levels, self._marks())
+        if "run" in groups and "response" in self._shown:
+            made |= figures.of_run(self._shown["response"], got("response of A"), system)
+        if "loop" in groups:
+            made |= figures.of_loop(got("loop"), got("loop of A"))
+        return made
 
-    def _clear_old(self) -> None:
-        """Take what belongs to the map before off this one."""
-        if "boundary" not in self._shown:
-            self.map.mark(None, self.state.units)
-        if "recommendation" not in self._shown:
-            self.map.star(None)
+    def _marks(self) -> Iterator[figures.Drawn]:
+        """What is on the map beside its levels."""
+        state, shown, system = self.state, self._shown, self.state.units
+        if "map of A" in shown:
+            kept = state.kept
+            assert kept is not None
+            design = self._base.replace(kept.settings)
+            at = {path: parameter(design, path).parse(text) for path, text in kept.cross.items()}
+            levels = self._base.tables.map.levels
+            yield from figures.kept_levels(shown["map of A"], levels, self._on_map(at), system)
+        if "boundary" in shown:
+            yield from figures.bounded(shown["boundary"], system)
+        if "audit" in shown:
+            yield figures.checked(shown["audit"], self._axes, system)
+        if "recommendation" in shown:
+            best = shown["recommendation"].recommended
+            law = best.design.tables.controller.law
+            place = self._on_map(best.gains)
+            if place and law == state.design(self._base).tables.controller.law:
+                yield figures.starred(place)
 
-    def _map_said(self, one: Picture) -> str:
-        if one.whole is None:
-            return "coarse"
-        minimum = one.whole.minimum
-        if minimum is None:
-            return "no cell gives a finite answer"
-        value, at = minimum
-        where = ", ".join(
-            f"{USUAL_NAMES.get(a.path, a.path)} {units.full(at[a.path], a.unit or '1', 5)}"
-            for a in one.axes
-        )
-        return units.told(f"least J1 {value:.4g} s at {where}", self.state.units)
-
-    def _levels(self) -> tuple[float, ...]:
-        return self._base.tables.map.levels
-
-    def _draw_share(self, one: Share) -> None:
-        self._clear_old()
-        self.map.paint(one.axes, one.values, (0.05, 0.5, 0.95), "j1", self.state.units, True)
-        self._say(map={"whole": one.draws >= self.state.draws,
-                       "said": f"share of {one.draws} of {self.state.draws} rocks with J1 of "
-                               f"{self.state.level:g} s or less"},
-                  chip={"text": f"{one.draws} rocks", "kind": "none"})  # fmt: skip
-
-    def _draw_boundary(self, one: Boundary) -> None:
-        self.map.mark(one, self.state.units)
-
-    def _draw_audit(self, one: Audit) -> None:
-        self.map.check(one, self._axes, self.state.units)
-        worst = "" if one.worst is None else f", worst difference {one.worst:.1e}"
-        text = f"audit: {one.verdict}, {len(one.cells)} cells{worst}"
-        self._say(chip={"text": text, "kind": one.verdict, "more": one.sentence("cells")})
-        if not self._asked_advice:  # once by itself, when nothing else waits for the machine
-            self._recommend()
-
-    def _draw_response(self, run: Simulation) -> None:
-        self.response.show(run)
-        self._say(problem={"of": "response", "said": ""})
-        if self._settled:
-            self._draw_torques(run)
-
-    def _draw_torques(self, run: Simulation) -> None:
-        """What is drawn when the cross rests: torques, and the numbers."""
-        self.response.show_torques(run, self.state.units)
-        self._readouts()
-
-    def _draw_response_of_a(self, run: Simulation) -> None:
-        self.response.keep(run, self.state.units)
-        self._readouts()
-
-    def _draw_loop(self, one: Loop) -> None:
-        self.loop.show(one)
-        self._say(problem={"of": "loop", "said": ""})
-        self._readouts()
-
-    def _draw_loop_of_a(self, one: Loop) -> None:
-        self.loop.keep(one)
-        self._readouts()
-
-    def _draw_map_of_a(self, one: Picture) -> None:
-        kept = self.state.kept
-        assert kept is not None
-        x, y = (shown(axis, self.state.units) for axis in one.axes)
-        lines = contours(x, y, one.values, self._levels())
-        design = self._base.replace(kept.settings)
-        at = {path: parameter(design, path).parse(value) for path, value in kept.cross.items()}
-        self.map.keep(lines, self._on_map(at))
-
-    def _on_map(self, values: dict[str, float]) -> tuple[float, float] | None:
+    def _on_map(self, values: dict[str, float]) -> figures.Place | None:
         """Where values (SI, by path) are on the map, in the units that are shown."""
         if any(axis.path not in values for axis in self._axes):
             return None
@@ -454,23 +374,41 @@ class Page:
         x, y = (values[a.path] / controls.shown_unit(a.unit, system)[0] for a in self._axes)
         return x, y
 
-    def _draw_sentence(self, one: Recommendation) -> None:
-        text = units.told(one.sentence, self.state.units)
-        self._say(sentence={"text": text, "old": False, "verdict": one.verdict})
-        law = one.recommended.design.tables.controller.law
-        same = law == self.state.design(self._base).tables.controller.law
-        self.map.star(self._on_map(one.recommended.gains) if same else None)
+    def _tell(self, kind: str) -> None:
+        """What a result says in words."""
+        one = self._shown.get(kind)
+        if one is None:
+            return
+        if kind in ("map", "response", "loop"):
+            self._say(problem={"of": kind, "said": ""})
+        if kind == "map":
+            self._tell_map(one)
+        elif kind == "audit":
+            worst = "" if one.worst is None else f", worst difference {one.worst:.1e}"
+            text = f"audit: {one.verdict}, {len(one.cells)} cells{worst}"
+            self._say(chip={"text": text, "kind": one.verdict, "more": one.sentence("cells")})
+        elif kind == "recommendation":
+            text = units.told(one.sentence, self.state.units)
+            self._say(sentence={"text": text, "old": False, "verdict": one.verdict})
 
-    def _paint_again(self) -> None:
-        for kind, draw in (
-            ("map", self._draw_share if self.state.draws else self._draw_map),
-            ("boundary", self._draw_boundary), ("audit", self._draw_audit),
-            ("map of A", self._draw_map_of_a), ("response of A", self._draw_response_of_a),
-            ("recommendation", self._draw_sentence),
-        ):  # fmt: skip
-            if kind in self._shown:
-                self._ready[kind] = partial(draw, self._shown[kind])
-        self._draw_ready()
+    def _tell_map(self, one: Picture | Share) -> None:
+        if isinstance(one, computed.Share):
+            said = (f"share of {one.draws} of {self.state.draws} rocks with J1 of "
+                    f"{self.state.level:g} s or less")  # fmt: skip
+            self._say(map={"whole": one.draws >= self.state.draws, "said": said},
+                      chip={"text": f"{one.draws} rocks", "kind": "none"})  # fmt: skip
+            return
+        said = "coarse"
+        if one.whole is not None:
+            said = "no cell gives a finite answer"
+            if one.whole.minimum is not None:
+                value, at = one.whole.minimum
+                where = ", ".join(
+                    f"{USUAL_NAMES.get(a.path, a.path)} {units.full(at[a.path], a.unit or '1', 5)}"
+                    for a in one.axes
+                )
+                said = units.told(f"least J1 {value:.4g} s at {where}", self.state.units)
+        self._say(map={"whole": one.whole is not None, "said": said})
 
     def _readouts(self) -> None:
         """Send the table of numbers at the cross and of case A."""
@@ -480,15 +418,10 @@ class Page:
 
     # The form.
 
-    def _place(self) -> None:
-        """Put the map where its axes are."""
-        state = self.state
-        self._axes = state.grid(self._base.replace(state.settings))
-        self.map.place(self._axes, state.units)
-        self._move()
-
     def _move(self) -> None:
-        self.map.move(self.state.cross, self._axes, self.state.units)
+        system = self.state.units
+        units_of = (controls.shown_unit(one.unit, system)[0] for one in self._axes)
+        self._say(cross=[at / one for at, one in zip(self.state.cross, units_of, strict=True)])
 
     def _undoable(self) -> dict[str, bool]:
         return {"undo": len(self._history) > 1, "redo": bool(self._undone)}
@@ -501,6 +434,11 @@ class Page:
         """Forget all of its work: the browser has left."""
         self._engine.drop(self)
         self._reports.drop(self)
+
+
+def _packed(values: Any) -> dict[str, str]:
+    doubles = np.asarray(values, dtype="<f8")
+    return {"f8": base64.b64encode(doubles.tobytes()).decode("ascii")}
 
 
 def _mapped(state: State) -> tuple[Any, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import html
 import logging
 import os
 import secrets
@@ -16,22 +17,24 @@ import socket
 import sys
 import tempfile
 import threading
-import warnings
 import webbrowser
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from tornado.httpserver import HTTPServer
+from tornado.web import Application, RequestHandler, StaticFileHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from drillctl import units
 from drillctl.design import Design
 from drillctl.errors import InputError
 
 if TYPE_CHECKING:
+    from drillctl.explorer.page import Page
     from drillctl.explorer.state import State
 
 HOST = "127.0.0.1"
-LEFT_AFTER = 2_000  # time (ms) without a connection after which a page counts as closed
-LOOK_EVERY = 1_000  # ms
 LAST = 5.0  # time (s) that running work has to end once it is interrupted
 SWITCH = 5e-4  # longest time (s) that a computation keeps a page from being heard
 HERE = Path(__file__).parent
@@ -92,12 +95,8 @@ def serve(
     Raises
     ------
     InputError
-        Bokeh is not installed, the port is taken, or a value is impossible.
+        The port is taken, or a value is impossible.
     """
-    try:
-        import bokeh  # noqa: F401
-    except ImportError:
-        raise InputError('needs Bokeh: pip install "drillctl[explore]"', "explore") from None
     from drillctl.explorer.state import first_state
 
     return_freed_memory()
@@ -148,36 +147,20 @@ class _Server:
         asyncio.run(self._run(browser))
 
     async def _run(self, browser: bool) -> None:
-        from bokeh.application import Application
-        from bokeh.application.handlers.function import FunctionHandler
-        from bokeh.server.tornado import BokehTornado
-        from tornado.httpserver import HTTPServer
-        from tornado.ioloop import IOLoop
-        from tornado.web import StaticFileHandler
-
-        logging.getLogger("bokeh").setLevel(logging.ERROR)
-        logging.getLogger("tornado.access").setLevel(logging.CRITICAL)
-        origin = f"{HOST}:{self._bound.getsockname()[1]}"
-        pages = Application(FunctionHandler(self._open))
-        tornado = BokehTornado(
-            {f"/{self._token}": pages},
-            extra_websocket_origins=[origin],
-            extra_patterns=[
-                (f"/{self._token}/reports/(.*)", StaticFileHandler, {"path": str(self._folder)})
+        logging.getLogger("tornado.access").setLevel(logging.CRITICAL)  # pages that are not there
+        # A page of another name that points here is refused, whatever it knows.
+        application = Application()
+        application.add_handlers(
+            HOST.replace(".", r"\."),
+            [
+                (f"/{self._token}", _Document, {"text": self._document()}),
+                (f"/{self._token}/ws", _Connection, {"opened": self._open}),
+                (f"/{self._token}/reports/(.*)", StaticFileHandler, {"path": str(self._folder)}),
             ],
-            sign_sessions=True,
-            secret_key=secrets.token_urlsafe(32).encode(),
-            generate_session_ids=True,
-            use_index=False,
-            unused_session_lifetime_milliseconds=LEFT_AFTER,
-            check_unused_sessions_milliseconds=LOOK_EVERY,
-            session_token_expiration=24 * 3600,
         )
-        http = HTTPServer(tornado, max_buffer_size=20 * 1024 * 1024)
+        http = HTTPServer(application)
         self._bound.setblocking(False)
         http.add_sockets([self._bound])
-        tornado.initialize(IOLoop.current())
-        tornado.start()
         # Computations hold the interpreter for 5 ms at a time by default, each of them.
         sys.setswitchinterval(SWITCH)
         stop = asyncio.Event()
@@ -189,22 +172,55 @@ class _Server:
         try:
             await stop.wait()
         finally:
-            # Pages that are still open break off in the middle of a message.
-            logging.getLogger("tornado.application").setLevel(logging.CRITICAL)
-            warnings.simplefilter("ignore", RuntimeWarning)
             self._reports.end()
             self._engine.end()
             http.stop()
-            tornado.stop()
+            await http.close_all_connections()
 
-    def _open(self, document: Any) -> None:
-        """Fill the document of a page that is opened."""
+    def _document(self) -> str:
+        """The page as the browser takes it."""
+        text = (HERE / "page.html").read_text(encoding="utf-8")
+        parts = {
+            f"{{{{ {name} }}}}": (HERE / name).read_text(encoding="utf-8")
+            for name in ("page.css", "draw.js", "page.js")
+        }
+        title = html.escape(self._design.tables.title or self._design.name)
+        for place, part in {"{{ title }}": title, **parts}.items():
+            text = text.replace(place, part)
+        return text
+
+    def _open(self, send: Callable[[str], Any]) -> Page:
+        """A page that is opened."""
         from drillctl.explorer.page import Page
 
-        page = Page(document, self._design, self._first, self._engine, self._reports)
-        parts = {
-            name: (HERE / f"page.{name}").read_text(encoding="utf-8") for name in ("css", "js")
-        }
-        document.template = (HERE / "page.html").read_text(encoding="utf-8")
-        document.template_variables.update(parts)
-        document.on_session_destroyed(lambda context: page.close())
+        soon = asyncio.get_running_loop().call_soon_threadsafe
+        return Page(send, soon, self._design, self._first, self._engine, self._reports)
+
+
+class _Document(RequestHandler):
+    def initialize(self, text: str) -> None:
+        self._text = text
+
+    def get(self) -> None:
+        self.set_header("Cache-Control", "no-store")
+        self.finish(self._text)
+
+
+class _Connection(WebSocketHandler):
+    """The web socket of a page, which lives as long as this."""
+
+    def initialize(self, opened: Callable[[Callable[[str], Any]], Page]) -> None:
+        self._opened = opened
+
+    def open(self, *args: str, **kwargs: str) -> None:
+        self._page = self._opened(self._tell)
+
+    def _tell(self, text: str) -> None:
+        with contextlib.suppress(WebSocketClosedError):
+            self.write_message(text)
+
+    def on_message(self, message: str | bytes) -> None:
+        self._page.take(str(message))
+
+    def on_close(self) -> None:
+        self._page.close()

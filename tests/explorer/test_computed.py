@@ -1,13 +1,16 @@
-"""Numbers of a page are those of the commands, to the bit."""
+"""Numbers of a page are those of the commands, to the bit, and pictures show them."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.interpolate import RegularGridInterpolator
 
 import drillctl
 from drillctl.ensemble.grid import axes_of
-from drillctl.explorer import computed, form
+from drillctl.explorer import computed, figures, form
 from drillctl.explorer.work import Dropped, Until
 from drillctl.linear.loop_analysis import loop
 
@@ -133,3 +136,50 @@ def test_the_boundary_is_that_of_the_loop(design):
     within = (slice(1, -1), slice(1, -1))  # the region ends with its window
     assert ((last.ratio > 1.0) == inside)[within].all()
     assert len(last.lines) >= 1
+
+
+def marks(picture, colour):
+    return [one for one in picture["marks"] if one.get("colour") == colour]
+
+
+def test_pictures_of_a_run_are_in_the_units_that_are_shown(design):
+    (run,) = computed.response(design)
+    (other,) = computed.response(design.replace({"controller.kp": 300.0}))
+    drawn = figures.of_run(run, other, "field")
+    (bit,), (a,) = marks(drawn["speed"], "blue"), marks(drawn["speed"], "purple")
+    assert bit["x"].tobytes() == run.time.tobytes()
+    assert bit["y"] == pytest.approx(run.signals["bit_speed"] * 30.0 / np.pi, rel=1e-14)
+    assert a["y"] == pytest.approx(other.signals["bit_speed"] * 30.0 / np.pi, rel=1e-14)
+    (torque,) = marks(drawn["torque"], "red")
+    assert drawn["torque"]["y"]["label"] == "torque (klbf ft)"
+    assert torque["y"] == pytest.approx(run.signals["top_torque"] / 1355.8179483314004, rel=1e-9)
+    for one in drawn.values():  # everything that is drawn is inside
+        for axis in "xy":
+            low = min(mark[axis].min() for mark in one["marks"])
+            high = max(mark[axis].max() for mark in one["marks"])
+            assert one[axis]["low"] <= low < high <= one[axis]["high"]
+
+
+def test_the_disk_of_the_margin_touches_the_nyquist_curve(design):
+    *_, last = computed.loop(design)
+    drawn = figures.of_loop(last, None)["nyquist"]
+    (disk,), (curve,) = marks(drawn, "orange"), marks(drawn, "blue")
+    middle = 0.5 * (disk["x"].min() + disk["x"].max())
+    distance = np.nanmin(np.hypot(curve["x"] - middle, curve["y"]))
+    assert distance == pytest.approx(np.ptp(disk["x"]) / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize("system", ["si", "field"])
+def test_levels_of_a_map_run_where_its_values_are(design, pictures, system):
+    last = replace(pictures[-1], measure="j1", values=pictures[-1].whole.j1)
+    drawn = figures.stability(axes_of(design), system, last, (30.0, 50.0), ())
+    lines, labels = drawn["marks"]
+    x, y = (figures.shown(axis, system) for axis in axes_of(design))
+    found = RegularGridInterpolator((x, y), last.values, bounds_error=False, fill_value=None)
+    known = ~np.isnan(lines["x"])
+    values = found(np.column_stack([lines["x"][known], lines["y"][known]]))
+    assert np.minimum(abs(values - 30.0), abs(values - 50.0)).max() < 1e-6
+    assert {"30", "50"} >= set(labels["texts"]) != set()
+    assert drawn["image"]["values"].reshape(13, 14).T.tobytes() == last.values.tobytes()
+    unit = {"si": "Kp (N m s)", "field": "Kp (klbf ft/rpm)"}[system]
+    assert drawn["x"]["label"] == unit

@@ -11,6 +11,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from http.client import HTTPConnection
 from typing import Any
 
 import pytest
@@ -153,12 +154,9 @@ def test_the_page_shows_the_numbers_of_the_commands(seen, file):
     loop = drillctl.loop(drillctl.load(file))
     seen.shows("disk margin", f"{loop.margins.disk:.5g}")
     image = seen.page.evaluate(
-        "() => { const all = [...Bokeh.documents[0]._all_models.values()];"
-        " const map = all.find(one => one.name === 'map');"
-        " const image = map.renderers.find(one => one.glyph && one.glyph.type === 'Image');"
-        " const data = image.data_source.data.image[0]; return [[...data.shape], [...data]]; }"
+        "(({ values, columns }) => [columns, [...values]])(pictures.all.map.image)"
     )
-    assert image[0] == [11, 13]
+    assert image[0] == 13
     assert image[1] == swept.j1.T.ravel().tolist()  # every cell, to the bit
 
 
@@ -273,9 +271,33 @@ def test_the_audit_comes_by_itself_and_a_recommendation_on_request(seen, file):
     assert "Kp 625" in seen.text("#sentence")
 
 
+def test_commands_are_copied(seen, file):
+    seen.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    base = drillctl.load(file)
+    first = states.first_state(base, "si")
+    for button, command in (("map", states.command), ("run", states.run_command)):
+        seen.page.click(f"#copy-{button}")
+        seen.until("text => document.querySelector('#report-said').textContent === text",
+                   f"Copied: {command(first, base)}")  # fmt: skip
+        assert seen.page.evaluate("navigator.clipboard.readText()") == command(first, base)
+
+
+@pytest.mark.slow
+def test_a_report_of_the_point_is_written_and_linked(seen, file):
+    seen.page.click("#report")
+    seen.page.wait_for_selector("#report-said a", timeout=300_000)
+    with seen.context.expect_page() as opened:
+        seen.page.click("#report-said a")
+    report = opened.value
+    report.wait_for_load_state()
+    assert "A rig to explore" in report.title()
+    assert told(file) in report.text_content("body")
+    report.close()
+
+
 def test_nothing_leaves_the_machine_and_a_wrong_token_is_refused(seen, address):
-    assert len(seen.asked) > 5
     host = address.split("/")[2]
+    assert f"ws://{host}/{address.split('/')[3]}/ws" in seen.asked
     outside = [url for url in seen.asked if url.split("/")[2] != host]
     assert [url for url in outside if not url.startswith(("data:", "blob:"))] == []
     wrong = address[:-3] + "abc"
@@ -283,6 +305,16 @@ def test_nothing_leaves_the_machine_and_a_wrong_token_is_refused(seen, address):
         with pytest.raises(urllib.error.HTTPError) as refused:
             urllib.request.urlopen(url, timeout=10)
         assert refused.value.code in (403, 404)
+    # A page of another name that points here, and one that knows the token.
+    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}
+    for path, headers, code in (
+        (address, {"Host": "another.example"}, 404),
+        (f"{address}/ws", upgrade | {"Origin": "http://another.example"}, 403),
+    ):
+        connection = HTTPConnection(host, timeout=10)
+        connection.request("GET", path.partition(host)[2], headers=headers)
+        assert connection.getresponse().status == code
+        connection.close()
     own = urllib.request.urlopen(address, timeout=10).read()
     assert b"drillctl" in own
 
