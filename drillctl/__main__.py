@@ -16,6 +16,8 @@ def main() -> None:
     gc.set_threshold(100_000, 50, 50)
     # Pictures go to files in one look, whatever the user draws others with.
     os.environ |= {"MPLBACKEND": "agg", "MATPLOTLIBRC": os.devnull}
+    # Matrices are small: threads of BLAS wait for each other many times as long as they work.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _settle_streams()
     from drillctl.cli import run
 

@@ -269,6 +269,8 @@ def many_loop_poles(
     string: Drillstring, kp: ArrayLike, ki: ArrayLike, slope: ArrayLike, threads: int = 1
 ) -> ComplexArray:
     """Eigenvalues for many gains at once."""
+    from threadpoolctl import threadpool_limits
+
     kp, ki, slope = (np.ravel(x) for x in np.broadcast_arrays(kp, ki, slope))
     # The matrix is affine in the three numbers: two controllers and one slope give its parts.
     still = closed_loop_matrices(string, 0.0, 1.0).a
@@ -287,7 +289,7 @@ def many_loop_poles(
     states = len(base)
     length = max(1, STACK // states**2)
     parts = [np.arange(len(kp))[i : i + length] for i in range(0, len(kp), length)]
-    with ThreadPoolExecutor(threads) as pool:
+    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
         poles = np.concatenate(list(pool.map(solve, parts)))
     # Without integral action nothing reads its state: a pole at zero that is not the loop's.
     poles[ki == 0.0, 0] = np.nan
