@@ -355,11 +355,14 @@ def axial(tables: DesignTables) -> AxialString | None:
     if table.model == "lumped" and table.mass is not None:
         springs = np.array([1.0])
         if table.top == "velocity":
-            springs = np.array([1.0 / sum(1.0 / k for k, _ in _axial_pieces(tables))])
+            springs = np.array([1.0 / sum(1.0 / k for k, _ in _axial_pieces(tables).values())])
         return axial_string(table, springs, np.array([table.mass]), consistent=False)
     each_spring: list[float] = []
     each_mass: list[float] = []
-    for (spring, mass), one in zip(_axial_pieces(tables), sections, strict=True):
+    of_pieces = _axial_pieces(tables)
+    for one in sections:  # with the short pieces that are lumped into it
+        held = [of_pieces[name] for name in (one.name, *one.lumped)]
+        spring, mass = 1.0 / sum(1.0 / k for k, _ in held), sum(m for _, m in held)
         each_spring += [spring * one.elements] * one.elements
         each_mass += [mass / one.elements] * one.elements
     k, m = np.array(each_spring), np.array(each_mass)
@@ -380,9 +383,9 @@ def refuse_weight_of_moving_top(tables: DesignTables) -> None:
         )
 
 
-def _axial_pieces(tables: DesignTables) -> list[tuple[float, float]]:
-    """Axial stiffness (N/m) and mass (kg) of each section, of its body."""
-    results = []
+def _axial_pieces(tables: DesignTables) -> dict[str, tuple[float, float]]:
+    """Axial stiffness (N/m) and mass (kg) of the body of each section, by name."""
+    results = {}
     for one in pieces(tables):
         if one.diameters is None:
             raise InputError(
@@ -394,7 +397,7 @@ def _axial_pieces(tables: DesignTables) -> list[tuple[float, float]]:
         area = 0.25 * math.pi * (outer**2 - inner**2)
         density = STEEL_DENSITY if one.density is None else one.density
         modulus = one.youngs_modulus or tables.axial.youngs_modulus
-        results.append((modulus * area / one.span, density * area * one.span))
+        results[one.name] = modulus * area / one.span, density * area * one.span
     return results
 
 
