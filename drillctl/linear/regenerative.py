@@ -145,11 +145,13 @@ def axial_mobility(string: AxialString, s: ComplexArray) -> ComplexArray:
         each = s.reshape(-1, 1)
         modes = each / (each**2 + each * np.diag(damping) + frequency**2)
         return np.asarray((modes @ shapes[-1] ** 2).reshape(s.shape))
-    flat = s.reshape(-1, 1, 1)
-    matrix = flat**2 * np.eye(len(frequency)) + flat * damping + np.diag(frequency**2)
-    force = np.broadcast_to(shapes[-1][:, None], (len(flat), len(frequency), 1))
-    answer = np.linalg.solve(matrix, force)[:, :, 0] @ shapes[-1]
-    return np.asarray((flat[:, 0, 0] * answer).reshape(s.shape))
+    # Else node by node from the top: what is above hangs on the node below by its impedance.
+    m, c, k = string.mass, string.damping, string.stiffness
+    above = s * m[0, 0] + c[0, 0] + k[0, 0] / s
+    for i in range(1, string.nodes):
+        link = s * m[i, i - 1] + c[i, i - 1] + k[i, i - 1] / s
+        above = s * m[i, i] + c[i, i] + k[i, i] / s - link**2 / above
+    return np.asarray(1.0 / above)
 
 
 @own_errstate()
@@ -259,9 +261,8 @@ def find_roots(
     starts = grid[np.all([size <= other for other in around], axis=0)]
     beside = 1j * chi.resonances[:, None] + (1.0 + 1.0j) * chi.scale * np.array([1e-4, 1e-3, 1e-2])
     starts = np.concatenate([starts, beside.ravel()])
-    for start in starts:
-        root = _polished(chi, complex(start), max(abs(right), 1.0))
-        if root is None or root.real < left or not -1e-9 <= root.imag <= limit:
+    for root in map(complex, _polished(chi, starts, max(abs(right), 1.0))):
+        if not (root.real >= left and -1e-9 <= root.imag <= limit):
             continue
         if abs(root) < 1e-6 * limit or any(abs(root - one) < 1e-7 * limit for one in found):
             continue  # zero is a root of the equation times s, and no motion
@@ -269,19 +270,22 @@ def find_roots(
     return np.array(sorted(found, key=lambda s: -s.real), dtype=complex)
 
 
-def _polished(chi: Any, start: complex, scale: float) -> complex | None:
-    """A root by Newton's method with a difference for the slope."""
-    s = start
+def _polished(chi: Any, starts: ComplexArray, scale: float) -> ComplexArray:
+    """Roots by Newton's method, its slope a difference; NaN where a start leads to none."""
+    step, left = 1e-7 * scale, np.arange(len(starts))
+    at, found = starts.astype(complex), np.full(len(starts), complex(math.nan, math.nan))
     for _ in range(60):
-        step = 1e-7 * scale
-        value, ahead, back = chi(np.array([s, s + step, s - step]))
+        s = at[left]
+        value, ahead, back = chi(np.concatenate([s, s + step, s - step])).reshape(3, -1)
         change = value * 2.0 * step / (ahead - back)
-        s -= change
-        if not math.isfinite(abs(s)) or abs(s - start) > scale:
-            return None
-        if abs(change) < 1e-13 * scale:
-            return complex(s)
-    return None
+        at[left] = s = s - change
+        near = np.abs(s - starts[left]) <= scale
+        done = near & (np.abs(change) < 1e-13 * scale)
+        found[left[done]] = s[done]
+        left = left[near & ~done]
+        if not left.size:
+            break
+    return found
 
 
 def axial_boundary(design: Design) -> float | None:
