@@ -112,8 +112,9 @@ def checks(result: Schedule) -> Iterator[Check]:
 
 
 def check(design: Design) -> None:
-    """Refuse depths that the string cannot have."""
-    if "schedule" in design.tree:
+    """Refuse depths that the string cannot have; defaults need not fit every string."""
+    table = design.tables.schedule
+    if table != type(table)():
         from drillctl.studies.schedule.strings import Along
 
         along = Along(design)
