@@ -14,6 +14,7 @@ from drillctl.design.paths import values_of
 from drillctl.design.tables import DesignTables
 from drillctl.rig.bit_rock import BitRockLaw
 from drillctl.rig.bit_rock.law import contact, friction_laws
+from drillctl.rig.bit_rock.richard_detournay import RichardDetournay
 from drillctl.rig.drillstring import Drillstring, Parts
 from drillctl.rig.drillstring.frequencies import followed
 from drillctl.rig.drillstring.mesh import off_the_line
@@ -76,7 +77,7 @@ def warnings_of(
     found = (
         *_implausible(tables),
         _assumed_rock(tables),
-        _varying_rock(tables),
+        _varying_rock(tables, rock),
         _weak_drive(tables, rock.static_torque(at_rest)),
         _drive_curve(tables),
         _growing(string, parts, -float(slope), drive, tables.simulation.duration),
@@ -96,20 +97,28 @@ def _assumed_rock(tables: DesignTables) -> DesignWarning | None:
     return DesignWarning(remark, "bit_rock.aggressiveness", "3 T / (W D) of a measured torque T")
 
 
-def _varying_rock(tables: DesignTables) -> DesignWarning | None:
-    """A rock that varies over depth so slowly that a run meets one level of it."""
+def _varying_rock(tables: DesignTables, rock: BitRockLaw) -> DesignWarning | None:
+    """A rock that varies over depth so slowly that a run meets one level of it, or at what rate."""
     table = getattr(tables.bit_rock, "variation", None)
     if table is None or table.cv == 0.0 or table.over != "depth":
         return None
-    rate, duration = tables.operating_point.rate_of_penetration, tables.simulation.duration
+    point, duration = tables.operating_point, tables.simulation.duration
+    rate, given = point.rate_of_penetration, "rate_of_penetration" in point.model_fields_set
+    if isinstance(rock, RichardDetournay):  # drills by itself
+        rate, given = float(rock.rate(point.weight_on_bit, point.speed)), True
+    told = f"{3600.0 * rate:.3g} m/h"
     drilled = rate * duration
-    if table.length < drilled:
+    if table.length >= drilled:
+        return DesignWarning(
+            f"at {told} a run of {duration:g} s drills {drilled:.2g} m, less than the correlation "
+            f"length of {table.length:g} m: its rock is of nearly one random level",
+            "bit_rock.variation.length", "centimetres to decimetres within a run",
+        )  # fmt: skip
+    if given:
         return None
     return DesignWarning(
-        f"at {units.write(rate, units.VELOCITY)} a run of {duration:g} s drills "
-        f"{drilled:.2g} m, less than the correlation length of {table.length:g} m: its rock is of "
-        "nearly one random level",
-        "bit_rock.variation.length", "centimetres to decimetres within a run",
+        f"no rate of penetration is given: the rock passes by at {told}",
+        "operating_point.rate_of_penetration", "that of the rig",
     )  # fmt: skip
 
 

@@ -125,3 +125,16 @@ def test_a_variation_is_read_and_written_in_the_unit_of_its_way(base, tmp_path):
         base.replace({"bit_rock.variation": {"cv": 0.1, "length": "1 m", "spacing": "20 cm"}})
     with pytest.raises(InputError, match="length is missing"):
         base.replace({"bit_rock.variation": {"cv": 0.1}})
+
+
+def test_results_state_the_rate_that_a_rock_passes_by_at(base):
+    varying = {"cv": 0.1, "length": "5 cm"}
+    text = "no rate of penetration is given: the rock passes by at 20 m/h"
+    assert text in [one.text for one in base.replace({"bit_rock.variation": varying}).warnings]
+    given = {"bit_rock.variation": varying, "operating_point.rate_of_penetration": "20 m/h"}
+    assert text not in [one.text for one in base.replace(given).warnings]
+    # A bit that drills by itself has its own.
+    own = drillctl.load("richard-detournay-2dof").replace({"bit_rock.variation": varying})
+    assert text not in [one.text for one in own.warnings]
+    slow = own.replace({"bit_rock.variation.length": "1 m"})
+    assert any("26.2 m/h a run of 21.1 s drills 0.15 m" in one.text for one in slow.warnings)
