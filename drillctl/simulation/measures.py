@@ -206,6 +206,11 @@ MEASURES = {
 """Every measure by its name."""
 
 
+def with_axial(names: tuple[str, ...], axial: bool) -> tuple[str, ...]:
+    """Names of measures, followed by those of axial motion where rigs have it."""
+    return (*names, *AXIAL_MEASURES) if axial else names
+
+
 def units_of(*names: str) -> dict[str, str]:
     """SI units of some measures, by name."""
     return {name: MEASURES[name].unit for name in names}

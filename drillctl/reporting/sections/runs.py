@@ -12,7 +12,7 @@ from drillctl.design import parameter
 from drillctl.provenance import provenance
 from drillctl.reporting.blocks import Block, Checks, Figure, Table, Words
 from drillctl.reporting.gather import Gathered, NotThereError, Study, opened
-from drillctl.simulation.measures import MEASURES, Measure
+from drillctl.simulation.measures import AXIAL_MEASURES, MEASURES, Measure
 from drillctl.store.tables import NOTHING, number, percent
 from drillctl.studies.base import Check
 
@@ -36,7 +36,9 @@ def build_responses(gathered: Gathered) -> tuple[Block, ...]:
     rows = [["engine", *(study.summary["engine"] for study in runs.values())]]
     rows.append(["status", *(s.summary["status"].replace("_", " ") for s in runs.values())])
     words = gathered.words
-    for one in (MEASURES[name] for name in SHOWN):
+    told = [study.summary["measures"] for study in runs.values()]
+    axial = [name for name in AXIAL_MEASURES if any(one[name] is not None for one in told)]
+    for one in (MEASURES[name] for name in (*SHOWN, *axial)):
         rows.append([words.measure(one), *(_value(study, one, words) for study in runs.values())])
     rows += _places(gathered, runs)
     table = Table("responses", "Measures of the runs", tuple(heads), tuple(map(tuple, rows)))

@@ -28,6 +28,7 @@ from drillctl.ensemble.draws import CommonDraws, matching_shift
 from drillctl.ensemble.parameters import refuse_dependent, uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.progress import Progress
+from drillctl.simulation.measures import with_axial
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.studies.advantage.settings import GAIN, REAL_PATH
@@ -203,7 +204,7 @@ KEPT = (
     "j1", "mean_weight_after_start", "rop_proxy", "peak_bit_speed", "peak_pipe_torque",
     "peak_top_torque", "settling_time",
 )  # fmt: skip
-"""Measures that are kept of every draw."""
+"""Measures that are kept of every draw, beside those of axial motion."""
 PATHS = (KP, KI, GAIN)
 STARTS = (0.0, 500.0, 1500.0)
 """Gains of the weight (N s/rad) that are tried with the constant weight's gains of the drive."""
@@ -313,8 +314,10 @@ class Case(Runs):
             "at_bounds": list(self.at_bounds),
             "objective": self.objective.summary(),
             "objective_difference": self.objective_less.summary(),
-            "means": {name: self.mean(name) for name in KEPT},
-            "differences": {name: self.difference(baseline, name, seed).summary() for name in KEPT},
+            "means": {name: self.mean(name) for name in self.measures},
+            "differences": {
+                name: self.difference(baseline, name, seed).summary() for name in self.measures
+            },
             "levels": shares,
             **picked(self, "step", "modes"),
         }
@@ -403,8 +406,9 @@ def _case(
     own: Measured, ground: Measured,
 ) -> Case:  # fmt: skip
     gains = {t.path: float(v) for t, v in zip(policy.tuned, best.values, strict=True)}
+    kept = with_axial(KEPT, policy.design.axial is not None)
     return Case(
-        **vars(own.runs) | {"measures": {name: own.runs.measures[name] for name in KEPT}},
+        **vars(own.runs) | {"measures": {name: own.runs.measures[name] for name in kept}},
         policy=policy.name,
         terms=terms.name,
         gains={path: gains.get(path, 0.0) for path in PATHS},

@@ -35,6 +35,7 @@ from drillctl.ensemble.sweeps import Region, Sweep, region, sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress, Within
 from drillctl.simulation import Simulation, simulate
+from drillctl.simulation.measures import with_axial
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
@@ -164,7 +165,7 @@ COMPARED = (
     "peak_top_torque", "settling_time", "mean_weight_on_bit", "mean_weight_after_start",
     "rop_proxy", "work_per_turn", "time_outside_table",
 )  # fmt: skip
-"""Measures that are compared."""
+"""Measures that are compared, beside those of axial motion."""
 NO_ANSWER = "no finite answer"  # reason of a run that broke down
 
 
@@ -338,10 +339,11 @@ def compare(
         refuse_too_large([len(named), *(one.points for one in axes)])
     progress.begin("simulating cases", (table.realizations + cells_of(axes)) * len(named))
     draws = CommonDraws(table.realizations, table.seed)
+    measures = with_axial(COMPARED, any(one.axial is not None for one in named.values()))
     results = []
     for name, variant in named.items():
         with variant.within(_of_case(name)):
-            results.append(_compared(name, variant, draws, equal, axes, progress))
+            results.append(_compared(name, variant, draws, equal, axes, measures, progress))
     each = -(-design.tables.map.audit_cells // len(named))
     levels = design.tables.map.levels
     results = [replace(case, audit=_audit(case, levels, each, progress)) for case in results]
@@ -359,7 +361,7 @@ def compare(
 
 def _compared(
     name: str, design: Design, draws: CommonDraws, equal: bool,
-    axes: tuple[AxisTable, ...] | None, progress: Progress,
+    axes: tuple[AxisTable, ...] | None, measures: tuple[str, ...], progress: Progress,
 ) -> ComparedCase:  # fmt: skip
     drawn = draws.lanes(design)
     shift = equalising_shift(drawn, draws.count) if equal else 0.0
@@ -371,7 +373,7 @@ def _compared(
         failures = (*failures, Failures(NO_ANSWER, broken, "a number of the run is not finite"))
     progress.advance(draws.count)
     return ComparedCase(
-        **vars(runs) | {"measures": {measure: runs.measures[measure] for measure in COMPARED}},
+        **vars(runs) | {"measures": {one: runs.measures[one] for one in measures}},
         name=name,
         design=design,
         drawn=draws.values(design),

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
+from drillctl.simulation.measures import MEASURES
 from drillctl.store.tables import Column, Table, chance, quantity
 from drillctl.studies.base import DRAWS, SEED, Picture, Study
 
@@ -25,10 +26,13 @@ def tables(result: WeightDelay) -> Iterator[Table]:
         Column("peak_bit_speed", "mean peak bit speed", "rad/s", hidden=True),
         Column("peak_pipe_torque", "mean peak pipe torque", "N*m", hidden=True),
         Column("mean_weight", "mean WOB", "N"),
+        *(Column(name, f"mean {MEASURES[name].label}", MEASURES[name].unit)
+          for name in result.baseline.axial),
     )  # fmt: skip
     rows = [
         [float(gain), one.delay, one.j1, one.difference, one.difference.draws, one.ended.hits,
-         one.ended.estimate, one.peak_bit_speed, one.peak_pipe_torque, one.mean_weight]
+         one.ended.estimate, one.peak_bit_speed, one.peak_pipe_torque, one.mean_weight,
+         *one.axial.values()]
         for gain, row in zip(result.gains, result.benefits, strict=True)
         for one in row
     ]  # fmt: skip

@@ -35,7 +35,7 @@ from drillctl.ensemble.parameters import Draws, draw, refuse_dependent, uncertai
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.lanes import Lanes
-from drillctl.simulation.measures import MEASURES, STATUSES
+from drillctl.simulation.measures import AXIAL_MEASURES, MEASURES, STATUSES, with_axial
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
@@ -46,7 +46,7 @@ GAIN, DELAY = VARIED
 KEPT = (
     "j1", "peak_bit_speed", "peak_pipe_torque", "mean_weight_on_bit", "mean_weight_after_start",
 )  # fmt: skip
-"""Measures that are kept of a run."""
+"""Measures that are kept of a run, beside those of axial motion."""
 ENOUGH = 0.95  # share of the draws in which stick-slip must have ended
 
 
@@ -62,6 +62,7 @@ class DelayedBenefit:
     peak_bit_speed: float | None  # rad/s
     peak_pipe_torque: float | None  # N m
     mean_weight: float | None  # after the start of the run (N)
+    axial: dict[str, float | None]  # measures of axial motion (SI), where a rig has it
 
     def summary(self) -> dict[str, Any]:
         """As strict JSON values, SI."""
@@ -74,6 +75,7 @@ class DelayedBenefit:
             "ended_share": self.ended.value,
             "ended_interval_95": list(self.ended.interval),
             **picked(self, "peak_bit_speed", "peak_pipe_torque", "mean_weight"),
+            **self.axial,
         }
 
 
@@ -184,6 +186,7 @@ class WeightDelay(Result, Runs, kind="delay"):
             peak_bit_speed=runs.mean("peak_bit_speed"),
             peak_pipe_torque=runs.mean("peak_pipe_torque"),
             mean_weight=runs.mean("mean_weight_after_start"),
+            axial={name: runs.mean(name) for name in AXIAL_MEASURES if name in runs.measures},
         )
 
     def _limits(self, gain: float, benefits: tuple[DelayedBenefit, ...]) -> GainLimits:
@@ -290,7 +293,7 @@ def weight_delay(
     results = []
     for gain in table.gains:
         # The constant weight is the same at any delay.
-        results.append(lanes.run(gain) if gain > 0.0 else constant.over(shape, KEPT))
+        results.append(lanes.run(gain) if gain > 0.0 else constant.over(shape, constant.measures))
         progress.advance(count * len(table.delays))
     runs = joined(results, np.stack)
     return WeightDelay(
@@ -364,7 +367,8 @@ class DelayedLanes:
                 for one in part.groups
             )
             runs = run_draws(DrawnLanes(groups, part.failures), size * self.draws)
-            results.append(runs.over((size, self.draws), KEPT))
+            kept = with_axial(KEPT, groups[0].design.axial is not None)
+            results.append(runs.over((size, self.draws), kept))
         return joined(results, np.concatenate)
 
 
