@@ -31,12 +31,14 @@ from drillctl.studies.recommend.criteria import (
 )
 from drillctl.studies.recommend.window import Window, window
 from drillctl.studies.tune.certificate import FreshDraws, Tolerance, fresh_design, tolerances
-from drillctl.studies.tune.problem import GainRuns, objective_of
+from drillctl.studies.tune.problem import GainRuns, alike, objective_of
+from drillctl.studies.tune.tuned import Tuned, spread
 
 NOMINAL = (
     "j1", "stick_slip_index", "peak_top_torque", "time_at_torque_limit", "time_at_power_limit",
 )  # fmt: skip
 """What is said of the run at nominal rock."""
+LOOKED_AT, FEW_DRAWS = 64, 16  # numbers and draws at which it is seen whether they matter at all
 TOLERANCE_DRAWS = 300  # first of the fresh draws, at which numbers are moved one by one
 PASSES, FRAGILE, FAILS = "passes", "fragile", "does not pass"
 
@@ -177,7 +179,16 @@ def _tolerances(design: Design, share: float) -> tuple[Tolerance, ...]:
         return ()
     fresh = FreshDraws(design.replace({"tune.certificate.realizations": few}), ranges)
     gains = c.gains_of(design)
+    if alike(fresh.problem.points(spread(ranges, LOOKED_AT), FEW_DRAWS)):
+        return tuple(_open(one, gains[one.path], share) for one in ranges)
     return tolerances(fresh, np.array([gains[t.path] for t in ranges]), share, SILENT)
+
+
+def _open(tuned: Tuned, value: float, share: float) -> Tolerance:
+    """That of a number that changes nothing: as far as it is followed."""
+    at = np.array([tuned.low, value, tuned.high])
+    ends = (tuned.low, tuned.high, True, True)
+    return Tolerance(tuned.path, tuned.unit, value, *ends, at, np.full(3, share))
 
 
 def _fragile(one: Assessed) -> Iterable[str]:

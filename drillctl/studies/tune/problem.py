@@ -18,7 +18,7 @@ always the plain statistic.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -306,6 +306,17 @@ class Point:
     def realizations(self) -> int:
         """At how many it was evaluated."""
         return len(self.measures["j1"])
+
+
+ALIKE = 1e-5
+"""Share of the objective under which gains are the same: that of J1 which a step of the batch
+engine leaves open is several times as large."""
+
+
+def alike(points: Sequence[Point]) -> bool:
+    """Whether what sets points apart changes nothing: the top of a rig may turn as it likes."""
+    merits = [point.merit for point in points]
+    return max(merits) - min(merits) <= ALIKE * min(merits)
 
 
 class GainProblem:

@@ -35,7 +35,7 @@ from drillctl.progress import SILENT, Progress
 from drillctl.store.codec import documented, label
 from drillctl.store.json_files import picked
 from drillctl.studies.tune.linear_design import linear_design
-from drillctl.studies.tune.problem import GainProblem, Point
+from drillctl.studies.tune.problem import ALIKE, GainProblem, Point, alike
 from drillctl.studies.tune.tuned import (
     Tuned,
     TunedGains,
@@ -61,13 +61,13 @@ FIRST_STEP, LAST_STEP = 0.01, 1e-3  # of the polish, over the bounds' width
 ROUNDS = 14  # most rounds of it
 
 _merit = attrgetter("merit")
-Note = Callable[[str, Point], None]
-"""Receives the name of a stage that is over and the best point of it."""
+Note = Callable[[str, Sequence[Point]], None]
+"""Receives the name of a stage that is over and its points, the best first."""
 
 
 def optimum(
     problem: GainProblem, known: Sequence[Array] = (), near: float = math.inf, ends: int = 1,
-    note: Note = lambda stage, best: None,
+    note: Note = lambda stage, points: None,
 ) -> Point:  # fmt: skip
     """Gains of the least objective, at all realizations.
 
@@ -78,9 +78,9 @@ def optimum(
     for stage, count, kept in RACE:
         field_ = sorted(problem.points(points, min(count, len(problem))), key=_merit)
         points = np.stack([point.values for point in field_[:kept]])
-        note(stage, field_[0])
+        note(stage, field_)
     population = _evolved(problem, points)
-    note("population", population[0])
+    note("population", population)
     starts = [problem.at_all(point) for point in _apart(problem, population, ends)]
     least = min(start.merit for start in starts)
     near_starts = [start for start in starts if start.merit <= NEAR * least]
@@ -90,7 +90,7 @@ def optimum(
         other = min(problem.points(np.stack(inside), len(problem)), key=_merit)
         if other.merit <= near * best.merit:
             best = min(best, polished(problem, other), key=_merit)
-    note("polish", best)
+    note("polish", [best])
     return best
 
 
@@ -185,8 +185,16 @@ def search(design: Design, progress: Progress = SILENT, verbose: bool = False) -
     problem = search_problem(design, tuned_parameters(design))
     stages: list[dict[str, Any]] = []
 
-    def note(stage: str, best: Point) -> None:
+    def note(stage: str, points: Sequence[Point]) -> None:
         progress.advance(1)
+        best = points[0]
+        if not stages and len(points) > 1 and alike(points):
+            raise InputError(
+                f"nothing between the bounds of {' and '.join(t.path for t in problem.tuned)} "
+                f"changes the objective, {best.value:.4g} s, by more than {ALIKE:.0e} of it: "
+                "there is nothing to tune",
+                "tune.parameters",
+            )
         stages.append({
             "stage": stage, "best": by_path(problem.tuned, best.values), "merit": best.merit,
             "realizations": best.realizations, "trajectories": problem.trajectories,
