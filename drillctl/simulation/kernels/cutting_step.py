@@ -30,6 +30,7 @@ from drillctl.simulation.kernels.arithmetic import (
 from drillctl.simulation.kernels.drive_step import REAL, SAMPLED
 from drillctl.simulation.kernels.rock_step import Outcome
 from drillctl.simulation.kernels.rows import WIDTH
+from drillctl.simulation.kernels.string_step import move_block
 from drillctl.simulation.kernels.variation_step import varies
 from drillctl.simulation.kernels.vectors import Variable, at, each, loop, pick, put, when
 from drillctl.simulation.kernels.weight_step import acting, stays
@@ -245,15 +246,11 @@ def _sink(friction: Any, law: Any, rows: Any) -> tuple[Any, Any]:
     with loop(friction.free.shape[0]) as blocks:
         i = blocks.index
         at_x = (OWN + 2 * i) * WIDTH
-        at_y = at_x + WIDTH
-        a11, a12, a21, a22 = (friction.free[i, k] for k in range(4))
+        free = [friction.free[i, k] for k in range(4)]
         b11, b12, b21, b22 = (friction.push[i, k] for k in range(4))
         x = fma(b21, blow, fma(b12, steady, fma(b11, push, at(rows, at_x))))
-        y = fma(b22, steady, fma(b21, push, at(rows, at_y)))
-        x_free = fma(a12, y, a11 * x)
-        y_free = fma(a22, y, a21 * x)
-        put(rows, at_x, x_free)
-        put(rows, at_y, y_free)
+        y = fma(b22, steady, fma(b21, push, at(rows, at_x + WIDTH)))
+        x_free, y_free = move_block(free, x, y, rows, at_x)
         depth.set(depth.get() + x_free)
         sinking.set(sinking.get() + y_free)
     return depth.get(), sinking.get()

@@ -214,6 +214,16 @@ def _by_modes(string: Any, room: Any, state: Any, work: Any, tracks_top: bool) -
     return Swing(top_angle.get(), speed, top_speed.get(), pipe.get())
 
 
+def move_block(free: Any, x: Any, y: Any, state: Any, place: Any) -> tuple[Any, Any]:
+    """Move a block of two states freely over a step, keep them at a place."""
+    a11, a12, a21, a22 = free
+    x_free = fma(a12, y, a11 * x)
+    y_free = fma(a22, y, a21 * x)
+    put(state, place, x_free)
+    put(state, place + WIDTH, y_free)
+    return x_free, y_free
+
+
 def _by_blocks(string: Any, room: Any, state: Any, work: Any, tracks_top: bool) -> Swing:
     top, bit = at(work, r.TOP_TORQUE), at(work, r.BIT_TORQUE)
     top_angle, bit_speed, top_speed = (Variable(each(0.0)) for _ in range(3))
@@ -224,14 +234,10 @@ def _by_blocks(string: Any, room: Any, state: Any, work: Any, tracks_top: bool) 
             read[k] for k in range(12)
         )
         at_x = 2 * blocks.index * WIDTH
-        at_y = at_x + WIDTH
         x = fma(b12, bit, fma(b11, top, at(state, at_x)))
-        y = fma(b22, bit, fma(b21, top, at(state, at_y)))
+        y = fma(b22, bit, fma(b21, top, at(state, at_x + WIDTH)))
         pipe.set(fma(pipe_y, y, fma(pipe_x, x, pipe.get())))
-        x_free = fma(a12, y, a11 * x)
-        y_free = fma(a22, y, a21 * x)
-        put(state, at_x, x_free)
-        put(state, at_y, y_free)
+        x_free, y_free = move_block((a11, a12, a21, a22), x, y, state, at_x)
         top_angle.set(top_angle.get() + x_free)
         bit_speed.set(bit_speed.get() + y_free)
         if tracks_top:
