@@ -346,7 +346,10 @@ def numbers_of(design: Design, also_kept: NDArray[np.integer[Any]] | None = None
         "damped": not design.string.undamped,
         "full": bool(np.any(np.abs(damping.row - damping.col) > 1)),
         "coupled": bool(np.any(arrays["bands"][f.SIDE_MASS])),
-        **addresses(), "components": components,
+        **addresses(
+            int(plain["drive_kind"]), int(plain["weight_kind"]), bool(plain["wall_nodes"] >= 0)
+        ),
+        "components": components,
         "set_speed": design.speed,
         "drag": float(design.string.ground_damping.sum()) * design.speed,
     }.items():  # fmt: skip

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import inspect
 import math
+from functools import cache
 from typing import Any
 
 import numba
@@ -75,7 +76,10 @@ WHOLE_NUMBERS = (
     "damped", "coupled", "full",  # damping at all; M more than a diagonal; C no band
     "drive_kind", "drive_torque", "rock_torque", "static_torque", "set_valued", "smooth",
     "weight_kind", "weight",  # addresses of `law_calls` among them
-    "rates", "margin", "decision", "weighing",  # addresses of what is compiled by itself
+    # addresses of what is compiled by itself; 0 of what a rig does without
+    "rates", "margin", "decision", "weighing",
+    "driving", "following", "starting", "stopping",
+    "pushing", "holding", "wall_margin", "piece_work", "drift_work",
     "bands", "full_damping", "laws", "observer", "begin", "tape", "path",  # addresses of arrays
     "path_nodes", "wall", "wall_nodes", "drifts", "scratch",
     "components", "steps",  # kept of each step; on the tape
@@ -179,10 +183,18 @@ weight = by_address("weighing", *WEIGHING)
 RATES = (types.float64, types.int64, STATE, STATE)
 rates_of = by_address("rates", *RATES)
 """Rates of a state at a time (s) in a phase, in place; returns the torque on the bit (N m)."""
+DRIVING = (types.float64, STATE, types.float64, types.float64, STATE)
+_with_memory = by_address("driving", *DRIVING)
+FOLLOWING = (types.float64, STATE, types.float64, STATE)
+weight_rates = by_address("following", *FOLLOWING)
+"""Rates of the memory of the weight at a time (s), of a state and the torque at the top (N m)."""
+PUSHING = (STATE, STATE)
+_push_wall, _hold_wall = by_address("pushing", *PUSHING), by_address("holding", *PUSHING)
 
 
-def callable_at(function: Any, *kinds: Any) -> int:
-    """Address of a function of a rig and of `kinds`, compiled by itself."""
+@cache
+def callable_at(function: Any, *kinds: Any) -> Any:
+    """A function of a rig and of `kinds` compiled by itself; it has an `address` as it lives."""
     names = [f"a{k}" for k in range(len(kinds))]
     views = [
         f"carray({name}, rig.states)" if kind is STATE else name
@@ -197,13 +209,7 @@ def callable_at(function: Any, *kinds: Any) -> int:
     )
     exec(compile(text, __file__, "exec"), scope)
     signature = types.float64(types.CPointer(numba.from_dtype(RIG)), *kinds)
-    made = kernel_cache.cfunc(signature, scope[name], **OPTIONS, fastmath={"contract"})
-    _alive.append(made)
-    return int(made.address)
-
-
-_alive: list[Any] = []
-"""Functions whose addresses are in use: each stays while the process lives."""
+    return kernel_cache.cfunc(signature, scope[name], **OPTIONS, fastmath={"contract"})
 
 
 @compiled
@@ -495,8 +501,8 @@ def weight_in_place(rig: Any, time: float, speed: float, state: Any) -> float:
 
 
 @compiled
-def weight_rates(rig: Any, time: float, state: Any, top_torque: float, rates: Any) -> None:
-    """Rates of the memory of the weight."""
+def follow_in_place(rig: Any, time: float, state: Any, top_torque: float, rates: Any) -> float:
+    """What `weight_rates` calls."""
     memory, out, path = memory_of_weight(rig, state), memory_of_weight(rig, rates), law(rig, PATH)
     count = rig.weight_states
     for i in range(count):
@@ -513,10 +519,11 @@ def weight_rates(rig: Any, time: float, state: Any, top_torque: float, rates: An
     if path[HOIST] > 0.0:
         wanted = (_asked(rig, time, state) - memory[count - 1]) / path[HOIST]
         out[count - 1] = min(max(wanted, -path[RATE]), path[RATE])
+    return 0.0
 
 
 @compiled
-def begin_weight(rig: Any, state: Any) -> None:
+def begin_weight(rig: Any, state: Any) -> float:
     """Reading and weight at time zero; the signal's own memory is in the state."""
     begin = numba.carray(_pointer(rig.begin), (rig.states,))
     memory, count = memory_of_weight(rig, state), rig.weight_states
@@ -526,6 +533,7 @@ def begin_weight(rig: Any, state: Any) -> None:
     copy(begin, state)
     memory[count - 1] = _asked(rig, 0.0, state)
     copy(begin, state)
+    return 0.0
 
 
 @compiled
@@ -627,14 +635,24 @@ def slip_torque(rig: Any, time: float, state: Any, phase: int) -> float:
 @compiled
 def drive_torque(rig: Any, time: float, state: Any, free: float, gain: float, rates: Any) -> float:
     """Torque of the drive (N m); writes the rates of its memory."""
+    if rig.drive_kind != IDEAL:
+        return _with_memory(rig, time, state, free, gain, rates)
+    angle, speed, program = state[0], state[rig.nodes], law(rig, SPEED_PROGRAM)
+    if program[0] != 0.0:
+        angle -= path_integral(program, time)
+        speed -= path_at(program, time)
+    return _drive_law(rig, law(rig, DRIVE), angle, speed, 0.0, 0.0)
+
+
+@compiled
+def drive_in_place(
+    rig: Any, time: float, state: Any, free: float, gain: float, rates: Any
+) -> float:
+    """What `drive_torque` calls for a drive with a memory."""
     n, numbers, program = rig.nodes, law(rig, DRIVE), law(rig, SPEED_PROGRAM)
-    angle, speed, lead = state[0], state[n], 0.0
+    speed, lead = state[n], 0.0
     if program[0] != 0.0:
         lead = path_at(program, time)
-    if rig.drive_kind == IDEAL:
-        if program[0] != 0.0:
-            angle -= path_integral(program, time)
-        return _drive_law(rig, numbers, angle, speed - lead, 0.0, 0.0)
     first = 2 * n + WORKS
     memory = state[first : first + rig.drive_states]
     if rig.drive_kind == CONTINUOUS:
@@ -675,7 +693,7 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
         rates[i] = state[n + i]
     _forces(rig, state, force)
     if rig.wall_nodes > 0:
-        wall.push_wall(wall_of(rig), state[n : 2 * n], rig.set_speed, force)
+        _push_wall(rig, state, rates)
     at_bit, bit_torque, count = force[n - 1], 0.0, n - 1
     if not held:
         bit_torque, count = slip_torque(rig, time, state, phase), n
@@ -687,18 +705,35 @@ def rates_in_place(rig: Any, time: float, phase: int, state: Any, rates: Any) ->
     top_torque = drive_torque(rig, time, state, force[0], by_top[0], rates)
     for i in range(n):
         force[i] += by_top[i] * top_torque
+    drift = 0.0
     if rig.wall_nodes > 0:
-        wall.hold_wall(wall_of(rig), band(rig, SIDE_MASS), force)
+        drift = _hold_wall(rig, state, rates)
     if held:
         bit_torque = at_bit - band(rig, SIDE_MASS)[n - 2] * force[n - 2]
     rates[2 * n] = top_torque * (state[n] + rig.set_speed)
     rates[2 * n + 1] = bit_torque * bit_speed(rig, state)
-    rates[2 * n + 2] = _damping_power(rig, state)
-    if rig.drifts:
-        rates[2 * n + 2] += wall.drift_power(wall_of(rig), state[n : 2 * n], rig.set_speed)
+    rates[2 * n + 2] = _damping_power(rig, state) + drift
     if rig.weight_states:
         weight_rates(rig, time, state, top_torque, rates)
     return bit_torque
+
+
+@compiled
+def push_in_place(rig: Any, state: Any, rates: Any) -> float:
+    """Torques of the wall on what slides."""
+    n = rig.nodes
+    wall.push_wall(wall_of(rig), state[n : 2 * n], rig.set_speed, rates[n : 2 * n])
+    return 0.0
+
+
+@compiled
+def hold_in_place(rig: Any, state: Any, rates: Any) -> float:
+    """Torques of the wall on what it holds; the power that it takes from a drifting string (W)."""
+    n = rig.nodes
+    wall.hold_wall(wall_of(rig), band(rig, SIDE_MASS), rates[n : 2 * n])
+    if not rig.drifts:
+        return 0.0
+    return wall.drift_power(wall_of(rig), state[n : 2 * n], rig.set_speed)
 
 
 @compiled

@@ -137,6 +137,19 @@ def _printed_phase(rig: Any, unused: Any, time: float, phase: int, state: Any) -
     return f.PUSHED if _overload(rig, time + f.AHEAD, unused) > 0.0 else f.CREEPING
 
 
+# What is called by its address.
+
+BEGIN_RUN, AT_STOP, BY_ITSELF, BY_WALL = range(4)  # what there is to decide
+_MARGIN = (types.float64, types.int64, types.int64, types.float64, STATE)
+_DECISION = (types.float64, types.int64, types.int64, STATE, STATE)
+_STOP, _WALL_MARGIN = (types.float64, STATE), (types.float64, types.int64, STATE)
+_PIECE, _DRIFT = (types.float64, STATE), (types.float64, types.int64, STATE, STATE, STATE, STATE)
+_margin_of, _decided = f.by_address("margin", *_MARGIN), f.by_address("decision", *_DECISION)
+_started, _stopped = f.by_address("starting", STATE), f.by_address("stopping", *_STOP)
+_wall_margin_of = f.by_address("wall_margin", *_WALL_MARGIN)
+_work_of_piece = f.by_address("piece_work", *_PIECE)
+_work_of_drift = f.by_address("drift_work", *_DRIFT)
+
 # From phase to phase.
 
 
@@ -191,14 +204,15 @@ def _next_stop(rig: Any, clock: Any, time: float) -> float:
 
 
 @f.compiled
-def _stop(rig: Any, time: float, state: Any) -> None:
-    """What happens at a stop."""
+def _stop(rig: Any, time: float, state: Any) -> float:
+    """What happens at a stop, of drives and weights that read at times."""
     if rig.drive_kind == f.SAMPLED:
         turns = time / f.law(rig, f.DRIVE)[DRIVE_PERIOD]
         if abs(turns - round(turns)) < 1e-6:
             f.sample_drive(rig, time, state)
     if rig.weight_kind != f.AT_ONCE:
         f.read_weight(rig, time, state)
+    return 0.0
 
 
 # Events.
@@ -212,7 +226,7 @@ def _margin(rig: Any, time: float, phase: int, which: int, torque: float, state:
     """
     tiny = 1e-300
     if which == 1 and rig.wall_nodes >= 0:
-        return _wall_margin(rig, time, phase, state)
+        return _wall_margin_of(rig, time, phase, state)
     if which == 1 and phase not in (f.CREEPING, f.PUSHED):
         return 1.0
     if phase == f.STUCK:
@@ -312,35 +326,33 @@ def _begin_wall(rig: Any, state: Any) -> None:
 
 
 @f.compiled
-def _decide(rig: Any, time: float, phase: int, what: int, state: Any, unused: Any) -> int:
+def _decide_with_wall(rig: Any, time: float, phase: int, what: int, state: Any, unused: Any) -> int:
     """What happens between two pieces, the nodes of the wall included; the phase that follows."""
-    if rig.wall_nodes < 0:
-        return _decide_bit(rig, time, phase, what, state, unused)
     if what == BEGIN_RUN:
         _begin_wall(rig, state)
     if what == BY_WALL:
         _turn_wall(rig, time, phase, state)
         f.factorise_anew(rig)
         return _settle(rig, time, phase, state)
-    after = _decide_bit(rig, time, phase, what, state, unused)
+    after = _decide(rig, time, phase, what, state, unused)
     if after != phase and what != BEGIN_RUN:
         rig.bit_level = 1.0
     return _settle(rig, time, after, state)
 
 
 @f.compiled
-def _decide_bit(rig: Any, time: float, phase: int, what: int, state: Any, unused: Any) -> int:
+def _decide(rig: Any, time: float, phase: int, what: int, state: Any, unused: Any) -> int:
     """What happens to the bit between two pieces; returns the phase that follows.
 
     A bit that came to rest sticks if the rock can hold it. A bit that was stuck may be loose at
     once after a stop, by a jump of weight or torque.
     """
     if what == BEGIN_RUN and rig.weight_kind != f.AT_ONCE:
-        f.begin_weight(rig, state)
+        _started(rig, state)
     if what == BY_ITSELF:
         _put_at_end(rig, time, phase, state)
-    else:
-        _stop(rig, time, state)
+    elif rig.drive_kind == f.SAMPLED or rig.weight_kind != f.AT_ONCE:
+        _stopped(rig, time, state)
     if what == AT_STOP and abs(phase) == 1:
         return phase
     if rig.tolerance > 0.0:
@@ -360,21 +372,32 @@ def _decide_bit(rig: Any, time: float, phase: int, what: int, state: Any, unused
     return 1 if holding > 0.0 else -1
 
 
-BEGIN_RUN, AT_STOP, BY_ITSELF, BY_WALL = range(4)  # what there is to decide
-_MARGIN = (types.float64, types.int64, types.int64, types.float64, STATE)
-_DECISION = (types.float64, types.int64, types.int64, STATE, STATE)
-_margin_of, _decided = f.by_address("margin", *_MARGIN), f.by_address("decision", *_DECISION)
-
-
 @cache
-def addresses() -> dict[str, int]:
-    """Where the functions lie that a rig is run with, by the fields of `RIG`."""
-    return {
-        "rates": f.callable_at(f.rates_in_place, *f.RATES),
-        "weighing": f.callable_at(f.weight_in_place, *f.WEIGHING),
-        "margin": f.callable_at(_margin, *_MARGIN),
-        "decision": f.callable_at(_decide, *_DECISION),
-    }
+def addresses(drive: int, weight: int, walled: bool) -> dict[str, int]:
+    """Where the functions lie that a rig is run with, by the fields of `RIG`.
+
+    Those alone that kinds of drive and weight, and a wall, ask for: compiling takes seconds.
+    """
+    used = {
+        "rates": (f.rates_in_place, *f.RATES), "weighing": (f.weight_in_place, *f.WEIGHING),
+        "margin": (_margin, *_MARGIN),
+        "decision": (_decide_with_wall if walled else _decide, *_DECISION),
+    }  # fmt: skip
+    if drive != f.IDEAL:
+        used["driving"] = f.drive_in_place, *f.DRIVING
+    if weight != f.AT_ONCE:
+        used |= {
+            "following": (f.follow_in_place, *f.FOLLOWING), "starting": (f.begin_weight, STATE),
+        }  # fmt: skip
+    if drive == f.SAMPLED or weight != f.AT_ONCE:
+        used["stopping"] = _stop, *_STOP
+    if walled:
+        used |= {
+            "pushing": (f.push_in_place, *f.PUSHING), "holding": (f.hold_in_place, *f.PUSHING),
+            "wall_margin": (_wall_margin, *_WALL_MARGIN), "piece_work": (_add_work, *_PIECE),
+            "drift_work": (_add_drift_work, *_DRIFT),
+        }  # fmt: skip
+    return {name: int(f.callable_at(*one).address) for name, one in used.items()}
 
 
 @f.uncounted
@@ -464,7 +487,7 @@ def _end_piece(rig: Any, clock: Any, work: Any, state: Any, what: int) -> None:
     count[PIECES] += 1
     count[IN_PIECE] = 0
     if rig.wall_nodes > 0 and not rig.drifts:
-        _add_work(rig, time - piece[0], state)
+        _work_of_piece(rig, time - piece[0], state)
     if time >= clock.duration:
         return
     after = int(_decided(rig, time, phase, what, state, work.trial))
@@ -479,22 +502,34 @@ def _end_piece(rig: Any, clock: Any, work: Any, state: Any, what: int) -> None:
 
 
 @f.compiled
-def _add_work(rig: Any, length: float, state: Any) -> None:
+def _add_work(rig: Any, length: float, state: Any) -> float:
     """Work of the wall in a piece: torques that stayed, times angles."""
     table = f.wall_of(rig)
     for k in range(rig.wall_nodes):
         turned = state[int(table[wall.NODE, k])] - table[wall.ANGLE, k] + rig.set_speed * length
         torque = table[wall.MODE, k] * table[wall.LEVEL, k] * table[wall.FRICTION, k]
         rig.wall_work += torque * turned
+    return 0.0
 
 
 @f.compiled
-def _add_drift_work(rig: Any, length: float, before: Any, after: Any) -> None:
-    """The same of a string that drifts, in a step: the mean power of its ends."""
-    n, table = rig.nodes, f.wall_of(rig)
-    power = wall.drift_power(table, before[n : 2 * n], rig.set_speed)
-    power += wall.drift_power(table, after[n : 2 * n], rig.set_speed)
+def _add_drift_work(
+    rig: Any, length: float, whole: int, before: Any, after: Any, rates: Any, rates_after: Any
+) -> float:
+    """The same of a string that drifts, in a step: the mean power of its ends.
+
+    Of a `whole` step corrected by the rates of that, to fourth order.
+    """
+    n, table, frame = rig.nodes, f.wall_of(rig), rig.set_speed
+    first, last = before[n : 2 * n], after[n : 2 * n]
+    power = wall.drift_power(table, first, frame)
+    power += wall.drift_power(table, last, frame)
     rig.wall_work += 0.5 * length * power
+    if whole:
+        bent = wall.drift_power_rate(table, first, frame, rates[n : 2 * n])
+        bent -= wall.drift_power_rate(table, last, frame, rates_after[n : 2 * n])
+        rig.wall_work += bent * length**2 / 12.0
+    return 0.0
 
 
 @f.compiled
@@ -601,18 +636,13 @@ def _keep_step(
         now[TIME] = time + until * step
         s.state_at(work, until, work.trial)
         if rig.drifts:
-            _add_drift_work(rig, until * step, state, work.trial)
+            rates = work.stages[0]
+            _work_of_drift(rig, until * step, 0, state, work.trial, rates, rates)
         f.copy(state, work.trial)
         return what
     if rig.drifts:
-        _add_drift_work(rig, step, state, work.after)
-        before, after = state[rig.nodes : 2 * rig.nodes], work.after[rig.nodes : 2 * rig.nodes]
-        rates = work.stages[0, rig.nodes : 2 * rig.nodes]
-        rates_after = work.stages[s.STAGES, rig.nodes : 2 * rig.nodes]
-        table, frame = f.wall_of(rig), rig.set_speed
-        bent = wall.drift_power_rate(table, before, frame, rates)
-        bent -= wall.drift_power_rate(table, after, frame, rates_after)
-        rig.wall_work += bent * step**2 / 12.0
+        rates, ends = work.stages[0], work.stages[s.STAGES]
+        _work_of_drift(rig, step, 1, state, work.after, rates, ends)
     now[TIME] = now[STOP] if step == now[STOP] - time else time + step
     f.copy(state, work.after)
     f.copy(work.stages[0], work.stages[s.STAGES])
