@@ -26,7 +26,8 @@ def tables(result: WeightDelay) -> Iterator[Table]:
         Column("peak_bit_speed", "mean peak bit speed", "rad/s", hidden=True),
         Column("peak_pipe_torque", "mean peak pipe torque", "N*m", hidden=True),
         Column("mean_weight", "mean WOB", "N"),
-        *(Column(name, f"mean {MEASURES[name].label}", MEASURES[name].unit)
+        *(Column(name, f"mean {MEASURES[name].label}", MEASURES[name].unit,
+                 hidden=name != "rate_of_penetration")
           for name in result.baseline.axial),
     )  # fmt: skip
     rows = [
