@@ -14,6 +14,7 @@ import numpy as np
 
 from drillctl.arrays import Array
 from drillctl.errors import InputError, SimulationError
+from drillctl.linear.observer import observer_of
 from drillctl.rig.axial import AxialString
 from drillctl.rig.bit_rock.richard_detournay import RichardDetournay
 from drillctl.rig.bit_rock.variation import NoVariation, Variation, path
@@ -21,22 +22,12 @@ from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.program import OF_A_PATH
 from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.top_drive.real_drive import MEMORY, SAMPLED_MEMORY
-from drillctl.rig.weight_on_bit import PATHS, FollowingSpeed
-from drillctl.simulation.lanes import single_lane
+from drillctl.rig.weight_on_bit import PATHS, AlarmWeight, FollowingSpeed
+from drillctl.simulation.lanes import Start, single_lane
 
 if TYPE_CHECKING:
     from drillctl.design import Design
     from drillctl.simulation.lanes import Lanes
-
-
-def refuse_others(design: Design) -> None:
-    """Refuse (`InputError`) what the reference solver does not follow with axial motion."""
-    if isinstance(design.weight_on_bit, PATHS):
-        raise InputError(
-            "with axial motion the reference solver follows a hook that holds its force, or sets "
-            "it by the bit speed at once; with delays, readings and lags use the batch engine",
-            "weight_on_bit",
-        )
 
 
 class Steady(NamedTuple):
@@ -123,7 +114,6 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
     """Simulate a design with located events."""
     from drillctl.simulation import cutting_events as e
 
-    refuse_others(design)
     assert design.axial is not None
     lane = single_lane(design)
     rock, speed, program = design.bit_rock, design.speed, design.program
@@ -140,13 +130,15 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
     n, m = len(torsion.by_bit), len(axial.by_bit)
     stands = speeds[-1] + speed == 0.0
     drive = _drive(e, design.top_drive)
-    state = np.zeros(n + m + drive.states + e.WORKS)
+    hook, followed, sizes = _hook(design, lane.begin, n + m + drive.states, point.torque)
+    state = np.zeros(n + m + drive.states + hook.states + e.WORKS)
     state[: n // 2], state[n // 2 : n] = torsion.modal @ angles, torsion.modal @ speeds
     if not stands:
         state[n + m // 2 : n + m] = axial.modal @ np.full(axial.modal.shape[1], start.velocity)
     if drive.states:
         held = float(lane.begin_torque[0]) if design.tables.start.kind == "steady" else 0.0
         state[n + m :][: drive.states] = _memory(design.top_drive, drive.states, held, speeds[0])
+    state[hook.first : hook.first + hook.states] = followed
     vary = _varying(design.variation, design.tables.simulation.duration, speed, point.velocity)
     between = 2.0 * math.pi / rock.blades
     scale = np.concatenate([
@@ -158,11 +150,12 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
             speed, point.torque, point.torque, 1.0, point.torque, point.torque, point.torque, speed,
             point.torque,
         ])[: drive.states],
+        sizes,
         np.array([*[point.torque * speed] * 5, speed, nominal]) + 1e-300,
     ])  # fmt: skip
     task = e.Task(
         _side(e, torsion, speed, torque=True), _side(e, axial, point.velocity, torque=False),
-        e.Bit(between, rock.blades), drive, _hook(e, design.weight_on_bit),
+        e.Bit(between, rock.blades), drive, hook,
         _path(program.speed), _path(program.weight), _rock(rock), program.rock_until,
         np.array([*program.breaks(), math.inf]), speed,
         design.tables.simulation.duration, tolerance, scale, start.slope,
@@ -186,10 +179,46 @@ def _path(path: Any) -> Array:
     return numbers
 
 
-def _hook(e: Any, law: Any) -> Any:
-    if isinstance(law, FollowingSpeed):
-        return e.Hook(*map(float, law))
-    return e.Hook(float(law[0]), 0.0, 0.0, -math.inf, math.inf)
+def _hook(design: Design, begin: Start, first: int, torque: float) -> tuple[Any, Array, Array]:
+    """The hook, its memory at time zero, and below which errors in that do not matter."""
+    from drillctl.simulation import reference_rates as f
+    from drillctl.simulation.cutting_hook import Hook
+
+    law, angles, speeds = design.weight_on_bit, begin.angles[:, 0], begin.speeds[:, 0]
+    nominal = float(law[0])  # type: ignore[index]
+    given: dict[str, Any] = dict.fromkeys(Hook._fields, 0.0)
+    given |= {key: float(x) for key, x in law._asdict().items() if key in given}
+    given |= {"kind": f.AT_ONCE, "first": first, "states": 0, "nominal": nominal}
+    given |= {"observer": np.zeros((3, 0))}
+    if not isinstance(law, PATHS):
+        if not isinstance(law, FollowingSpeed):
+            given |= {"least": -math.inf, "most": math.inf}
+        return Hook(**given), np.zeros(0), np.zeros(0)
+    signal, sizes = np.array([abs(speeds[-1] + design.speed)]), np.array([design.speed])
+    given |= {"kind": f.ALARMED if isinstance(law, AlarmWeight) else f.MEASURED}
+    seen, now = observer_of(design), float(signal[0])
+    if seen is not None:
+        signal, modal = seen.state(angles, speeds), seen.from_speed
+        sizes = np.full(seen.states, _size(modal, design.speed))
+        sizes[1 : seen.states // 2] = _size(modal, torque / design.string.static_stiffness)
+        sizes[-1] = torque
+        now = abs(design.speed + float(seen.read @ signal))
+        given |= {
+            "kind": f.OBSERVED, "drag": float(design.string.ground_damping.sum()) * design.speed,
+            "observer": np.vstack([seen.by_torque, seen.by_speed, seen.read, seen.free]),
+        }  # fmt: skip
+    present = nominal * (1.0 + design.program.weight.at(0.0))
+    reading, asked = now, present
+    if isinstance(law, AlarmWeight):
+        reading = 1.0
+    else:
+        asked = float(law.command(now, present))
+    given |= {"begin": now, "states": len(signal) + 2}
+    size = 1.0 if isinstance(law, AlarmWeight) else design.speed
+    return (
+        Hook(**given), np.concatenate([signal, [reading, asked]]),
+        np.concatenate([sizes, [size, nominal]]),
+    )  # fmt: skip
 
 
 def _drive(e: Any, drive: Any) -> Any:
@@ -237,13 +266,15 @@ def _varying(
 
 
 def _run(e: Any, task: Any, state: Array, stands: bool, rock: Array) -> Located:
+    from drillctl.simulation.cutting_tape import COLUMNS, Memory
+
     room, size = 1 << 14, len(state)
     phase = e.STUCK if stands else e.DOWN
     n, m = len(task.torsion.by_bit), len(task.axial.by_bit)
     place = task.torsion.read[0] @ state[:n], task.axial.read[0] @ state[n : n + m]
-    memory = e.Memory(
+    memory = Memory(
         np.array([0.0, 1e-3 * task.bit.between / task.set_speed, *place, 0.0]),
-        np.array([phase, int(not stands), 0, 0, 0, 0]), rock, np.zeros((room, 36)),
+        np.array([phase, int(not stands), 0, 0, 0, 0, 0]), rock, np.zeros((room, COLUMNS)),
         np.zeros((4096, 2)), state.copy(), np.zeros((9, size)),
     )  # fmt: skip
     while True:

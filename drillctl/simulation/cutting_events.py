@@ -12,13 +12,22 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
-from numba.extending import register_jitable
 
 from drillctl.rig import program
 from drillctl.rig.top_drive import real_drive
-from drillctl.simulation import reference_rates
+from drillctl.rig.weight_on_bit import following_speed, stick_slip_alarm
+from drillctl.simulation import cutting_hook, cutting_tape, reference_rates
+from drillctl.simulation.cutting_hook import (
+    Hook,
+    hook_force,
+    hook_rates,
+    keep_followed,
+    longest_delayed,
+    next_reading,
+    read_signal,
+)
+from drillctl.simulation.cutting_tape import CLOSE, FIRST, LAST, compiled, surface
 from drillctl.simulation.kernel_cache import on_disk
 from drillctl.simulation.reference_rates import (
     CONTINUOUS,
@@ -32,8 +41,6 @@ from drillctl.simulation.reference_rates import (
     sampled,
     sampled_of,
 )
-
-compiled = numba.njit(fastmath={"contract"}, nogil=True, error_model="numpy", _nrt=False)
 
 UP, STUCK, DOWN, OFF = -1, 0, 1, 2
 """Axial phases: rising, at rest and sinking in contact with the rock; off bottom.
@@ -49,8 +56,6 @@ WORKS = 7
 """States beside the motion: work of drive, hook, cutting, wear flat and dampers (J), the integral
 of abs(bit speed - set speed) (rad), and the weight's (N s)."""
 MOST_CHANGES = 200_000
-FIRST, LAST = 3, 27  # columns of the tape: of the polynomials, and behind them
-CLOSE = 1e-14  # share of a step to which an event is located
 REACH = 0.3  # share of the angle between two blades that a step may turn
 
 
@@ -93,16 +98,6 @@ class Drive(NamedTuple):
     states: int
 
 
-class Hook(NamedTuple):
-    """Force of hook and string on the bit: at once after its speed, within limits."""
-
-    nominal: float  # N
-    gain: float  # N s/rad
-    set_speed: float  # rad/s
-    least: float  # N
-    most: float
-
-
 class Task(NamedTuple):
     """A run."""
 
@@ -127,24 +122,6 @@ class Task(NamedTuple):
     vary: Any  # shape (5,): spread, spacing, way per time, per angle, per depth
 
 
-class Memory(NamedTuple):
-    """What a run has been through; arrays so that calls can go on."""
-
-    now: Any  # shape (5,): time, next step; angle and depth at the start; energy of impacts (J)
-    # shape (6,): axial phase, torsional one, steps, events; next break, next sample of the drive
-    count: Any
-    rock: Any  # shape (4,): that of the hour
-    # shape (room, 36): begin (s), length (s), 1 if in contact; value, slope and curvature at both
-    # ends of bit angle, depth, top angle and angle of the node below; force on the bit and its
-    # torque at both ends; phases; depth of cut, torque of the drive at both ends
-    tape: Any
-    events: Any  # shape (room, 2): time, kind
-    state: Any
-    # shape (9, states): rates of the seven stages, the state at the end of the step; rates that
-    # nobody keeps
-    work: Any
-
-
 @compiled
 def _dot(row: Any, x: Any, offset: int) -> float:
     total = 0.0
@@ -160,94 +137,6 @@ def _bit(task: Any, x: Any, time: float) -> tuple[float, float, float, float]:
     angle = _dot(task.torsion.read[0], x, 0) + task.set_speed * time
     speed = _dot(task.torsion.read[1], x, 0) + task.set_speed
     return angle, speed, _dot(task.axial.read[0], x, n), _dot(task.axial.read[1], x, n)
-
-
-@register_jitable(fastmath={"contract"}, error_model="numpy")  # called from plain Python too
-def _coefficients(h: float, a: float, va: float, aa: float, b: float, vb: float, ab: float
-                  ) -> tuple[float, float, float, float, float]:  # fmt: skip
-    """Of `hermite`, from the first power of the share to the fifth."""
-    p, q = va * h, vb * h
-    r, s = 0.5 * aa * h * h, 0.5 * ab * h * h
-    d = b - a - p - r
-    e = q - p - 2.0 * r
-    f = s - r
-    c3 = 10.0 * d - 4.0 * e + f
-    c4 = -15.0 * d + 7.0 * e - 2.0 * f
-    c5 = 6.0 * d - 3.0 * e + f
-    return p, r, c3, c4, c5
-
-
-@compiled
-def hermite(x: float, h: float, a: float, va: float, aa: float, b: float, vb: float,
-            ab: float) -> float:  # fmt: skip
-    """Polynomial of degree five through value, slope and curvature at both ends of a step."""
-    p, r, c3, c4, c5 = _coefficients(h, a, va, aa, b, vb, ab)
-    return a + x * (p + x * (r + x * (c3 + x * (c4 + x * c5))))
-
-
-@compiled
-def hermite_slope(x: float, h: float, a: float, va: float, aa: float, b: float, vb: float,
-                  ab: float) -> float:  # fmt: skip
-    """Derivative of `hermite` with respect to the share."""
-    p, r, c3, c4, c5 = _coefficients(h, a, va, aa, b, vb, ab)
-    return p + x * (2.0 * r + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))
-
-
-@compiled
-def on_step(memory: Any, step: int, share: float, which: int) -> float:
-    """Bit angle (0), depth (1), top angle (2) or that of the node below at a share of a step."""
-    row, k = memory.tape[step], FIRST + 6 * which
-    return hermite(
-        share, row[1], row[k], row[k + 1], row[k + 2], row[k + 3], row[k + 4], row[k + 5]
-    )
-
-
-@compiled
-def slope_on_step(memory: Any, step: int, share: float, which: int) -> float:
-    """Rate of the same."""
-    row, k, h = memory.tape[step], FIRST + 6 * which, memory.tape[step, 1]
-    return (
-        hermite_slope(share, h, row[k], row[k + 1], row[k + 2], row[k + 3], row[k + 4], row[k + 5])
-        / h
-    )
-
-
-@compiled
-def surface(bit: Any, slope: float, memory: Any, angle: float) -> float:
-    """Depth of the rock where the bit was at an angle, as it left it."""
-    tape, begin = memory.tape, memory.now[2]
-    while True:
-        steps = memory.count[2]
-        if steps == 0 or angle <= begin:
-            return memory.now[3] + slope * (angle - begin)
-        low, high = 0, steps - 1
-        while low < high:  # the first step that ends at the angle or beyond
-            middle = (low + high) // 2
-            if tape[middle, FIRST + 3] >= angle:
-                high = middle
-            else:
-                low = middle + 1
-        if tape[low, 2] != 0.0:
-            break
-        angle -= bit.between  # not cut then: as a blade before has left it
-    a, b = tape[low, FIRST], tape[low, FIRST + 3]
-    if angle >= b or b <= a:
-        return tape[low, FIRST + 9]
-    left, right, x = 0.0, 1.0, (angle - a) / (b - a)
-    for _ in range(60):
-        value = on_step(memory, low, x, 0) - angle
-        if value > 0.0:
-            right = x
-        else:
-            left = x
-        rise = slope_on_step(memory, low, x, 0) * tape[low, 1]
-        new = x - value / rise if rise > 0.0 else 0.5 * (left + right)
-        if not left < new < right:
-            new = 0.5 * (left + right)
-        if abs(new - x) < CLOSE:
-            break
-        x = new
-    return on_step(memory, low, x, 1)
 
 
 @compiled
@@ -274,15 +163,6 @@ class Contact(NamedTuple):
     spare: Any  # torque of the rock beyond what holds a bit that stands still (N m)
     cutting: Any  # force of the cutters (N)
     hook: Any  # of hook and string (N)
-
-
-@compiled
-def _hook(task: Any, time: float, speed: float) -> float:
-    """Force of hook and string on the bit (N)."""
-    hook, nominal = task.hook, task.hook.nominal
-    if task.weight[0] != 0.0:
-        nominal *= 1.0 + path_at(task.weight, time)
-    return min(max(nominal + hook.gain * (speed - hook.set_speed), hook.least), hook.most)
 
 
 @compiled
@@ -330,7 +210,7 @@ def _contact(
     depth = place - surface(task.bit, task.slope, memory, angle - task.bit.between)
     hard = hardness(task, time, angle, place, memory)
     cut = rock[PER_DEPTH] * hard * depth if axial != OFF else 0.0
-    hook = _hook(task, time, speed if turning else 0.0)
+    hook = hook_force(task, memory, time, speed if turning else 0.0, x)
     share = 0.0
     if axial == DOWN:
         share = 1.0
@@ -385,12 +265,14 @@ def _rates(
             rate += other.a[i, j] * x[n + j]
         out[n + i] = rate
     _, speed, _, sinking = _bit(task, x, time)
-    first = n + m + task.drive.states
+    first = n + m + task.drive.states + task.hook.states
     if held:
         force, sinking = now.hook - push, 0.0
-    out[first] = now.top * (_dot(torsion.read[3], x, 0) + task.set_speed)
-    out[first + 1] = now.hook * sinking + _dot(other.read[6], x, n)
     turned = 0.0 if not turning else speed
+    top_speed = _dot(torsion.read[3], x, 0)
+    hook_rates(task, memory, time, turned, (now.top, top_speed), x, out)
+    out[first] = now.top * (top_speed + task.set_speed)
+    out[first + 1] = now.hook * sinking + _dot(other.read[6], x, n)
     flat = force - now.cutting
     flat_torque = memory.rock[FLAT_TORQUE] / memory.rock[FLAT] * flat
     out[first + 2] = now.cutting * sinking + (now.torque - flat_torque) * turned
@@ -462,6 +344,7 @@ def _ends(task: Any, memory: Any, row: Any, column: int, time: float, x: Any, ra
         row[k] = _dot(read[pair], x, 0) + turned
         row[k + 1] = _dot(read[pair + 1], x, 0) + task.set_speed
         row[k + 2] = _dot(read[pair + 1], rates, 0)
+    keep_followed(task.hook, row, column // 3, x, rates)
 
 
 @compiled
@@ -576,12 +459,12 @@ def _next_stop(task: Any, memory: Any) -> float:
     stop = task.breaks[memory.count[4]]
     if task.drive.kind == SAMPLED:
         stop = min(stop, memory.count[5] * sampled_of(task.drive.numbers).period)
-    return stop
+    return min(stop, next_reading(task.hook, memory.count[6]))
 
 
 @compiled
 def _turn_over(task: Any, memory: Any) -> None:
-    """Pass what is due now: a break, a sample of the drive."""
+    """Pass what is due now: a break, a sample of the drive, a reading of the weight."""
     time, count, x = memory.now[0], memory.count, memory.state
     close = 1e-12 * task.duration
     while task.breaks[count[4]] <= time + close:
@@ -599,6 +482,9 @@ def _turn_over(task: Any, memory: Any) -> None:
             for i in range(9):
                 x[first + i] = after[i]
             count[5] += 1
+    if next_reading(task.hook, count[6]) <= time + close:
+        read_signal(task, memory, count[6], x)
+        count[6] += 1
 
 
 def _advance(task: Any, memory: Any, most: int) -> int:
@@ -619,6 +505,7 @@ def _advance(task: Any, memory: Any, most: int) -> int:
         begin = _margins(task, memory, time, axial, turning, memory.state, margins[0])
         _, speed, _, _ = _bit(task, memory.state, time)
         longest = REACH * task.bit.between / max(speed, task.set_speed)
+        longest = min(longest, longest_delayed(task.hook))
         h = min(now[1], longest, task.duration - time, _next_stop(task, memory) - time)
         if fresh:
             h = min(h, 1e-3 * longest)
@@ -679,6 +566,19 @@ def _advance(task: Any, memory: Any, most: int) -> int:
 
 
 advance = on_disk(
-    _advance, __file__, program.__file__, real_drive.__file__, reference_rates.__file__
+    _advance,
+    __file__,
+    *(
+        str(one.__file__)
+        for one in (
+            cutting_hook,
+            cutting_tape,
+            program,
+            real_drive,
+            reference_rates,
+            following_speed,
+            stick_slip_alarm,
+        )
+    ),
 )
 """Compiled, and kept on disk under a name that its source is part of."""

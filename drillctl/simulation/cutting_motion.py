@@ -12,6 +12,8 @@ from drillctl.arrays import Array
 from drillctl.rig.top_drive import RealDrive
 from drillctl.simulation import cutting
 from drillctl.simulation import cutting_events as e
+from drillctl.simulation import cutting_tape as tape
+from drillctl.simulation.cutting_tape import FIRST, LAST
 from drillctl.simulation.measures import EnergyAudit, Event
 
 if TYPE_CHECKING:
@@ -47,12 +49,12 @@ class CuttingMotion:
     @cached_property
     def directions(self) -> Array:
         """1 in each step that the bit turns in, 0 where it stands still."""
-        return (self._tape[:, e.LAST + 4] > 5.0).astype(float)
+        return (self._tape[:, LAST + 4] > 5.0).astype(float)
 
     @cached_property
     def axial(self) -> Array:
         """Axial phase of each step."""
-        return self._tape[:, e.LAST + 4] - 10.0 * self.directions
+        return self._tape[:, LAST + 4] - 10.0 * self.directions
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -67,9 +69,9 @@ class CuttingMotion:
         step = np.minimum(np.searchsorted(self.ends, time), len(self.ends) - 1)
         row, h = self._tape[step], self._tape[step, 1]
         share = np.clip((time - row[:, 0]) / h, 0.0, 1.0)
-        k = e.FIRST + 6 * which
+        k = FIRST + 6 * which
         numbers = (row[:, k + i] for i in range(6))
-        made = (e.hermite_slope if slope else e.hermite).py_func(share, h, *numbers)
+        made = (tape.hermite_slope if slope else tape.hermite).py_func(share, h, *numbers)
         return np.asarray(made / h if slope else made)
 
     def _between(self, column: int, time: Array) -> Array:
@@ -143,7 +145,7 @@ class CuttingMotion:
         bit = self.bit_angle(time)
         spring, damper = design.string.element_stiffness[0], design.string.element_damping[0]
         if isinstance(design.top_drive, RealDrive):
-            drive = self._between(e.LAST + 7, time)
+            drive = self._between(LAST + 7, time)
         else:
             program = design.program.speed
             led = np.array([[program.at(t), program.integral(t)] for t in time]).T
@@ -157,8 +159,8 @@ class CuttingMotion:
             "top_torque": drive,
             "pipe_torque": spring * (top - below)
             + damper * (top_speed - self._values(BELOW, time, slope=True)),
-            "bit_torque": self._between(e.LAST + 2, time),
-            "weight_on_bit": self._between(e.LAST, time),
+            "bit_torque": self._between(LAST + 2, time),
+            "weight_on_bit": self._between(LAST, time),
             "stuck": still.astype(float),
             "bit_depth": self._values(DEPTH, time),
             "penetration": self._values(DEPTH, time, slope=True),
@@ -167,8 +169,8 @@ class CuttingMotion:
     def axial_measures(self) -> dict[str, float]:
         """What the axial motion adds to the measures."""
         lengths, duration = self._tape[:, 1], self.design.tables.simulation.duration
-        cut = 0.5 * (self._tape[:, e.LAST + 5] + self._tape[:, e.LAST + 6])
-        drilled = float(self._tape[-1, e.FIRST + 9] - self._tape[0, e.FIRST + 6])
+        cut = 0.5 * (self._tape[:, LAST + 5] + self._tape[:, LAST + 6])
+        drilled = float(self._tape[-1, FIRST + 9] - self._tape[0, FIRST + 6])
         return cutting.axial_measures(
             self.design.bit_rock, duration, drilled,
             float(cut @ lengths) / duration, float(lengths[self.axial == e.STUCK].sum()),

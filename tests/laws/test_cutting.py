@@ -13,6 +13,11 @@ from drillctl.errors import InputError
 from drillctl.simulation import cutting
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.simulation.lanes import Lanes, Start, lane_numbers, lanes_of
+from drillctl.simulation.measures import AXIAL_MEASURES
+from drillctl.studies.compare import STUDY
+from drillctl.studies.tune.problem import alike
+from drillctl.studies.tune.search import search_problem
+from drillctl.studies.tune.tuned import spread, tuned_parameters
 from drillctl.units import SI
 
 UNIT = math.sqrt(116.0 / 938.0)  # s
@@ -220,9 +225,30 @@ def test_a_pipe_of_elements_is_the_same_in_both_engines(top):
     assert batch.step < relaxes / 59.0
 
 
+def test_short_pieces_of_a_tally_have_their_part_of_the_axial_string():
+    """Those that are lumped into a neighbour in torsion are so along the axis."""
+    values = {key: PIPE[key] for key in ("bit_rock", "operating_point.weight_on_bit", "start")}
+    one = drillctl.load("typical-land").replace(values | {"axial.model": "elements"})
+    assert any(section.lumped for section in one.string.parts.sections)
+    assert one.axial.nodes == one.string.nodes
+    assert one.axial.total == pytest.approx(one.replace({"axial.model": "lumped"}).axial.total)
+    assert one.axial.total > 1.3e5
+
+
+RIG = {
+    "top_drive.inertia": "500 kg*m^2", "controller.kp": 400.0, "controller.ki": 200.0,
+    "simulation.duration": "7 s", "start.bit_speed": "35 rpm",
+}  # fmt: skip
 DRIVES = {
-    # a limited drive on its way through changes of set speed, hook and rock
+    # a limited drive on its way through changes of set speed, hook and rock, under a hook that
+    # follows the bit speed late
     "limited": {
+        "weight_on_bit": {
+            "law": "navarro-lopez-suarez", "gain": "2 kN*s/rad", "path": {
+                "delay": "0.3 s", "sensor_lag": "0.1 s", "hoist_lag": "0.2 s",
+                "rate_limit": "30 kN/s",
+            },
+        },
         "controller.drive": {"torque_limit": "5.5 kN*m", "lag": "20 ms", "encoder_lag": "5 ms"},
         "scenario.speed": {"start": "40 rpm", "begin": "1 s", "end": "2 s"},
         "scenario.weight_on_bit": {"start": "95 kN", "begin": "3 s", "end": "3 s"},
@@ -238,23 +264,68 @@ DRIVES = {
 
 @pytest.mark.parametrize("name", DRIVES)
 def test_drives_programs_and_hooks_are_the_same_in_both_engines(design, name):
-    rig = {
-        "top_drive.inertia": "500 kg*m^2", "controller.kp": 400.0, "controller.ki": 200.0,
-        "simulation.duration": "7 s", "start.bit_speed": "35 rpm",
-    }  # fmt: skip
-    one = design.replace(rig | DRIVES[name])
+    one = design.replace(RIG | DRIVES[name])
     exact, batch = drillctl.simulate(one), drillctl.simulate(one, "batch")
     assert exact.energy.relative_residual < 1e-6
     for measure in ("j1", "work_at_bit", "mean_weight_on_bit", "peak_top_torque",
                     "rate_of_penetration", "mean_bit_speed"):  # fmt: skip
         value = getattr(exact.measures, measure)
         assert getattr(batch.measures, measure) == pytest.approx(value, rel=2e-3), measure
-    plain = drillctl.simulate(design.replace(rig), "batch").measures.j1
+    plain = drillctl.simulate(design.replace(RIG), "batch").measures.j1
     assert abs(batch.measures.j1 / plain - 1.0) > 0.01
     if name == "limited":
         limit = exact.measures.time_at_torque_limit
         assert limit > 0.3
         assert batch.measures.time_at_torque_limit == pytest.approx(limit, abs=0.02)
+
+
+FEW = {
+    "tune.realizations": 8, "tune.certificate.realizations": 100, "uncertainty.realizations": 8,
+    "simulation.duration": "2 s", "map.audit_cells": 0,
+}  # fmt: skip
+
+
+def test_gains_that_change_nothing_are_not_searched(design):
+    """The top turns as it likes: a search over its gains would follow rounding."""
+    few = design.replace(FEW)
+    with pytest.raises(InputError, match="there is nothing to tune"):
+        drillctl.tune(few)
+    found = drillctl.recommend(few)
+    assert "there is nothing to tune" in found.left_out["PI, robust"]
+    assert [one.low for one in found.present.tolerance] == [250.0, 125.0]
+    assert all(one.low_at_bound and one.high_at_bound for one in found.present.tolerance)
+    # Where the top gives way gains matter.
+    light = few.replace({"top_drive.inertia": "50 kg*m^2"})
+    problem = search_problem(light, tuned_parameters(light))
+    assert not alike(problem.points(spread(problem.tuned, 16), 4))
+
+
+def test_comparisons_list_the_axial_motion(design):
+    faster = {"name": "faster", "set": {"operating_point.speed": "60 rpm"}}
+    cases = [{"name": "slower"}, faster]
+    result = drillctl.compare(design.replace(FEW | {"compare": {"cases": cases, "maps": False}}))
+    for name in AXIAL_MEASURES:
+        assert result.summary()["cases"]["faster"]["measures"][name]["defined"] == 8, name
+    labels = [row[1] for row in next(iter(STUDY.tables(result))).rows]
+    assert "mechanical specific energy" in labels
+    rates = [one.mean("rate_of_penetration") for one in result.cases]
+    assert rates[1] > rates[0] > 0.0
+
+
+@pytest.mark.slow
+def test_constant_and_following_hooks_are_tuned_and_compared(design):
+    values = {
+        "advantage": {
+            "realizations": 6, "sweep_realizations": 4, "region_points": 2,
+            "region_realizations": 4, "weights": ["100 kN"], "speeds": ["60 rpm"],
+            "delays": ["0 s", "0.5 s"],
+        },
+    }  # fmt: skip
+    result = drillctl.advantage(design.replace(RIG | FEW | values))
+    for case in result.cases:
+        assert set(AXIAL_MEASURES) <= set(case.summary(result.baseline, (20.0,), 1)["means"])
+        assert case.mean("rate_of_penetration") > 0.0
+    assert result.front.figures["objective"].size == 3
 
 
 def test_gains_of_a_drive_that_nothing_slows_down_have_bounds(design):
@@ -263,10 +334,39 @@ def test_gains_of_a_drive_that_nothing_slows_down_have_bounds(design):
         assert design.replace({path: most}).tables.controller.ki <= 1e8
 
 
+HOOKS = {
+    "late": {
+        "law": "navarro-lopez-suarez", "gain": "2 kN*s/rad", "path": {"delay": "0.7 s"},
+    },
+    "read at times": {
+        "law": "navarro-lopez-suarez", "gain": "2 kN*s/rad",
+        "path": {"delay": "0.3 s", "sampling_period": "0.5 s"},
+    },
+    "on an alarm": {
+        "law": "stick-slip-alarm", "window": "1.5 s", "alarm": 0.15, "calm": 0.05,
+        "path": {"delay": "0.2 s"},
+    },
+    "observed": {
+        "law": "surface-observer", "gain": "2 kN*s/rad", "observer_modes": 1,
+        "path": {"delay": "0.1 s", "hoist_lag": "0.2 s"},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.slow  # a kernel for each
+@pytest.mark.parametrize("name", HOOKS)
+def test_hooks_with_a_memory_are_the_same_in_both_engines(design, name):
+    one = design.replace(RIG | {"weight_on_bit": HOOKS[name]})
+    exact, batch = drillctl.simulate(one), drillctl.simulate(one, "batch")
+    assert exact.energy.relative_residual < 1e-6
+    for measure in ("j1", "work_at_bit", "mean_weight_on_bit", "rate_of_penetration"):
+        value = getattr(exact.measures, measure)
+        assert getattr(batch.measures, measure) == pytest.approx(value, rel=2e-3), measure
+    constant = drillctl.simulate(design.replace(RIG)).measures.j1
+    assert abs(exact.measures.j1 / constant - 1.0) > 0.01
+
+
 def test_what_it_does_not_go_with_is_refused(design):
-    late = {"law": "navarro-lopez-suarez", "gain": "2 kN*s/rad", "path": {"delay": "1 s"}}
-    with pytest.raises(InputError, match="batch engine"):
-        drillctl.simulate(design.replace({"weight_on_bit": late}))
     held = {"axial.top": "velocity", "axial.model": "elements"}
     program = {"scenario.weight_on_bit": {"start": "90 kN", "begin": "1 s", "end": "2 s"}}
     with pytest.raises(InputError, match="no hook sets a force"):
