@@ -13,7 +13,7 @@ import argparse
 import time
 
 import drillctl
-from drillctl import catalog
+from drillctl import catalog, units
 from drillctl.errors import InputError
 from drillctl.studies.recommend.assess import assessed
 from drillctl.studies.recommend.candidates import Candidate
@@ -33,7 +33,7 @@ def verdict(name: str, values: dict[str, str]) -> str:
             name,
             found.verdict,
             f"again: {again.verdict}, P = {again.probability:.4g}",
-            found.sentence,
+            units.told(found.sentence, "si"),
             *(one.sentence for one in found.confirmed),
         )
     )

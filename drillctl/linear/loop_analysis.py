@@ -13,13 +13,14 @@ from drillctl import units
 from drillctl.arrays import Array, ComplexArray, finite, own_errstate
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.ends import BitSide, bit_side, ends_of, weight_path
+from drillctl.linear.ends import BitSide, Route, bit_side, ends_of, weight_path
 from drillctl.linear.loop_margins import Margins, margins, weight_delay_margin, whole_crossings
 from drillctl.linear.loop_model import loop_poles, model_poles
 from drillctl.linear.mesh_limited import Figures, figures_of, mesh_limited
 from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
 from drillctl.linear.regenerative import CuttingLoop, cutting_loop
 from drillctl.linear.slope_margin import slope_margin
+from drillctl.rig.weight_on_bit import RealWeight
 from drillctl.store.codec import label
 from drillctl.store.result import Result
 
@@ -145,9 +146,12 @@ def loop(design: Design) -> LoopAnalysis:
     ends, bit = ends_of(string), bit_side(design, point.slope, point.speed)
     tolerated, omega = tolerated_slope(design, point.speed)
     # Two gains describe the drive, and a weight that acts at once is in the slope already.
-    simple = design.simple_loop
-    gains = design.linear_drive.gains()
-    poles = loop_poles(string, *gains, point.slope) if simple else model_poles(design, bit)
+    at_once = not isinstance(design.weight_on_bit, RealWeight)
+    poles = (
+        loop_poles(string, *design.linear_drive.gains(), point.slope)
+        if design.simple_loop
+        else model_poles(design, bit)
+    )
     stable = bool(point.slope < tolerated)
     cutting = None if design.axial is None else cutting_loop(design)
     at_top = margins(ends, design.linear_drive, bit, poles) if stable else None
@@ -166,18 +170,20 @@ def loop(design: Design) -> LoopAnalysis:
         poles=poles,
         slope_margin=tolerated,
         deciding_frequency_hz=omega / (2.0 * math.pi),
-        continuum_slope_margin=_continuum(design, *gains) if simple else None,
+        continuum_slope_margin=_continuum(design, point.speed),
         margins=at_top,
         weight_delay_margin=later,
         mesh_limited=mesh_limited(design, figures, bit, moving, poles),
-        critical_speed=critical_speed(design, tolerated) if simple else None,
-        critical_weight_on_bit=critical_weight_on_bit(design, tolerated) if simple else None,
+        critical_speed=critical_speed(design, tolerated) if at_once else None,
+        critical_weight_on_bit=critical_weight_on_bit(design, tolerated) if at_once else None,
     )
 
 
-def tolerated_slope(design: Design, speed: float) -> tuple[float, float]:
+def tolerated_slope(
+    design: Design, speed: float, model: Route = "finite-elements"
+) -> tuple[float, float]:
     """Slope margin of any loop about steady drilling at a speed (rad/s)."""
-    ends = ends_of(design.sliding_string)
+    ends = ends_of(design.sliding_string, model)
     if design.simple_loop:
         return slope_margin(ends, *design.linear_drive.gains())
     bit = bit_side(design, 0.0, speed)
@@ -202,10 +208,10 @@ def _moving(design: Design, point: OperatingPoint) -> BitSide | None:
     return BitSide(held, path)
 
 
-def _continuum(design: Design, kp: float, ki: float) -> float | None:
+def _continuum(design: Design, speed: float) -> float | None:
     if design.string.parts.modal_damping > 0.0:
         return None
-    return slope_margin(ends_of(design.sliding_string, "wave"), kp, ki)[0]
+    return finite(tolerated_slope(design, speed, "wave")[0])
 
 
 def critical_speed(design: Design, tolerated: float | None = None) -> float | None:
@@ -224,7 +230,7 @@ def critical_speed(design: Design, tolerated: float | None = None) -> float | No
         The one nearest to the set speed in ratio (rad/s); None if there is none from a
         thousandth to twenty times the set speed.
     """
-    limit = _margin(design) if tolerated is None else tolerated
+    limit = tolerated_slope(design, design.speed)[0] if tolerated is None else tolerated
     return _nearest_zero(
         lambda speed: at_speed(design, speed).slope - limit, design.speed * SPEEDS, design.speed
     )
@@ -246,7 +252,7 @@ def critical_weight_on_bit(design: Design, tolerated: float | None = None) -> fl
         The one nearest to the design's weight in ratio (N); None if there is none, or only
         outside the friction table where the design refuses that.
     """
-    limit = _margin(design) if tolerated is None else tolerated
+    limit = tolerated_slope(design, design.speed)[0] if tolerated is None else tolerated
     nominal = design.tables.operating_point.weight_on_bit
     if nominal == 0.0:
         return None
@@ -265,10 +271,6 @@ def _weights(design: Design, nominal: float) -> Array:
     """Weights to look at (N), and the rows of the friction table, where its slope breaks."""
     rows = getattr(design.tables.bit_rock, "table", None) or ()
     return np.unique([*(nominal * WEIGHTS), *(row.weight_on_bit for row in rows)])
-
-
-def _margin(design: Design) -> float:
-    return slope_margin(ends_of(design.sliding_string), *design.linear_drive.gains())[0]
 
 
 def _nearest_zero(function: Callable[[float], float], points: Array, about: float) -> float | None:

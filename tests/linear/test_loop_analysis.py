@@ -367,3 +367,16 @@ def test_poles_of_the_exact_string_are_found(kp):
     low = of_400[(of_400.imag > 0.0) & (np.abs(of_400) < 30.0)]
     nearest = np.abs(poles[None, :] - low[:, None]).min(axis=1)
     assert (nearest < 2.5e-4 * np.abs(low)).all()
+
+
+@pytest.mark.parametrize("law", ["z-torque", "active-damping"])
+def test_a_drive_with_torque_fed_back_has_critical_points_too(law):
+    design = drillctl.load("six-drives-100kn", **{"controller.law": law})
+    found = loop(design)
+    assert found.continuum_slope_margin == pytest.approx(found.slope_margin, rel=1e-3)
+    for path, value in (
+        ("operating_point.speed", found.critical_speed),
+        ("operating_point.weight_on_bit", found.critical_weight_on_bit),
+    ):
+        there = operating_point(design.replace({path: units.SI(value)}))
+        assert there.slope == pytest.approx(found.slope_margin, rel=1e-6)

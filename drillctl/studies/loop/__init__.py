@@ -73,9 +73,12 @@ def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
         ("bit torque at that speed", steady.bit_torque, "N*m"),
         ("falling slope of the rock, −dT/dω", steady.slope, SLOPE),
         ("falling slope that the loop tolerates, D*", result.slope_margin, SLOPE),
-        ("critical speed (stability changes)", result.critical_speed, "rad/s"),
-        ("nearest weight at which stability changes", result.critical_weight_on_bit, "N"),
     )
+    if result.bit_side.path is None:  # a weight that is late is another one at each speed
+        rows += (
+            ("critical speed (stability changes)", result.critical_speed, "rad/s"),
+            ("nearest weight at which stability changes", result.critical_weight_on_bit, "N"),
+        )
     cut = result.cutting
     if cut is not None:
         rows += (
@@ -84,7 +87,10 @@ def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
             ("speed above which axial motion alone is stable", cut.boundary_speed, "rad/s"),
             ("roots in the right half-plane", float(cut.unstable_roots), "1"),
         )
-    return [[name, Quantity(value, unit), Unit(unit)] for name, value, unit in rows]
+    return [
+        [name, "none" if value is None else Quantity(value, unit), Unit(unit)]
+        for name, value, unit in rows
+    ]
 
 
 def _margins(result: LoopAnalysis) -> list[list[Any]]:
@@ -93,8 +99,10 @@ def _margins(result: LoopAnalysis) -> list[list[Any]]:
         ("falling slope of the rock, −dT/dω", result.operating_point.slope, SLOPE, ""),
         ("slope margin D*", result.slope_margin, SLOPE, "slope_margin"),
         ("deciding frequency", result.deciding_frequency_hz, "Hz", ""),
-        ("slope margin of the continuous string", result.continuum_slope_margin, SLOPE, ""),
     ]
+    if result.continuum_slope_margin is not None:
+        rows.append(("slope margin of the continuous string", result.continuum_slope_margin, SLOPE,
+                     ""))  # fmt: skip
     margins = result.margins
     if margins is not None:
         rows += [

@@ -106,7 +106,8 @@ def sentence(result: Recommendation) -> str:
     helps = "; ".join(result.helps)
     if best.verdict == FAILS:
         worst = max(best.missed, key=lambda one: one.miss)
-        missed = f"misses by {100 * worst.miss:.0f} %: {worst.said}"
+        by = "far" if worst.miss >= 1.0 else f"{100 * worst.miss:.0f} %"
+        missed = f"misses by {by}: {worst.said}"
         others = [one.said for one in best.missed if one is not worst]
         also = f"; also {'; '.join(others)}" if others else ""
         return (
