@@ -165,6 +165,7 @@ const pictures = (() => {
     if (!one || !width || !height) return;
     on.font = FONT;
     on.textBaseline = "middle";
+    on.lineJoin = "round";
     on.fillStyle = colour("paper");
     on.fillRect(0, 0, width, height);
     const frame = made.frame = framed(one, made), { left, right, top, bottom, across, up } = frame;
@@ -187,30 +188,19 @@ const pictures = (() => {
     if (made.cross) cross(made.cross);
   }
 
-  // The cross of the map, on a canvas of its own.
+  // The cross of the map is of elements that are moved: a canvas over it would be copied each time.
   function cross(at) {
-    const made = board("map"), { over, width, height, frame } = made, on = over.getContext("2d");
+    const made = board("map"), { over, width, height, frame } = made;
     made.cross = at;
     if (!frame) return;
-    const { left, right, top, bottom, across, up } = frame, x = across.at(at[0]), y = up.at(at[1]);
-    on.clearRect(0, 0, width, height);
-    on.strokeStyle = "#000";
-    on.lineWidth = 1;
-    on.beginPath();
-    on.moveTo(x, top); on.lineTo(x, bottom);
-    on.moveTo(left, y); on.lineTo(right, y);
-    on.stroke();
-    on.lineWidth = 2;
-    on.fillStyle = "rgba(255,255,255,.6)";
-    on.beginPath();
-    on.arc(x, y, 9, 0, 2 * Math.PI);
-    on.fill();
-    on.stroke();
+    const { left, right, top, bottom, across, up } = frame, x = across.at(at[0]) - left, y = up.at(at[1]) - top;
+    over.style.inset = `${top}px ${width - right}px ${height - bottom}px ${left}px`;
+    for (const one of over.children) one.style.transform = `translate(${one.dataset.x * x}px, ${one.dataset.y * y}px)`;
   }
 
   // Values of the map at a place (px) of the page, inside its frame.
   function under(event) {
-    const { over, frame: { left, right, top, bottom, across, up } } = board("map"), box = over.getBoundingClientRect();
+    const { canvas, frame: { left, right, top, bottom, across, up } } = board("map"), box = canvas.getBoundingClientRect();
     const inside = (value, low, high) => Math.min(high, Math.max(low, value));
     return [across.back(inside(event.clientX - box.left, left, right)), up.back(inside(event.clientY - box.top, top, bottom))];
   }
@@ -218,16 +208,14 @@ const pictures = (() => {
   // ---- canvases
   function board(name) {
     if (boards[name]) return boards[name];
-    const home = document.getElementById(name), [canvas, over] = home.querySelectorAll("canvas");
+    const home = document.getElementById(name), [canvas, over] = home.children;
     const made = boards[name] = { canvas, over, on: canvas.getContext("2d") };
     const size = () => {
       made.width = home.clientWidth;
       made.height = home.clientHeight;
-      for (const one of home.querySelectorAll("canvas")) {
-        one.width = made.width * devicePixelRatio;
-        one.height = made.height * devicePixelRatio;
-        one.getContext("2d").scale(devicePixelRatio, devicePixelRatio);
-      }
+      canvas.width = made.width * devicePixelRatio;
+      canvas.height = made.height * devicePixelRatio;
+      made.on.scale(devicePixelRatio, devicePixelRatio);
     };
     size();
     new ResizeObserver(() => {

@@ -15,7 +15,7 @@ import contourpy
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array
+from drillctl.arrays import Array, ComplexArray
 from drillctl.design.paths import USUAL_NAMES
 from drillctl.ensemble.grid import Axis
 from drillctl.explorer.computed import Share
@@ -33,7 +33,8 @@ Place = tuple[float, float]
 REQUIRED = 1.10  # slope margin over slope that a recommendation requires by default
 SHARES = (0.05, 0.5, 0.95)  # levels of a map of shares
 NEAR = 3.0  # half-width of the Nyquist picture
-FAR = 50.0  # beyond it nothing is drawn of the curve
+FAR = 20.0  # beyond it nothing is drawn of the curve
+SEEN = 0.01  # distance along it that can be seen
 ANGLE = np.linspace(0.0, 2.0 * np.pi, 121)
 
 
@@ -216,7 +217,7 @@ def of_loop(loop: Loop | None, of_a: Loop | None) -> dict[str, Drawn]:
     for one, of_curve, of_drive in ((of_a, "purple", "purple"), (loop, "blue", "green")):
         if one is None:
             continue
-        near = np.where(np.abs(one.loop) < FAR, one.loop, np.nan)
+        near = _seen(one.loop)
         curves.append(_line(near.real, near.imag, of_curve, width=1.4))
         hertz = one.drive["frequency"]
         impedances.append(_line(hertz, one.drive["impedance"], of_drive, width=1.4))
@@ -239,6 +240,14 @@ def of_loop(loop: Loop | None, of_a: Loop | None) -> dict[str, Drawn]:
         "reflection": {"x": frequency, "y": _axis("reflection |r|", 0.0, 1.25),
                        "marks": reflections},
     }  # fmt: skip
+
+
+def _seen(curve: ComplexArray) -> ComplexArray:
+    """Points of a curve as far apart as can be seen; NaN where it is far away."""
+    near = np.where(np.abs(curve) < FAR, curve, np.nan)
+    along = np.nancumsum(np.abs(np.diff(near, prepend=near[:1])))
+    further = np.diff(np.floor(along / SEEN), prepend=-1.0) > 0.0
+    return near[further | np.isnan(near)]
 
 
 def _disk(loop: Loop) -> Iterator[Drawn]:

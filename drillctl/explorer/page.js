@@ -19,7 +19,7 @@
 
   // ---- the cross: drawn here at once, told to the server
   function drag(event) {
-    if (event.type === "pointerdown") { event.target.setPointerCapture(event.pointerId); dragging = true; }
+    if (event.type === "pointerdown") { event.currentTarget.setPointerCapture(event.pointerId); dragging = true; }
     if (!dragging) return;
     dragging = event.type === "pointerdown" || event.type === "pointermove";
     const [x, y] = pictures.under(event);
