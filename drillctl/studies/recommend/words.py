@@ -24,7 +24,7 @@ def numbers_of(one: Assessed) -> str:
         return SI_OF.get(path.rpartition(".")[2]) or parameter(one.design, path).si_unit
 
     return ", ".join(
-        f"{USUAL_NAMES.get(path, path)} {units.full(value, unit(path), 4)}"
+        f"{USUAL_NAMES.get(path, path)} {units.full(value, unit(path), 5)}"
         for path, value in one.gains.items()
     )
 
