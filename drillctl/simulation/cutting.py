@@ -141,17 +141,19 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
     state[hook.first : hook.first + hook.states] = followed
     vary = _varying(design.variation, design.tables.simulation.duration, speed, point.velocity)
     between = 2.0 * math.pi / rock.blades
+    # A bit that does not drill is small against one that does.
+    sized = point if point.velocity else steady(rock, 2.0 * rock.flat_force, speed)
     scale = np.concatenate([
-        np.full(n // 2, _size(torsion.modal, point.torque / design.string.static_stiffness)),
+        np.full(n // 2, _size(torsion.modal, sized.torque / design.string.static_stiffness)),
         np.full(n // 2, _size(torsion.modal, speed)),
-        np.full(m // 2, _size(axial.modal, point.depth_of_cut / rock.blades)),
-        np.full(m // 2, _size(axial.modal, point.velocity)),
+        np.full(m // 2, _size(axial.modal, sized.depth_of_cut / rock.blades)),
+        np.full(m // 2, _size(axial.modal, sized.velocity)),
         np.array([
-            speed, point.torque, point.torque, 1.0, point.torque, point.torque, point.torque, speed,
-            point.torque,
+            speed, sized.torque, sized.torque, 1.0, sized.torque, sized.torque, sized.torque, speed,
+            sized.torque,
         ])[: drive.states],
         sizes,
-        np.array([*[point.torque * speed] * 5, speed, nominal]) + 1e-300,
+        np.array([*[sized.torque * speed] * 5, speed, nominal or rock.flat_force]) + 1e-300,
     ])  # fmt: skip
     task = e.Task(
         _side(e, torsion, speed, torque=True), _side(e, axial, point.velocity, torque=False),
@@ -161,7 +163,8 @@ def solve(design: Design, tolerance: float = 1e-9) -> Located:
         design.tables.simulation.duration, tolerance, scale, start.slope,
         np.array([axial.read[1] @ axial.by_bit, -torsion.read[1] @ torsion.by_bit]), *vary,
     )  # fmt: skip
-    return _run(e, task, state, stands, _rock(first))
+    rests = stands or start.velocity == 0.0
+    return _run(e, task, state, (e.STUCK if rests else e.DOWN, int(not stands)), _rock(first))
 
 
 def _rock(rock: RichardDetournay) -> Array:
@@ -265,16 +268,15 @@ def _varying(
     return path(one, nodes), np.array([one.spread, one.spacing, one.advance, one.turns, one.sinks])
 
 
-def _run(e: Any, task: Any, state: Array, stands: bool, rock: Array) -> Located:
+def _run(e: Any, task: Any, state: Array, phases: tuple[int, int], rock: Array) -> Located:
     from drillctl.simulation.cutting_tape import COLUMNS, Memory
 
     room, size = 1 << 14, len(state)
-    phase = e.STUCK if stands else e.DOWN
     n, m = len(task.torsion.by_bit), len(task.axial.by_bit)
     place = task.torsion.read[0] @ state[:n], task.axial.read[0] @ state[n : n + m]
     memory = Memory(
         np.array([0.0, 1e-3 * task.bit.between / task.set_speed, *place, 0.0]),
-        np.array([phase, int(not stands), 0, 0, 0, 0, 0]), rock, np.zeros((room, COLUMNS)),
+        np.array([*phases, 0, 0, 0, 0, 0]), rock, np.zeros((room, COLUMNS)),
         np.zeros((4096, 2)), state.copy(), np.zeros((9, size)),
     )  # fmt: skip
     while True:

@@ -211,13 +211,12 @@ def _contact(
     hard = hardness(task, time, angle, place, memory)
     cut = rock[PER_DEPTH] * hard * depth if axial != OFF else 0.0
     hook = hook_force(task, memory, time, speed if turning else 0.0, x)
-    share = 0.0
-    if axial == DOWN:
-        share = 1.0
-    elif axial == STUCK:
-        share = (hook + _free(other, 1, x, n) / task.hold[0] - cut) / rock[FLAT]
-    used = min(max(share, 0.0), 1.0) if axial == STUCK and not turning else share
+    share = used = 1.0 if axial == DOWN else 0.0
     force = cut + rock[FLAT] * used
+    if axial == STUCK:  # held by what the rock gives, at rest by more than the wear flat
+        force = hook + _free(other, 1, x, n) / task.hold[0]
+        share = (force - cut) / rock[FLAT]
+        used = share if turning else min(max(share, 0.0), 1.0)
     torque = rock[TORQUE_PER_DEPTH] * hard * (depth if axial != OFF else 0.0)
     torque += rock[FLAT_TORQUE] * used
     top = _top(task, time, turning, torque, x, rates)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import drillctl
+from drillctl import units
 from drillctl.design.paths import tuned_ranges
 from drillctl.errors import InputError
 from drillctl.simulation import cutting
@@ -178,6 +179,30 @@ def test_steady_drilling_stays_steady(design):
         assert run.measures.j1 < 1e-6
         assert run.measures.rate_of_penetration == pytest.approx(point.velocity, rel=1e-6)
         assert run.measures.depth_of_cut == pytest.approx(point.depth_of_cut, rel=1e-6)
+
+
+def test_a_bit_at_rest_bears_what_it_is_held_by(design):
+    """However far the cutters have gone in: by the momentum of the string, the hook's force."""
+    sharp = {"bit_rock.wear_flat_length": "0.01 mm", "simulation.duration": "4 s"}
+    exact = drillctl.simulate(design.replace(RIG | sharp))
+    assert exact.measures.stuck_time > 1.0
+    # What is left are forces that jump between two samples.
+    assert exact.measures.mean_weight_on_bit == pytest.approx(102546.7, rel=2e-2)
+    still = exact.signals["stuck"] > 0.5
+    assert exact.signals["weight_on_bit"][still] == pytest.approx(102546.7)
+
+
+@pytest.mark.parametrize("weight", ["0 kN", "30 kN"])
+def test_a_bit_that_does_not_drill_rests_on_its_flats(design, weight):
+    light = design.replace(RIG | {
+        "operating_point.weight_on_bit": weight, "simulation.duration": "2 s",
+    })  # fmt: skip
+    exact, batch = drillctl.simulate(light), drillctl.simulate(light, "batch")
+    for one in (exact, batch):
+        assert one.measures.rate_of_penetration == 0.0
+        assert one.measures.mean_weight_on_bit == pytest.approx(units.parse(weight, units.FORCE))
+        assert one.measures.lost_contact_time == 0.0
+    assert batch.measures.j1 == pytest.approx(exact.measures.j1, rel=1e-4)
 
 
 def test_a_varying_rock_is_the_same_in_both_engines(design):
