@@ -1,6 +1,7 @@
 """What to set: criteria, verdicts, windows and numbers against other rooms and by hand."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -309,3 +310,16 @@ def test_a_weight_that_follows_stands_beside_the_constant_one_where_it_is_asked(
     assert moving.design.tables.weight_on_bit.gain == 6e3
     assert moving.loop.slope < 0.1 * constant.loop.slope  # the weight takes the slope away
     assert np.median(moving.j1) < np.median(constant.j1)
+
+
+@pytest.mark.parametrize("margin", [math.nan, -3.0, 0.0])
+def test_a_loop_that_is_unstable_under_a_rock_that_does_not_fall_is_told(margin):
+    """Such as that of a cutting bit, whose torque has no slope to divide by."""
+    design = drillctl.load("monteiro-trindade-140kn")
+    asked = design.tables.recommend
+    figures = loop_figures(design, asked.slope_share)
+    flat = replace(figures, slope=0.0, slope_margin=margin)
+    found = {one.name: one for one in loop_criteria(design, flat, asked)}
+    assert not found["stable"].kept
+    assert not found["slope_reserve"].kept
+    assert found["stable"].miss == found["slope_reserve"].miss == 1.0

@@ -167,7 +167,9 @@ def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Cri
     mode = mode_at(design, one.deciding_hz)
     needed = asked.slope_reserve * max(one.slope, 0.0)
     no_slope = math.isnan(one.slope_margin)
-    ratio = math.inf if one.slope <= 0.0 < one.slope_margin else one.slope_margin / one.slope
+    ratio = math.nan if no_slope else math.copysign(math.inf, one.slope_margin or -1.0)
+    if one.slope > 0.0 or (one.slope < 0.0 and one.slope_margin <= 0.0):
+        ratio = one.slope_margin / one.slope
     without = one.problem or f"unstable even without falling friction, in {mode}"
     own = own_delay(drive_of(design)) if asked.delay is None else asked.delay
     delay = None if one.whole is None else one.whole.delay
@@ -199,7 +201,7 @@ def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Cri
     )
     stable = Criterion("stable", one.stable, one.slope_margin, one.slope, 0.0, "")
     if not one.stable:
-        miss = 1.0 if no_slope else min(1.0, 1.0 - one.slope_margin / one.slope)
+        miss = 1.0 if no_slope else min(1.0, 1.0 - ratio)
         stable = Criterion("stable", False, finite(one.slope_margin), one.slope, miss, unstable)
     later = _criterion("delay", delay, own, True, late)
     if own == 0.0 and delay == 0.0:
