@@ -484,7 +484,7 @@ def filed_text(text: str, system: System) -> str:
 
 def full(value: float, si_unit: str, digits: int = 6) -> str:
     """A quantity in a text, for `told`."""
-    return f"{value:.{digits}g} {'' if si_unit == '1' else si_unit}".rstrip()
+    return f"{value + 0.0:.{digits}g} {'' if si_unit == '1' else si_unit}".rstrip()
 
 
 def told(text: str, system: System) -> str:

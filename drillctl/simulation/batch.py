@@ -31,6 +31,7 @@ from drillctl.simulation.step_laws import (
     remembered,
     variation_step,
     weight_step,
+    within_run,
 )
 
 Array = NDArray[np.float64]
@@ -162,10 +163,10 @@ def _run(
     axial = 2 if more else 0
     traces = np.empty((samples, len(TRACED) + max(len(wall) - 1, 0) + axial, len(padded)))
     window = min(m.WINDOW, duration)
-    observer = padded.observer
+    observer, weight = padded.observer, within_run(padded.weight, duration)
     ticks = Clock(
         scheme.step, scheme.steps, prepared.j1_from, duration - window, every, scheme.sampling,
-        remembered(padded.weight, scheme.step), 0 if observer is None else observer.states,
+        remembered(weight, scheme.step, duration), 0 if observer is None else observer.states,
         more, surface, give_up,
     )  # fmt: skip
     numbers = np.stack([
@@ -177,7 +178,7 @@ def _run(
         drive_step(
             _at_whole_steps(padded.drive, scheme), scheme.step, prepared.stepper.string
         ),
-        weight_step(padded.weight, scheme.step), program_step(padded.program),
+        weight_step(weight, scheme.step), program_step(padded.program),
         variation_step(padded.variation, duration, padded.set_speed, _rate(padded)),
         observer_step(observer, scheme.step, begin),
         numbers, np.ascontiguousarray(state), ticks,

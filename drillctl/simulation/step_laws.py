@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from drillctl import units
 from drillctl.arrays import Array
+from drillctl.errors import InputError
 from drillctl.linear.observer import Observer
 from drillctl.rig.bit_rock.variation import NoVariation, paths
 from drillctl.rig.program import Path
@@ -102,6 +104,9 @@ def _sampled_step(drive: SampledDrive, step: float) -> Any:
     )  # fmt: skip
 
 
+MOST_REMEMBERED = 2**22  # steps of a weight that comes late: half a GiB a thread
+
+
 def weight_step(weight: Any, step: float) -> Any:
     """The kernel's form of a weight law; one that acts at once as it is."""
     if not isinstance(weight, PATHS):
@@ -136,13 +141,27 @@ def weight_step(weight: Any, step: float) -> Any:
     return type(made)(*(np.ascontiguousarray(x, dtype=float) for x in made))
 
 
-def remembered(weight: Any, step: float) -> int:
+def within_run(weight: Any, duration: float) -> Any:
+    """A weight law with a delay no longer than the run, at the end of which it is the same."""
+    if not isinstance(weight, PATHS) or isinstance(weight, AlarmWeight):
+        return weight
+    return weight._replace(delay=np.minimum(weight.delay, duration))
+
+
+def remembered(weight: Any, step: float, duration: float) -> int:
     """Steps whose signals a weight law may ask for."""
     if not isinstance(weight, PATHS):
         return 0
     if isinstance(weight, AlarmWeight):
         return 1
-    steps = math.ceil(float(np.max(weight.delay + weight.period)) / step) + 3
+    longest = float(np.max(weight.delay + np.minimum(weight.period, duration)))
+    steps = math.ceil(longest / step) + 3
+    if steps > MOST_REMEMBERED:
+        raise InputError(
+            f"{units.full(longest, 's', 3)} are {steps:.1e} steps of {units.full(step, 's', 3)}, "
+            f"whose signals it would remember; at most {MOST_REMEMBERED:.1e}",
+            "weight_on_bit.path",
+        )
     return 1 << (steps - 1).bit_length()  # a power of two
 
 

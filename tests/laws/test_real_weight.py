@@ -100,6 +100,19 @@ def test_engines_agree_on_what_comes_late(path):
     assert batch.peak_bit_speed == pytest.approx(reference.peak_bit_speed, rel=1e-3)
 
 
+@pytest.mark.parametrize("more", [{}, {"sampling_period": "1e5 s"}])
+def test_what_comes_after_the_run_is_neither_seen_nor_remembered(more):
+    late = [
+        drillctl.simulate(rig(path={"delay": delay, **more}), engine="batch").measures.j1
+        for delay in ("101 s", "150 s", "1e6 s")
+    ]
+    assert late[0] == late[1] == late[2]
+    with pytest.raises(InputError, match=r"weight_on_bit.path: .* signals it would remember"):
+        drillctl.simulate(
+            rig(path={"delay": "90 s"}, **{"simulation.step": "5 us"}), engine="batch"
+        )
+
+
 def test_order_2_of_what_comes_late():
     """Against the reference solver, over a run that neither sticks nor meets a limit."""
     values = {"start.speed": "100 rpm", "operating_point.weight_on_bit": "45 kN"}
