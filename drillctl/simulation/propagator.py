@@ -239,14 +239,17 @@ def _rubbed(
         "place": compliance[nodes] / compliance[-1],
         "ratio": wall.ratio,
         "critical": wall.critical,
-        "angle_by_top": float(by[0, 0]),
-        "angle_by_bit": float(-by[0, 1]),
-        "speed_by_top": float(by[1, 0]),
-        "speed_by_bit": float(-by[1, 1]),
-        "top_speed_by_top": float(by[3, 0]),
-        "top_speed_by_bit": float(-by[3, 1]),
+        **_by_ends(by[[0, 1, 3]]),
     }
     return fields, inverse
+
+
+def _by_ends(by: Array) -> dict[str, float]:
+    """Fields of top angle, bit speed and top speed after a step per torque on top and bit."""
+    names = ("angle", "speed", "top_speed")
+    return {f"{name}_by_top": float(row[0]) for name, row in zip(names, by, strict=True)} | {
+        f"{name}_by_bit": float(-row[1]) for name, row in zip(names, by, strict=True)
+    }
 
 
 def _modal(string: Drillstring, frequency: Array, shapes: Array) -> Modal:
@@ -360,7 +363,6 @@ def _dense(modal: Modal, step: float) -> tuple[dict[str, Any], Array]:
     """Fields of a `DenseString`, whose states are the modal ones."""
     free, push = _held(modal.a, modal.b, step)
     s = modal.signals
-    by = s[[0, 1, 3]] @ push
     fields = {
         "free": free,
         "push": push,
@@ -369,11 +371,6 @@ def _dense(modal: Modal, step: float) -> tuple[dict[str, Any], Array]:
         "pipe": s[2].copy(),
         "top_speed": s[3].copy(),
         "bit_angle": s[4].copy(),
-        "angle_by_top": float(by[0, 0]),
-        "angle_by_bit": float(-by[0, 1]),
-        "speed_by_top": float(by[1, 0]),
-        "speed_by_bit": float(-by[1, 1]),
-        "top_speed_by_top": float(by[2, 0]),
-        "top_speed_by_bit": float(-by[2, 1]),
+        **_by_ends(s[[0, 1, 3]] @ push),
     }
     return fields, np.eye(len(modal.a))

@@ -297,7 +297,7 @@ SLOW = (
     "five-weights-uncertain", "monteiro-trindade-120kn", "monteiro-trindade-fig6",
     "robust-gains-140kn", "pi-vs-pi-dynamic-wob",
     "monteiro-trindade-140kn", "wob-rpm-chart", "dynamic-wob-delay-140kn",  # in test_studies.py
-    "well-a-off-bottom",  # 191 nodes
+    "well-a-off-bottom",  # 258 nodes
 )  # fmt: skip
 
 
