@@ -113,6 +113,21 @@ def test_a_measured_torque_gives_the_friction_factor():
         drillctl.torque_drag(design.replace({"well.survey": [["0 m", "0 deg", "0 deg"]]}))
 
 
+def test_what_a_sweep_or_a_trip_cannot_do_is_pointed_out():
+    level = {
+        "well.survey": [["0 m", "0 deg", "0 deg"], ["700 m", "90 deg", "0 deg"]],
+        "well.holes": [{"to": "500 m", "diameter": "9 in", "friction_factor": 0.5},
+                       {"diameter": "9 in", "friction_factor": 0.6}],
+    }  # fmt: skip
+    result = drillctl.torque_drag(drillctl.load(WELL_A, **level))
+    assert result.summary()["cases"]["running_in"]["hook_load"] < 0.0
+    assert np.ptp(result.torques["off_bottom"]) == 0.0
+    said = " ".join(result.notes)
+    assert "own: the sweep changes nothing" in said
+    assert "does not go down by its own weight" in said
+    assert drillctl.torque_drag(drillctl.load(WELL_A)).notes == ()
+
+
 def test_compression_beyond_the_sinusoidal_limit_is_pointed_out():
     run = RUNS[1]._replace(top=0.0, bottom=1000.0, bending=2e7, clearance=0.03)
     line = lay(path_of(((0.0, 1.0, 0.0),)), (run,), 0.0)

@@ -123,6 +123,8 @@ def torque_drag(design: Design, progress: Progress = SILENT) -> TorqueDrag:
         notes=(
             *_lumped(made),
             *_vertical(design),
+            *_all_given(design),
+            *_too_light(found["running_in"]),
             *_buckled(found, limit, placed),
         ),
     )
@@ -182,6 +184,21 @@ def _vertical(design: Design) -> list[str]:
     if design.tables.well.survey:
         return []
     return ["the well has no survey and is taken as vertical, where nothing rubs: give well.survey"]
+
+
+def _all_given(design: Design) -> list[str]:
+    """A well in which no hole takes the factor that is swept."""
+    holes = design.tables.well.holes
+    if not holes or any(hole.friction_factor is None for hole in holes):
+        return []
+    return ["every hole has a friction factor of its own: the sweep changes nothing"]
+
+
+def _too_light(run_in: Drag) -> list[str]:
+    """A string that the wall holds up."""
+    if run_in.hook_load >= 0.0:
+        return []
+    return ["run in: the hook load is negative, the string does not go down by its own weight"]
 
 
 def _buckled(found: dict[str, Drag], limit: Array, placed: Line) -> list[str]:
