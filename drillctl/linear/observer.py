@@ -10,6 +10,7 @@ import scipy.linalg
 
 from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
+from drillctl.errors import InputError
 from drillctl.rig.drillstring import Drillstring
 
 MODES = 4
@@ -97,8 +98,15 @@ def _kalman(a: Array, top: Array, torque: int) -> Array:
     scaled = a * scale / scale[:, None]
     wander = np.zeros((len(a), len(a)))
     wander[torque, torque] = 1.0
-    covariance = scipy.linalg.solve_continuous_are(
-        scaled.T, top[:, None] * scale[:, None], wander + 1e-9 * np.eye(len(a)),
-        np.array([[SPEED_NOISE**2]]),
-    )  # fmt: skip
+    try:
+        covariance = scipy.linalg.solve_continuous_are(
+            scaled.T, top[:, None] * scale[:, None], wander + 1e-9 * np.eye(len(a)),
+            np.array([[SPEED_NOISE**2]]),
+        )  # fmt: skip
+    except (ValueError, np.linalg.LinAlgError):
+        raise InputError(
+            "no observer can be computed for this string: its inertias or frequencies are too "
+            "far apart",
+            "weight_on_bit.observer_modes",
+        ) from None
     return np.asarray(scale * (covariance @ top) / SPEED_NOISE**2)

@@ -54,7 +54,9 @@ def plant_matrices(string: Drillstring) -> StateMatrices:
     forces[0, 0] = 1.0
     forces[-1, 1] = -1.0
     torques = np.hstack([-incidence * string.element_stiffness, -string.damping.toarray(), forces])
-    accelerations = scipy.linalg.solve(string.mass.toarray(), torques, assume_a="pos")
+    # Unlike `solve` it says nothing of inertias that are far apart, which a diagonal bears.
+    mass = scipy.linalg.cho_factor(string.mass.toarray(), lower=True)
+    accelerations = scipy.linalg.cho_solve(mass, torques)
 
     a = np.zeros((elements + nodes, elements + nodes))
     a[:elements, elements:] = incidence.T

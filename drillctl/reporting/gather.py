@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import drillctl
 from drillctl import store, units
 from drillctl.design import Design, axis_tables
+from drillctl.design.tables import AxisTable
 from drillctl.errors import DrillctlError, InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.reporting.blocks import Block, Text, Words, block, figure
@@ -47,13 +48,14 @@ class Profile:
     def applied(self, design: Design) -> Design:
         """The design with map and draws reduced to the limits of the profile."""
         values: dict[str, Any] = {}
-        if self.points is not None and any(a.points > self.points for a in axis_tables(design)):
+        axes = _axes_that_fit(design)
+        if self.points is not None and any(axis.points > self.points for axis in axes):
             values["map.axes"] = [
                 {
                     "path": axis.path, "min": axis.min, "max": axis.max,
                     "points": min(axis.points, self.points),
                 }
-                for axis in axis_tables(design)
+                for axis in axes
             ]  # fmt: skip
         if self.audited is not None:
             values["map.audit_cells"] = min(self.audited, design.tables.map.audit_cells)
@@ -69,7 +71,7 @@ class Profile:
         """Number of draws within the limits of draws and lanes."""
         table = design.tables.uncertainty
         cells = 1
-        for axis in (*axis_tables(design), *table.axes):
+        for axis in (*_axes_that_fit(design), *table.axes):
             cells *= axis.points
         most = max(2, self.lanes // cells)
         if self.realizations is not None:
@@ -81,6 +83,13 @@ class Profile:
         if table.sampling == "sobol":  # Sobol points come in powers of two
             each = 1 << (each.bit_length() - 1)
         return each * table.replicates
+
+
+def _axes_that_fit(design: Design) -> tuple[AxisTable, ...]:
+    try:
+        return axis_tables(design)
+    except InputError:  # the map is left out, with this reason
+        return ()
 
 
 QUICK = Profile(

@@ -238,6 +238,14 @@ def test_other_rigs_have_reports_too(name, sections, left_out, tmp_path):
     assert set(made.content["sections"]) == set(sections.split(",")) - left_out
 
 
+def test_a_drive_whose_map_has_no_ends(tmp_path):
+    drive = {"law": "constant-torque", "torque": "0 N*m"}
+    design = drillctl.load("navarro-lopez-2dof", controller=drive)
+    made = drillctl.report(design, tmp_path / "r", TINY, sections=("rig", "map"))
+    (why,) = made.content["left_out"].values()
+    assert "no bounds about it" in why
+
+
 def test_a_line_of_cells_and_a_drive_without_gains(tmp_path):
     design = drillctl.load(
         "navarro-lopez-2dof",
