@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -28,7 +29,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from drillctl import registry
-from drillctl.catalog import regular_file
 from drillctl.progress import SILENT, Progress
 from drillctl.store.tables import Column, Table, Told
 
@@ -264,8 +264,12 @@ class Study:
 
 def _stamped(files: Iterable[str | Path]) -> list[str]:
     """Files by name, size and date: what tells one content from another."""
-    held = [(file, file.stat()) for file in (regular_file(str(one)) for one in files)]
-    return [f"{file.resolve()} {about.st_size} {about.st_mtime_ns}" for file, about in held]
+    stamps = []
+    for file in map(Path, files):
+        with suppress(OSError):  # whoever reads it says why it cannot be read
+            about = file.stat()
+            stamps.append(f"{file.resolve()} {about.st_size} {about.st_mtime_ns}")
+    return stamps
 
 
 @cache
