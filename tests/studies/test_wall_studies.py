@@ -46,7 +46,8 @@ def test_cases_are_compared_at_drawn_friction(design):
 
 
 def test_gains_are_tuned_and_certified_at_drawn_friction(design):
-    found = drillctl.tune(design)
+    longer = {"simulation.duration": "12 s"}  # until the bit breaks loose
+    found = drillctl.tune(design.replace(longer))
     assert 500.0 <= found.gains[KP] <= 900.0
     assert len(np.unique(found.certificate.drawn[FACTOR])) == 4
     assert np.isfinite(found.certificate.runs.j1).all()

@@ -121,7 +121,7 @@ def test_known_gains_are_polished_where_they_come_near():
     known = [np.array([900.0, -5.0]), own]
     best = optimum(near, known, math.inf, 2, lambda *one: stages.append(one))
     assert [name for name, _ in stages] == ["first look", "race", "population", "polish"]
-    assert [point.realizations for _, point in stages] == [16, 24, 24, 24]
+    assert [points[0].realizations for _, points in stages] == [16, 24, 24, 24]
     assert best.merit <= polished(near, near.points(own[None, :], 24)[0]).merit
     assert best.merit <= optimum(alone).merit == optimum(behind, [own], 1.0).merit
     assert behind.trajectories == alone.trajectories + 24
