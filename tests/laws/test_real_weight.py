@@ -179,6 +179,12 @@ def test_a_map_runs_over_delays_from_none_on():
 # The observer
 
 
+def test_a_string_without_an_observer_is_refused_in_words():
+    damped = {"drillstring.stiffness_damping": "2e5 s"}
+    with pytest.raises(InputError, match="no observer can be computed for this string"):
+        observer(drillctl.load("aarsnes-shor-well-a", **damped).string, 100)
+
+
 def test_an_observer_comes_to_the_truth():
     """Of a string that turns as a whole under no torque the estimate is exact from the start, and
     a wrong start is forgotten."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import warnings
 
 import control
 import numpy as np
@@ -215,3 +216,11 @@ def test_high_modes_alone_need_gain():
 def test_importing_the_room_leaves_control_alone():
     code = "import sys, drillctl.linear; sys.exit('control' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_inertias_far_apart_are_no_matter():
+    design = drillctl.load("richard-detournay-2dof", **{"bha.inertia": "1e-6 kg*m^2"})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pushed = plant_matrices(design.string).b
+    np.testing.assert_allclose(pushed, [[0.0, 0.0], [1e-10, 0.0], [0.0, -1e6]], rtol=1e-12)

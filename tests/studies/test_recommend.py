@@ -278,7 +278,9 @@ def test_the_sentence_names_setting_limit_and_room(result):
     assert all(text in result.sentence for text in (*result.limits, "What limits it is"))
     said = others(result)
     assert len(said) == len(result.candidates) - 1
-    assert any(text.startswith("soft torque: unstable in the first mode") for text in said)
+    (soft,) = (text for text in said if text.startswith("soft torque: unstable in the first mode"))
+    (of_soft,) = (one for one in result.candidates if one.name == "soft torque")
+    assert soft.endswith(f"it misses {len(of_soft.missed) - 1} other criteria")
     last, fails = result.until
     assert last >= depth_of(best.design) - 1e-9
     assert f"it passes to {units.full(last, 'm', 5)}" in result.sentence
