@@ -20,7 +20,9 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
 
 from drillctl.arrays import Array
 from drillctl.rig.program import MOST_RAMPS, Ramp
@@ -38,11 +40,16 @@ from drillctl.simulation.law_calls import (
     version,
 )
 
-compiled = numba.njit(fastmath={"contract"}, nogil=True, **OPTIONS)
-"""Decorator of what is part of the solver: products and sums may be fused, nothing else."""
-uncounted = numba.njit(fastmath={"contract"}, nogil=True, _nrt=False, **OPTIONS)
-"""The same for what neither makes an array nor calls what does, as `band`. No references are
-counted: each look at a row would count up and down, atomically, which took a third of a run."""
+compiled = numba.njit(fastmath={"contract"}, nogil=True, _nrt=False, **OPTIONS)
+"""Decorator of what is part of the solver: products and sums may be fused, nothing else.
+
+No references are counted: each look at an array would count up and down, atomically, and a tuple of
+arrays all of its own, which took a third of a run. So nothing here may make an array; `view` looks
+at numbers that the caller keeps.
+"""
+
+shown = numba.njit(nogil=True, _nrt=True, **OPTIONS)
+"""The same of what returns an array, which numba does not make without counting."""
 
 STUCK, CREEPING, PUSHED, FORWARD_EDGE, BACKWARD_EDGE = 0, 2, 3, 4, 5
 """Phases beside +1 and -1 of a bit that turns; those from 2 on belong to the printed law.
@@ -135,11 +142,21 @@ MEMORIES = (0, len(MEMORY), len(SAMPLED_MEMORY))  # numbers of memory of each ki
 
 
 @intrinsic
-def _pointer(typing_context: Any, address: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+def view(typing_context: Any, address: Any, shape: Any) -> Any:
+    """Numbers at an address as an array of some shape: `numba.carray`, which counts references."""
 
-    return types.CPointer(types.float64)(types.int64), generate
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        lengths = cgutils.unpack_tuple(builder, arguments[1])
+        strides = [ir.Constant(ir.IntType(64), 8)]
+        for length in reversed(lengths[1:]):
+            strides.insert(0, builder.mul(strides[0], length))
+        array = context.make_array(signature.return_type)(context, builder)
+        place = builder.inttoptr if isinstance(address, types.Integer) else builder.bitcast
+        data = place(arguments[0], array.data.type)
+        populate_array(array, data, lengths, strides, 8, None)
+        return array._getvalue()
+
+    return types.Array(types.float64, shape.count, "C")(address, shape), generate
 
 
 def by_address(field: str, *kinds: Any) -> Any:
@@ -197,53 +214,52 @@ def callable_at(function: Any, *kinds: Any) -> Any:
     """A function of a rig and of `kinds` compiled by itself; it has an `address` as it lives."""
     names = [f"a{k}" for k in range(len(kinds))]
     views = [
-        f"carray({name}, rig.states)" if kind is STATE else name
+        f"view({name}, (rig.states,))" if kind is STATE else name
         for name, kind in zip(names, kinds, strict=True)
     ]
     name = f"{function.__name__.strip('_')}_{version()}"
-    scope = {"__name__": __name__, "carray": numba.carray, "function": function}
+    scope = {"__name__": __name__, "view": view, "function": function}
     text = (
-        f"def {name}(pointer, {', '.join(names)}):\n"
-        f"    rig = carray(pointer, 1)[0]\n"
+        f"def {name}(rig, {', '.join(names)}):\n"
         f"    return float(function(rig, {', '.join(views)}))\n"
     )
     exec(compile(text, __file__, "exec"), scope)
-    signature = types.float64(types.CPointer(numba.from_dtype(RIG)), *kinds)
-    return kernel_cache.cfunc(signature, scope[name], **OPTIONS, fastmath={"contract"})
+    signature = types.float64(numba.from_dtype(RIG), *kinds)
+    return kernel_cache.cfunc(signature, scope[name], **OPTIONS, fastmath={"contract"}, _nrt=False)
 
 
-@compiled
+@shown
 def band(rig: Any, row: int) -> Any:
     """A row of `bands`."""
-    return numba.carray(_pointer(rig.bands + 8 * row * rig.nodes), (rig.nodes,))
+    return view(rig.bands + 8 * row * rig.nodes, (rig.nodes,))
 
 
-@compiled
+@shown
 def law(rig: Any, row: int) -> Any:
     """A row of `laws`."""
-    return numba.carray(_pointer(rig.laws + 8 * row * MOST_NUMBERS), (MOST_NUMBERS,))
+    return view(rig.laws + 8 * row * MOST_NUMBERS, (MOST_NUMBERS,))
 
 
-@compiled
+@shown
 def wall_of(rig: Any) -> Any:
     """The table of the nodes at which the wall rubs, the bit aside."""
-    return numba.carray(_pointer(rig.wall), (wall.ROWS, rig.wall_nodes))
+    return view(rig.wall, (wall.ROWS, rig.wall_nodes))
 
 
-@compiled
+@shown
 def scratch_of(rig: Any) -> Any:
     """Room for rates that nobody keeps."""
-    return numba.carray(_pointer(rig.scratch), (rig.states,))
+    return view(rig.scratch, (rig.states,))
 
 
-@compiled
+@shown
 def tape_row(rig: Any, step: int) -> Any:
     """A step on the tape."""
     width = FIRST + 8 * rig.components
-    return numba.carray(_pointer(rig.tape + 8 * step * width), (width,))
+    return view(rig.tape + 8 * step * width, (width,))
 
 
-@compiled
+@shown
 def memory_of_weight(rig: Any, state: Any) -> Any:
     """The last numbers of a state, or of its rates."""
     return state[rig.states - rig.weight_states :]
@@ -278,9 +294,9 @@ def pipe_torque(rig: Any, state: Any) -> float:
 # The string.
 
 
-@compiled
+@shown
 def _full_damping(rig: Any) -> Any:
-    return numba.carray(_pointer(rig.full_damping), (rig.nodes, rig.nodes))
+    return view(rig.full_damping, (rig.nodes, rig.nodes))
 
 
 @compiled
@@ -312,13 +328,24 @@ def _forces(rig: Any, state: Any, force: Any) -> None:
 
 @compiled
 def solve_factorised(pivot: Any, factor: Any, count: int, x: Any) -> None:
-    """Solve a tridiagonal system in place, of its factors and of one over its pivots."""
+    """Solve a tridiagonal system in place, of its factors and of one over its pivots.
+
+    Each substitution waits for the one before last alone, as the last is put in by its own
+    equation: the processor follows two chains at a time, in two thirds of the time.
+    """
+    given, last, before_last, share = x[0], x[0], 0.0, 0.0
+    x[0] *= pivot[0]
     for i in range(1, count):
-        x[i] -= factor[i - 1] * x[i - 1]
-    for i in range(count):
-        x[i] *= pivot[i]
+        own, new_share = x[i], factor[i - 1]
+        value = (own - new_share * given) + new_share * share * before_last
+        given, last, before_last, share = own, value, last, new_share
+        x[i] = value * pivot[i]
+    given, last, before_last, share = x[count - 1], x[count - 1], 0.0, 0.0
     for i in range(count - 2, -1, -1):
-        x[i] -= factor[i] * x[i + 1]
+        own, new_share = x[i], factor[i]
+        value = (own - new_share * given) + new_share * share * before_last
+        given, last, before_last, share = own, value, last, new_share
+        x[i] = value
 
 
 @compiled
@@ -398,11 +425,11 @@ def step_at(rig: Any, time: float) -> int:
     return low
 
 
-@compiled
+@shown
 def _observer(rig: Any) -> Any:
     """Shape (3 + states, states): by torque, by speed, read, then the free motion."""
     n = rig.observer_states
-    return numba.carray(_pointer(rig.observer), (3 + n, n))
+    return view(rig.observer, (3 + n, n))
 
 
 @compiled
@@ -422,7 +449,7 @@ def _signal(rig: Any, memory: Any, absolute: float) -> float:
 def past(rig: Any, time: float) -> float:
     """The signal of the weight law at a time (s) before; before the start, that of the start."""
     if time <= 0.0:
-        begin = numba.carray(_pointer(rig.begin), (rig.states,))
+        begin = view(rig.begin, (rig.states,))
         return _signal(rig, memory_of_weight(rig, begin), bit_speed(rig, begin))
     row = tape_row(rig, step_at(rig, time))
     share = (time - row[BEGIN]) / row[LENGTH]
@@ -525,7 +552,7 @@ def follow_in_place(rig: Any, time: float, state: Any, top_torque: float, rates:
 @compiled
 def begin_weight(rig: Any, state: Any) -> float:
     """Reading and weight at time zero; the signal's own memory is in the state."""
-    begin = numba.carray(_pointer(rig.begin), (rig.states,))
+    begin = view(rig.begin, (rig.states,))
     memory, count = memory_of_weight(rig, state), rig.weight_states
     memory[count - 2] = 1.0
     if rig.weight_kind != ALARMED:
@@ -569,7 +596,7 @@ def _read_window(rig: Any, time: float, memory: Any) -> None:
 # The rock.
 
 
-@compiled
+@shown
 def _rock(rig: Any, time: float) -> Any:
     return law(rig, ROCK_BEFORE if time < rig.rock_until else ROCK)
 
@@ -582,12 +609,12 @@ def rock_factor(rig: Any, time: float, state: Any) -> float:
     way = rig.advance * time
     if rig.turns > 0.0:
         last = rig.nodes - 1
-        begin = numba.carray(_pointer(rig.begin), (rig.states,))[last]
+        begin = view(rig.begin, (rig.states,))[last]
         way += rig.turns * (state[last] - begin + rig.set_speed * time)
     count = rig.path_nodes
     place = min(max(way / rig.spacing, 0.0), count - 2.0)
     node = int(place)
-    path = numba.carray(_pointer(rig.path), (count,))
+    path = view(rig.path, (count,))
     value = path[node] + (place - node) * (path[node + 1] - path[node])
     return math.exp(rig.spread * (value - 0.5 * rig.spread))
 

@@ -400,7 +400,7 @@ def addresses(drive: int, weight: int, walled: bool) -> dict[str, int]:
     return {name: int(f.callable_at(*one).address) for name, one in used.items()}
 
 
-@f.uncounted
+@f.compiled
 def _value(which: int, rig: Any, work: Any, row: Any, phase: int, share: float) -> float:
     """A function of the share of a step: margins (0, 1), bit speed (2), its slope (3)."""
     if which == 2:
@@ -414,7 +414,7 @@ def _value(which: int, rig: Any, work: Any, row: Any, phase: int, share: float) 
     return _margin_of(rig, time, phase, which, torque, work.trial)
 
 
-@f.uncounted
+@f.compiled
 def _locate(
     which: int, rig: Any, work: Any, row: Any, phase: int, low_value: float, high_value: float
 ) -> float:
@@ -650,7 +650,7 @@ def _keep_step(
     return AT_STOP
 
 
-@f.uncounted
+@f.compiled
 def _happens(which: int, phase: int, before: float, after: float) -> bool:
     """Whether an event lies within a step: a margin comes down to zero, a value changes sign."""
     down = before >= 0.0 and after <= 0.0
@@ -659,7 +659,7 @@ def _happens(which: int, phase: int, before: float, after: float) -> bool:
     return abs(phase) == 1 and (down or (before <= 0.0 and after >= 0.0))
 
 
-@f.uncounted
+@f.compiled
 def _note(which: int, clock: Any, row: Any, share: float) -> None:
     """Keep when the bit turned at the set speed, and its angle; or of an extreme, its speed."""
     count = clock.count

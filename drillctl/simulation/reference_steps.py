@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drillctl.arrays import Array, Index
-from drillctl.simulation.reference_rates import BEGIN, FIRST, LENGTH, on_tape, rates_of, uncounted
+from drillctl.simulation.reference_rates import BEGIN, FIRST, LENGTH, compiled, on_tape, rates_of
 
 STAGES, DENSE_STAGES = 12, 16
 TOGETHER = 4  # stages that a sum takes in at once
@@ -42,7 +42,7 @@ class Tableau(NamedTuple):
 class Dense(NamedTuple):
     """A dense output: F1 to F6 of the nested form as sums of the stages and of the change."""
 
-    weights: Any  # shape (6, 16)
+    weights: Any  # shape (16, 6)
     changes: Any  # shape (6,)
     by_step: bool  # whether the stages are rates, to be multiplied with the step
 
@@ -66,8 +66,9 @@ def tableau() -> Tableau:
 
 def explicit_dense_output() -> Dense:
     """The dense output of order 7."""
-    weights = np.zeros((6, DENSE_STAGES))
-    weights[0, 0], weights[1, [0, STAGES]], weights[2:] = 1.0, -1.0, _published()["dense"]
+    weights = np.zeros((DENSE_STAGES, 6))
+    weights[0, 0], weights[[0, STAGES], 1] = 1.0, -1.0
+    weights[:, 2:] = np.transpose(_published()["dense"])
     return Dense(weights, np.array([-1.0, 2.0, 0.0, 0.0, 0.0, 0.0]), by_step=True)
 
 
@@ -93,7 +94,7 @@ class Work(NamedTuple):
     whole: Any  # shape (2 + 8 states,): whole dense output of a step, where an event ends it
 
 
-@uncounted
+@compiled
 def _combine(
     stages: Any, weights: Any, of: Any, count: int, step: float, state: Any, out: Any
 ) -> None:
@@ -114,7 +115,26 @@ def _combine(
             out[i] += (a * one[i] + b * two[i]) + (c * three[i] + d * four[i])
 
 
-@uncounted
+@compiled
+def _product(first: Any, second: Any) -> float:
+    """Scalar product in eight sums, none of which waits for another."""
+    size, a, b, c, d, e, f, g, h = len(first), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    whole = size - size % 8
+    for i in range(0, whole, 8):
+        a += first[i] * second[i]
+        b += first[i + 1] * second[i + 1]
+        c += first[i + 2] * second[i + 2]
+        d += first[i + 3] * second[i + 3]
+        e += first[i + 4] * second[i + 4]
+        f += first[i + 5] * second[i + 5]
+        g += first[i + 6] * second[i + 6]
+        h += first[i + 7] * second[i + 7]
+    for i in range(whole, size):
+        a += first[i] * second[i]
+    return ((a + b) + (c + d)) + ((e + f) + (g + h))
+
+
+@compiled
 def _stages(
     rig: Any, method: Any, work: Any, time: float, step: float, phase: int, state: Any,
     first: int, last: int,
@@ -127,7 +147,7 @@ def _stages(
     return torque
 
 
-@uncounted
+@compiled
 def explicit_step(
     rig: Any, method: Any, work: Any, time: float, step: float, phase: int, state: Any
 ) -> float:
@@ -138,7 +158,7 @@ def explicit_step(
     return torque
 
 
-@uncounted
+@compiled
 def explicit_dense(
     rig: Any, method: Any, work: Any, time: float, step: float, phase: int, state: Any
 ) -> None:
@@ -146,7 +166,7 @@ def explicit_dense(
     _stages(rig, method, work, time, step, phase, state, STAGES + 1, DENSE_STAGES)
 
 
-@uncounted
+@compiled
 def explicit_error(method: Any, work: Any, step: float, tolerance: float, state: Any) -> float:
     """Estimated error of a step over the tolerance, as Hairer weighs the two estimates."""
     size, total, after = len(state), work.errors, work.after
@@ -157,11 +177,11 @@ def explicit_error(method: Any, work: Any, step: float, tolerance: float, state:
             work.stages, method.errors[k], method.errors_of[k], method.errors_count[k], 1.0,
             total[2], total[k],
         )  # fmt: skip
-    fifth, third = 0.0, 0.0
     for i in range(size):
         scale = 1.0 / (tolerance + tolerance * max(abs(state[i]), abs(after[i])))
-        fifth += (total[0, i] * scale) ** 2
-        third += (total[1, i] * scale) ** 2
+        total[0, i] *= scale
+        total[1, i] *= scale
+    fifth, third = _product(total[0], total[0]), _product(total[1], total[1])
     if fifth == 0.0 and third == 0.0:
         return 0.0
     # The square of the estimate of order 5 (h^6) over that of order 3 (h^4) goes with h^8, as the
@@ -173,51 +193,59 @@ def explicit_error(method: Any, work: Any, step: float, tolerance: float, state:
 # of the step, F0 the change over it and the others sums of that and of the stages.
 
 
-@uncounted
+@compiled
 def _record_one(
     dense: Any, unit: float, begin: float, change: float, stages: Any, row: Any, place: int
 ) -> None:
+    a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(DENSE_STAGES):
+        rate, weights = stages[j], dense.weights[j]
+        a += weights[0] * rate
+        b += weights[1] * rate
+        c += weights[2] * rate
+        d += weights[3] * rate
+        e += weights[4] * rate
+        f += weights[5] * rate
+    changes = dense.changes
     row[place], row[place + 1] = begin, change
-    for k in range(6):
-        total = 0.0
-        for j in range(DENSE_STAGES):
-            total += dense.weights[k, j] * stages[j]
-        row[place + 2 + k] = dense.changes[k] * change + unit * total
+    row[place + 2], row[place + 3] = changes[0] * change + unit * a, changes[1] * change + unit * b
+    row[place + 4], row[place + 5] = changes[2] * change + unit * c, changes[3] * change + unit * d
+    row[place + 6], row[place + 7] = changes[4] * change + unit * e, changes[5] * change + unit * f
 
 
-@uncounted
+@compiled
 def record(
     dense: Any, work: Any, time: float, step: float, state: Any, sums: Any, kept: Any, row: Any
 ) -> None:
     """Keep the dense output of some states and of sums of states."""
     row[BEGIN], row[LENGTH] = time, step
     stages, after, unit = work.stages, work.after, step if dense.by_step else 1.0
-    one = work.one
+    one, moved = work.one, work.errors[0]
+    for i in range(len(state)):
+        moved[i] = after[i] - state[i]
     for c in range(len(kept)):
         i = kept[c]
         for j in range(DENSE_STAGES):
             one[j] = stages[j, i]
-        _record_one(dense, unit, state[i], after[i] - state[i], one, row, FIRST + 8 * c)
+        _record_one(dense, unit, state[i], moved[i], one, row, FIRST + 8 * c)
     for c in range(len(sums)):
-        weights, begin, change = sums[c], 0.0, 0.0
-        for i in range(len(weights)):
-            begin += weights[i] * state[i]
-            change += weights[i] * (after[i] - state[i])
+        weights = sums[c]
+        count = len(weights)
+        begin = _product(weights, state[:count])
+        change = _product(weights, moved[:count])
         for j in range(DENSE_STAGES):
-            one[j] = 0.0
-            for i in range(len(weights)):
-                one[j] += weights[i] * stages[j, i]
+            one[j] = _product(weights, stages[j, :count])
         _record_one(dense, unit, begin, change, one, row, FIRST + 8 * (len(kept) + c))
 
 
-@uncounted
+@compiled
 def state_at(work: Any, share: float, out: Any) -> None:
     """Every state at a share of the step whose whole dense output is kept."""
     for i in range(len(out)):
         out[i] = on_tape(work.whole, i, share)
 
 
-@uncounted
+@compiled
 def first_length(
     rig: Any, work: Any, time: float, end: float, longest: float, tolerance: float,
     order: float, phase: int, state: Any,

@@ -80,8 +80,8 @@ def stiff_dense_output() -> Dense:
         -52.072871366152654, -59.78993625266729, -0.15582684282751913, 4.883087185713722,
     )  # fmt: skip
     one, two, three = np.array(first), np.array(second), np.array(third)
-    weights = np.zeros((6, DENSE_STAGES))
-    weights[0, 1:9], weights[1, 1:9], weights[2, 1:9] = one, two + three, -three
+    weights = np.zeros((DENSE_STAGES, 6))
+    weights[1:9, 0], weights[1:9, 1], weights[1:9, 2] = one, two + three, -three
     return Dense(weights, np.zeros(6), by_step=False)
 
 
