@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any
 
@@ -16,6 +17,15 @@ Index = NDArray[np.int64]
 # Whatever the user of the library has set with `numpy.seterr`: the exponentials of friction laws
 # vanish far from rest, which is no fault.
 own_errstate = partial(np.errstate, divide="warn", over="warn", under="ignore", invalid="warn")
+
+
+def aligned(*shape: int) -> Array:
+    """Zeros of which each row begins with a line of the cache: no register's load spans two."""
+    doubles = 8  # in a line
+    width = -(-shape[-1] // doubles) * doubles
+    room = np.zeros(math.prod(shape[:-1]) * width + doubles)
+    first = (-room.ctypes.data % (8 * doubles)) // 8
+    return room[first : len(room) - doubles + first].reshape(*shape[:-1], width)
 
 
 def finite(value: float | None) -> float | None:

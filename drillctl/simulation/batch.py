@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drillctl.arrays import Array, aligned
 from drillctl.design.tables import SimulationTable
 from drillctl.errors import InputError
 from drillctl.rig.bit_rock import PrintedThreeBranch
@@ -34,7 +35,6 @@ from drillctl.simulation.step_laws import (
     within_run,
 )
 
-Array = NDArray[np.float64]
 Watch = NDArray[np.int64]
 """Shape (1,): runs stop once it is other than zero, by whichever thread."""
 
@@ -191,7 +191,7 @@ def _run(
     watch = new_watch() if watch is None else watch
 
     def advance(begin: int, end: int) -> None:
-        run(begin, end, *arguments, _aligned(rows * WIDTH), measures, traces, watch)
+        run(begin, end, *arguments, aligned(rows * WIDTH), measures, traces, watch)
 
     _in_threads(advance, len(padded) // WIDTH, watch)
     return measures[:, :count], traces[:, :, :count]
@@ -213,13 +213,6 @@ def _rate(lanes: Lanes) -> float | Array:
     if lanes.axial is None:
         return 0.0
     return np.asarray(lanes.friction.rate(lanes.weight_at_rest, lanes.begin_speed))
-
-
-def _aligned(size: int) -> Array:
-    """Room for doubles that begins with a line of the cache: no row lies across two."""
-    line = 64
-    room = np.empty(size + line // 8)
-    return room[(-room.ctypes.data % line) // 8 :][:size]
 
 
 def new_watch() -> Watch:

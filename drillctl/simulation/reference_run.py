@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from drillctl.arrays import aligned
 from drillctl.rig.top_drive import SampledDrive
 from drillctl.simulation import reference_rates as f
 from drillctl.simulation import reference_steps as s
@@ -699,7 +700,7 @@ def advance(
 def work_for(size: int) -> s.Work:
     """Memory of the steps of a rig with so many states."""
     return s.Work(
-        np.zeros((s.DENSE_STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((3, size)),
+        aligned(s.DENSE_STAGES, size), aligned(size), aligned(size), aligned(3, size),
         np.zeros(s.DENSE_STAGES), np.zeros(8),
         np.arange(size), np.zeros((0, size)), np.zeros(f.FIRST + 8 * size),
     )  # fmt: skip

@@ -42,7 +42,8 @@ class Tableau(NamedTuple):
 class Dense(NamedTuple):
     """A dense output: F1 to F6 of the nested form as sums of the stages and of the change."""
 
-    weights: Any  # shape (16, 6)
+    weights: Any  # shape (stages, 6)
+    of: Any  # shape (stages,): stages that these belong to
     changes: Any  # shape (6,)
     by_step: bool  # whether the stages are rates, to be multiplied with the step
 
@@ -69,7 +70,8 @@ def explicit_dense_output() -> Dense:
     weights = np.zeros((DENSE_STAGES, 6))
     weights[0, 0], weights[[0, STAGES], 1] = 1.0, -1.0
     weights[:, 2:] = np.transpose(_published()["dense"])
-    return Dense(weights, np.array([-1.0, 2.0, 0.0, 0.0, 0.0, 0.0]), by_step=True)
+    of = np.flatnonzero(np.any(weights != 0.0, axis=1))
+    return Dense(weights[of], of, np.array([-1.0, 2.0, 0.0, 0.0, 0.0, 0.0]), by_step=True)
 
 
 def _without_zeros(weights: Array) -> tuple[Array, Index, Index]:
@@ -81,7 +83,7 @@ def _without_zeros(weights: Array) -> tuple[Array, Index, Index]:
 
 
 class Work(NamedTuple):
-    """Memory of the steps, shared by all phases of a run."""
+    """Memory of the steps, shared by all phases of a run; rows end with zeros, see `aligned`."""
 
     stages: Any  # shape (16, states)
     trial: Any  # shape (states,): argument of a stage
@@ -198,7 +200,7 @@ def _record_one(
     dense: Any, unit: float, begin: float, change: float, stages: Any, row: Any, place: int
 ) -> None:
     a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(DENSE_STAGES):
+    for j in range(len(dense.of)):
         rate, weights = stages[j], dense.weights[j]
         a += weights[0] * rate
         b += weights[1] * rate
@@ -220,21 +222,21 @@ def record(
     """Keep the dense output of some states and of sums of states."""
     row[BEGIN], row[LENGTH] = time, step
     stages, after, unit = work.stages, work.after, step if dense.by_step else 1.0
-    one, moved = work.one, work.errors[0]
+    of, one, moved = dense.of, work.one, work.errors[0]
     for i in range(len(state)):
         moved[i] = after[i] - state[i]
     for c in range(len(kept)):
         i = kept[c]
-        for j in range(DENSE_STAGES):
-            one[j] = stages[j, i]
+        for j in range(len(of)):
+            one[j] = stages[of[j], i]
         _record_one(dense, unit, state[i], moved[i], one, row, FIRST + 8 * c)
     for c in range(len(sums)):
         weights = sums[c]
         count = len(weights)
         begin = _product(weights, state[:count])
         change = _product(weights, moved[:count])
-        for j in range(DENSE_STAGES):
-            one[j] = _product(weights, stages[j, :count])
+        for j in range(len(of)):
+            one[j] = _product(weights, stages[of[j], :count])
         _record_one(dense, unit, begin, change, one, row, FIRST + 8 * (len(kept) + c))
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from drillctl.arrays import Array
 from drillctl.simulation import reference_rates as f
-from drillctl.simulation.reference_steps import DENSE_STAGES, Dense
+from drillctl.simulation.reference_steps import Dense
 
 STAGES = 8
 GAMMA = 0.21193756319429014
@@ -80,9 +80,9 @@ def stiff_dense_output() -> Dense:
         -52.072871366152654, -59.78993625266729, -0.15582684282751913, 4.883087185713722,
     )  # fmt: skip
     one, two, three = np.array(first), np.array(second), np.array(third)
-    weights = np.zeros((DENSE_STAGES, 6))
-    weights[1:9, 0], weights[1:9, 1], weights[1:9, 2] = one, two + three, -three
-    return Dense(weights, np.zeros(6), by_step=False)
+    weights = np.zeros((STAGES, 6))
+    weights[:, 0], weights[:, 1], weights[:, 2] = one, two + three, -three
+    return Dense(weights, 1 + np.arange(STAGES), np.zeros(6), by_step=False)
 
 
 def _lower(rows: list[tuple[float, ...]]) -> Array:

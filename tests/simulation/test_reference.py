@@ -145,7 +145,9 @@ def test_coefficients_are_those_of_scipy():
     errors = np.zeros((2, 16))
     np.put_along_axis(errors, made.errors_of, made.errors, axis=1)
     assert np.array_equal(errors[:, :13], [DOP853.E5, DOP853.E3])
-    assert np.array_equal(dense.weights[:, 2:], DOP853.D.T)
+    weights = np.zeros((16, 6))
+    weights[dense.of] = dense.weights
+    assert np.array_equal(weights[:, 2:], DOP853.D.T)
 
 
 STIFF = {"drillstring.sections.pipe.stiffness_damping": "1e-3 s", "simulation.duration": "15 s"}
@@ -195,7 +197,7 @@ def _steps(rigs, method, solver, work, state, step, count):
         change_with_time(rigs[0], solver, k * step, step, 1, state, work.stages[0])
         rock = slip_torque(rigs[0], k * step, state, 1)
         stiff_step(rigs[0], method.implicit, work, solver, k * step, step, 1, state, (torque, rock))
-        state[:] = work.after
+        state[:] = work.after[: len(state)]
 
 
 def test_method_by_what_the_string_asks():
