@@ -17,7 +17,7 @@ import numpy as np
 from drillctl.rig import program
 from drillctl.rig.top_drive import real_drive
 from drillctl.rig.weight_on_bit import following_speed, stick_slip_alarm
-from drillctl.simulation import cutting_hook, cutting_tape, reference_rates
+from drillctl.simulation import cutting_hook, cutting_tape, law_calls, reference_rates
 from drillctl.simulation.cutting_hook import (
     Hook,
     hook_force,
@@ -572,6 +572,7 @@ advance = on_disk(
         for one in (
             cutting_hook,
             cutting_tape,
+            law_calls,
             program,
             real_drive,
             reference_rates,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numba
 from numba.extending import register_jitable
 
-compiled = numba.njit(fastmath={"contract"}, nogil=True, error_model="numpy", _nrt=False)
+from drillctl.simulation.law_calls import compiled
 
 FIRST, LAST = 3, 27  # columns of the tape: of the polynomials, and behind them
 FOLLOWED = LAST + 9  # of what the weight follows

@@ -20,6 +20,13 @@ from numba import types
 from drillctl.simulation import kernel_cache
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy"}
+compiled = numba.njit(fastmath={"contract"}, nogil=True, _nrt=False, **OPTIONS)
+"""Decorator of what is part of a solver: products and sums may be fused, nothing else.
+
+No references are counted: each look at an array would count up and down, atomically, and a tuple of
+arrays all of its own, which took a third of a run. So nothing here may make an array: what shows
+numbers that the caller keeps is `reference_rates.view`.
+"""
 STATE = types.CPointer(types.float64)  # how an array is passed
 CALL = (STATE, *[types.float64] * 4)  # numbers of a law, and four more, used or not
 

@@ -34,22 +34,15 @@ from drillctl.simulation.law_calls import (
     CALL,
     OPTIONS,
     STATE,
+    compiled,
     from_numbers,
     jitted,
     on_disk,
     version,
 )
 
-compiled = numba.njit(fastmath={"contract"}, nogil=True, _nrt=False, **OPTIONS)
-"""Decorator of what is part of the solver: products and sums may be fused, nothing else.
-
-No references are counted: each look at an array would count up and down, atomically, and a tuple of
-arrays all of its own, which took a third of a run. So nothing here may make an array; `view` looks
-at numbers that the caller keeps.
-"""
-
 shown = numba.njit(nogil=True, _nrt=True, **OPTIONS)
-"""The same of what returns an array, which numba does not make without counting."""
+"""Decorator of what returns an array, which numba does not compile without counting."""
 
 STUCK, CREEPING, PUSHED, FORWARD_EDGE, BACKWARD_EDGE = 0, 2, 3, 4, 5
 """Phases beside +1 and -1 of a bit that turns; those from 2 on belong to the printed law.

@@ -16,11 +16,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
-
-from drillctl.simulation.law_calls import OPTIONS
-
-compiled = numba.njit(fastmath={"contract"}, nogil=True, **OPTIONS)
+from drillctl.simulation.law_calls import compiled
 
 # Rows of the table, a column a node: its number; friction at rest (N m); -1, 0 or 1 as it slides
 # or sticks, 2 where it drifts; the share of the friction that is left; torque that holds it (N m);
