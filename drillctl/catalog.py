@@ -123,7 +123,7 @@ def regular_file(text: str) -> Path:
             return path
         mode = path.stat().st_mode if path.exists() else None
         others = path.parent.iterdir() if path.parent.is_dir() else ()
-        beside = [p.name for p in others if p.suffix in (path.suffix, ".toml")]
+        beside = {p.name for p in others if p.suffix in (path.suffix, ".toml")} - {path.name}
     if mode is not None:
         raise InputError(_not_regular(mode), text)
     close = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.7)

@@ -195,15 +195,9 @@ def write_starter(name: str, tally: Tally | None = None, like: str | None = None
         raise InputError(f"{shown(name)} is not a file name")
     path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
     source = Path(__file__).with_name("starter.toml") if like is None else catalog.find(like)
-    text = source.read_text(encoding="utf-8")
+    text = catalog.read(source, str(source))
     if tally is not None:
         text = _BLOCK.sub(lambda _: _with_lines(tally), text)
-        text = _BODY.sub(
-            '[bha]\ninertia = "0 kg*m^2"              # all of it is in the tally\n', text
-        )
-        text = _BODY.sub(
-            '[bha]\ninertia = "0 kg*m^2"              # all of it is in the tally\n', text
-        )
         text = _BODY.sub(
             '[bha]\ninertia = "0 kg*m^2"              # all of it is in the tally\n', text
         )
@@ -220,8 +214,6 @@ def write_starter(name: str, tally: Tally | None = None, like: str | None = None
 
 
 _BLOCK = re.compile("^# string: begin\n.*^# string: end\n", flags=re.M | re.S)
-_BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
-_BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
 _BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
 _DAMPING = re.compile("^# Typical internal damping.*?^stiffness_damping.*?\n", flags=re.M | re.S)
 

@@ -5,9 +5,12 @@ CSV, Parquet and MAT 7.3 are never in memory as a whole; LAS and MAT 5 are, as t
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -46,16 +49,30 @@ def open_source(path: Path) -> Source:
         raise InputError(
             f"{path.suffix or 'no ending'} is not a log; allowed are {known}", str(path)
         )
-    try:
+    with _named(path):
         source = reader(path)
-    except InputError as error:
-        raise error.within(str(path)) from None
-    except (OSError, ValueError, KeyError, IndexError, UnicodeError) as error:
-        reason = f"{error}".splitlines()[0] if f"{error}" else type(error).__name__
-        raise InputError(f"cannot be read: {reason}", str(path)) from None
     if len(source.heads) < 2:
         raise InputError("holds fewer than two columns", str(path))
-    return source
+    return replace(source, pieces=partial(_named_pieces, source))
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Refuse a file in one way, whatever the library that reads it raises."""
+    try:
+        yield
+    except InputError as error:
+        raise error.within(str(path)) from None
+    except Exception as error:
+        reason = f"{error}".splitlines()[0] if f"{error}" else type(error).__name__
+        raise InputError(f"cannot be read: {reason}", str(path)) from error
+
+
+def _named_pieces(
+    source: Source, columns: Sequence[int], progress: Progress
+) -> Iterator[list[Any]]:
+    with _named(source.path):
+        yield from source.pieces(columns, progress)
 
 
 def _needed(module: str) -> Any:
@@ -107,7 +124,7 @@ def _layout(path: Path) -> _Text:
         raise InputError("is not text")
     encoding = "utf-16" if raw.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
     try:
-        text = raw[: raw.rfind(b"\n") + 1 or len(raw)].decode(encoding)
+        text = codecs.getincrementaldecoder(encoding)().decode(raw)  # whose end may be cut
     except UnicodeDecodeError:
         encoding = "latin-1"
         text = raw.decode(encoding)
@@ -164,8 +181,9 @@ def _csv_pieces(
         reader = pd.read_csv(
             stream, sep=r"\s+" if layout.separator == " " else layout.separator, header=None,
             skiprows=layout.skipped, usecols=sorted(columns), names=range(len(layout.heads)),
-            index_col=False, encoding=layout.encoding, decimal=layout.decimal, chunksize=rows,
-            na_values=_WORDS, skip_blank_lines=True, on_bad_lines="skip", low_memory=False,
+            index_col=False, encoding=layout.encoding, encoding_errors="replace",
+            decimal=layout.decimal, chunksize=rows, na_values=_WORDS, skip_blank_lines=True,
+            on_bad_lines="skip", low_memory=False,
         )  # fmt: skip
         done = 0
         for piece in reader:
@@ -270,10 +288,7 @@ def _mat5(path: Path) -> Source:
 
 def _las(path: Path) -> Source:
     lasio = _needed("lasio")
-    try:
-        file = lasio.read(str(path))
-    except Exception as error:  # lasio raises types of its own for what is no LAS
-        raise InputError(f"is not LAS: {error}") from None
+    file = lasio.read(str(path))
     heads = tuple(Head(one.mnemonic, one.unit) for one in file.curves)
     data = [np.asarray(one.data) for one in file.curves]
     dated = frozenset(k for k, values in enumerate(data) if _is_text(values))

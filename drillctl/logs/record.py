@@ -22,6 +22,7 @@ from drillctl.progress import SILENT, Progress
 GAP = 2.5  # spacing of two samples, over the usual one, that counts as a gap
 IRREGULAR = 0.1  # standard deviation of the spacing over the usual one that is told
 FEWEST_ROWS = 32
+LARGEST = 1e15  # SI: whatever exceeds it was not measured; its square is a number as well
 CLIPPED = 0.002  # share of rotating time at the very largest value that counts as clipping
 STUCK_TIME = 20.0  # time (s) of one and the same torque under rotation: a sensor that is stuck
 SPIKE = 12.0  # deviation from the running median, over its usual one, of an outlier
@@ -144,10 +145,11 @@ def _si(values: Any, one: Chosen) -> tuple[Any, int]:
         values = numbers
     with np.errstate(over="ignore"):
         result = values.astype(np.float64 if one.quantity == "time" else np.float32)
-    result[~np.isfinite(result)] = np.nan
     for absent in ABSENT:
         result[result == result.dtype.type(absent)] = np.nan
-    result *= result.dtype.type(one.factor)
+    with np.errstate(over="ignore"):
+        result *= result.dtype.type(one.factor)
+    result[np.abs(result) > LARGEST] = np.nan
     return result, lost
 
 
@@ -176,6 +178,7 @@ def _cleaned(file: str, order: list[Chosen], columns: dict[str, Any]) -> Log:
         faults.append(Fault(f"{count} cells of {QUANTITIES[name].label} are no numbers", count))
     time = columns.pop("time")
     time, columns = _in_order(time, columns, faults, file)
+    columns = _with_values(columns, faults, file)
     spacing = float(np.median(np.diff(time[: min(len(time), 200_000)])))
     if not spacing > 0.0:
         raise InputError("its time does not advance", file)
@@ -195,6 +198,16 @@ def _cleaned(file: str, order: list[Chosen], columns: dict[str, Any]) -> Log:
     for name, values in columns.items():
         _mend(name, values, time, turning, usable, spacing, faults)
     return Log(file, tuple(order), time, columns, spacing, bounds, tuple(faults), usable)
+
+
+def _with_values(columns: dict[str, Any], faults: list[Fault], file: str) -> dict[str, Any]:
+    """Columns in which there is anything; refused (`InputError`) if one of the others is needed."""
+    for name in [name for name, values in columns.items() if np.isnan(values).all()]:
+        problem = f"holds no values of {QUANTITIES[name].label}"
+        if name in NEEDED:
+            raise InputError(problem, file)
+        faults.append(Fault(problem, len(columns.pop(name))))
+    return columns
 
 
 def _in_order(

@@ -136,21 +136,28 @@ def _measured(
         speed, torque = (np.interp(time, time[good], x[good]) for x in (speed, torque))
     # A soft drive is stopped for moments by a bit that sticks, under torque.
     turning = (speed >= least[0]) | (torque >= UNDER_TORQUE * torque.mean())
-    if turning.mean() < ROTATING or min(speed.mean() / least[0], torque.mean() / least[1]) < 1.0:
+    drilling = speed.mean() >= least[0] > 0.0 and torque.mean() >= least[1] > 0.0
+    if turning.mean() < ROTATING or not drilling:
         return None
     share, period = tonal_share(time, torque, band)
     low, high = np.percentile(torque, ENDS)
     index = float((high - low) / (2.0 * torque.mean()))
     if from_bit:
-        bit = np.asarray(log.signals["bit_speed"][rows], float)
-        mean = float(np.nanmean(bit))
-        index = float((np.nanmax(bit) - np.nanmin(bit)) / (2.0 * mean)) if mean > 0.0 else np.nan
-    weight = log.signals.get("weight_on_bit")
-    mean_weight = np.nan if weight is None else float(np.nanmean(weight[rows]))
+        bit = _known(log, "bit_speed", rows)
+        mean = bit.mean() if len(bit) else 0.0
+        index = float(np.ptp(bit) / (2.0 * mean)) if mean > 0.0 else np.nan
+    weight = _known(log, "weight_on_bit", rows)
     return (
         float(time[0]), float(time[-1]), share, period, index, float(torque.mean()),
-        float(high - low), float(speed.mean()), mean_weight, np.nan,
+        float(high - low), float(speed.mean()), float(weight.mean()) if len(weight) else np.nan,
+        np.nan,
     )  # fmt: skip
+
+
+def _known(log: Log, name: str, rows: slice) -> Array:
+    """Values of a signal that are there, if any."""
+    values = np.asarray(log.signals.get(name, ())[rows], float)
+    return values[np.isfinite(values)]
 
 
 def tonal_share(time: Array, torque: Array, band: tuple[float, float]) -> tuple[float, float]:

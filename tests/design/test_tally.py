@@ -221,6 +221,9 @@ def test_a_new_rig_like_a_typical_one(name, tmp_path, monkeypatch):
     assert mine.string.parts == model.string.parts
     assert model.tables.status == "typical"
     assert not model.warnings
+    (tmp_path / "no.text").write_bytes(b"\xff")
+    with pytest.raises(InputError, match="not UTF-8 text"):
+        write_starter("other", like="no.text")
 
 
 PIPE = {"name": "Drill pipe", "pipe": "5 in 19.5 lb/ft", "tool_joints": True}

@@ -109,6 +109,8 @@ def test_a_measured_torque_gives_the_friction_factor():
     assert partly.friction_factor > result.friction_factor
     with pytest.raises(InputError, match=r"less than the 2.3\d+ kN\*m of the holes"):
         drillctl.torque_drag(design.replace(cased | {"torque_drag.off_bottom_torque": "1 kN*m"}))
+    with pytest.raises(InputError, match=r"need a friction factor of 27\.9; .* at most 10"):
+        drillctl.torque_drag(design.replace({"torque_drag.off_bottom_torque": "1000 kN*m"}))
     with pytest.raises(InputError, match="no friction factor follows"):
         drillctl.torque_drag(design.replace({"well.survey": [["0 m", "0 deg", "0 deg"]]}))
 

@@ -123,6 +123,52 @@ def test_dates_with_dots_are_of_the_day_first_and_any_column_may_hold_them(tmp_p
     assert log.signals["top_torque"][3] == pytest.approx(3500.0)
 
 
+def rows(torque="8000", speed="100", time=lambda k: k / 10, end=""):
+    lines = [f"{time(k)!r},{torque},{speed}{end}" for k in range(1600)]
+    return "\n".join(["time_s,torque_Nm,speed_rpm" + (",wob_kN,dhrpm_rpm" if end else ""), *lines])
+
+
+@pytest.mark.parametrize(("content", "words"), [
+    (rows("nan"), "holds no values of top torque"),
+    (rows("1e400", "1e30"), "holds no values of top speed"),
+    (rows(time=lambda k: k * 1e300), "holds 1 rows"),
+    (rows().replace("8000", "x"), "holds no values of top torque"),
+])  # fmt: skip
+def test_a_log_of_nothing_is_refused(content, words, tmp_path):
+    (tmp_path / "a.csv").write_text(content)
+    with pytest.raises(InputError, match=words):
+        read_log(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("content", [
+    rows("0", "0"), rows("1e-308", "1e-320"), rows("-8000", "-100"),
+    rows(time=lambda k: k * 1e-12), rows(end=",nan,"), rows("9e14", "9e14", end=",1e40,0"),
+    rows(end=",140,90").replace(",140,90", ",,", 900),
+])  # fmt: skip
+def test_any_numbers_are_ranked_without_a_warning(content, tmp_path):
+    lines = content.split("\n")
+    lines = [line.replace(",8000,", f",{8000 + k % 13},") for k, line in enumerate(lines)]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    with np.errstate(all="raise", under="ignore"):
+        assert run(["log", str(tmp_path / "a.csv"), "--out", str(tmp_path / "run"), "--json"]) == 0
+
+
+def test_a_file_that_breaks_is_named(tmp_path, log):
+    for name, content in (("a.mat", b""), ("a.las", b"x"), ("a.parquet", b"x")):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError, match=f"{name}: (cannot be read|needs the package)"):
+            read_log(tmp_path / name)
+    text = csv(tmp_path / "a.csv").read_text()
+    (tmp_path / "a.csv").write_bytes(text.encode("utf-16"))
+    assert len(text) > 2**17
+    assert read_log(tmp_path / "a.csv").time.tobytes() == log.time.tobytes()
+    (tmp_path / "a.csv").write_bytes(text[:100_000].encode() + b"\xe9" + text[100_000:].encode())
+    assert sum(fault.count for fault in read_log(tmp_path / "a.csv").faults) < 5
+    (tmp_path / "a.csv").write_text(text[:100_000] + '\n"' + text[100_000:])
+    with pytest.raises(InputError, match=r"a\.csv: cannot be read: Error tokenizing"):
+        read_log(tmp_path / "a.csv")
+
+
 @pytest.mark.parametrize(
     ("head", "words"),
     [

@@ -235,5 +235,6 @@ def _spectra(logs: tuple[Log, ...], windows: Windows, events: tuple[Event, ...])
         torque = np.asarray(log.signals["top_torque"][inside], float)
         good = np.isfinite(torque)
         frequency, power = spectrum(log.time[inside][good], torque[good])
-        results.append(Spectrum(name, frequency[1:], power[1:] / power[1:].sum()))
+        total = power[1:].sum() or 1.0  # of a constant torque nothing is to be shared
+        results.append(Spectrum(name, frequency[1:], power[1:] / total))
     return results

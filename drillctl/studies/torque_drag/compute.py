@@ -12,6 +12,7 @@ from drillctl.design import Design, well
 from drillctl.design.parts import torque_at_set_speed
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
+from drillctl.rig.table import MOST_FRICTION
 from drillctl.rig.well.soft_string import Drag, Line, Motion, Run, drag, sinusoidal_limit
 from drillctl.store.codec import label
 from drillctl.store.result import Result
@@ -170,7 +171,13 @@ def _factor(design: Design, placed: Line, made: tuple[Run, ...]) -> float:
             f"{measured / 1e3:.4g} kN*m is less than the {none / 1e3:.4g} kN*m of the holes with a "
             "friction factor of their own", "off_bottom_torque",
         )  # fmt: skip
-    return float((measured - none) / (one - none))
+    factor = float((measured - none) / (one - none))
+    if factor > MOST_FRICTION:
+        raise InputError(
+            f"{measured / 1e3:.4g} kN*m need a friction factor of {factor:.3g}; that of a wall is "
+            f"at most {MOST_FRICTION:g}", "off_bottom_torque",
+        )  # fmt: skip
+    return factor
 
 
 def _lumped(made: tuple[Run, ...]) -> list[str]:
