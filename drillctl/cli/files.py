@@ -216,6 +216,8 @@ def new(
     """Write a commented design file to start from."""
     from drillctl.design.reading import load, write_starter
     from drillctl.design.tally import read
+    from drillctl.design.well import mass_in_air
+    from drillctl.rig.well.soft_string import GRAVITY
 
     if tally is None:
         if begins is not None:
@@ -224,16 +226,17 @@ def new(
         return
     if like is not None:
         raise InputError("is not allowed with --tally: add the tally to the new file", "--like")
-    made = read(tally, begins, Path(), "--from")
+    made = read(tally, begins, Path(), "--tally")
     path = write_starter(name, made)
-    console.table(f"columns of {tally}", ["column", "read as", "unit"], list(made.columns))
+    console.table(f"columns of {made.place}", ["column", "read as", "unit"], list(made.columns))
     for note in made.notes:
         console.line(note)
     design = load(path)
-    sections = design.tables.drillstring.sections
+    sections, system = design.tables.drillstring.sections, design.tables.units or "si"
+    weight = full(GRAVITY * mass_in_air(design.tables), "N")
     console.line(
-        f"{len(sections)} sections from the top, {sections[0].name}, to {sections[-1].name}, "
-        f"{sum(one.span for one in sections):.1f} m in all"
+        f"{len(sections)} sections from the top, {sections[0].name}, to {sections[-1].name}: "
+        + told(f"{full(sum(one.span for one in sections), 'm')} in all, {weight} in air", system)
     )
     console.line(f"written: {path}")
 

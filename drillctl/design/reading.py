@@ -201,6 +201,7 @@ def write_starter(name: str, tally: Tally | None = None, like: str | None = None
         text = _BODY.sub(
             '[bha]\ninertia = "0 kg*m^2"              # all of it is in the tally\n', text
         )
+        text = _of_tally(text, tally)
     title = path.stem.replace("\\", "").replace('"', "")
     text = re.sub(r'^title = ".*"$', lambda _: f'title = "{title}"', text, count=1, flags=re.M)
     try:
@@ -216,6 +217,26 @@ def write_starter(name: str, tally: Tally | None = None, like: str | None = None
 _BLOCK = re.compile("^# string: begin\n.*^# string: end\n", flags=re.M | re.S)
 _BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
 _DAMPING = re.compile("^# Typical internal damping.*?^stiffness_damping.*?\n", flags=re.M | re.S)
+
+
+def _of_tally(text: str, tally: Tally) -> str:
+    """A new file with the bit and the units of its tally."""
+
+    def put(key: str, value: str, why: str) -> None:
+        nonlocal text
+        line = f'{key} = "{value}"'
+        text = re.sub(f"^{key} = .*$", lambda _: f"{line:<34}# {why}", text, count=1, flags=re.M)
+
+    size, kind = tally.bit
+    if tally.in_feet:
+        text = re.sub("^(source = .*\n)", r'\1units = "field"\n', text, count=1, flags=re.M)
+        put("units", "field", 'in which results are; or "si"')
+    if size is not None:
+        across = f"{size / 0.0254:.6g} in" if tally.in_feet else units.write(size, units.DIAMETER)
+        put("bit_diameter", across, "of the tally")
+    if kind is not None:
+        put("bit_type", kind, 'of the tally; "pdc", "hybrid" or "roller-cone"')
+    return text
 
 
 def _with_lines(tally: Tally) -> str:

@@ -8,6 +8,7 @@ and what was read how is reported.
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -18,13 +19,15 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from drillctl import units
-from drillctl.design.tables import SectionTable
+from drillctl.design.tables import RANGE_2, SectionTable
 from drillctl.design.tally_heads import (
     FIELDS,
     NOTHING,
     Head,
     columns_of,
     heads_of,
+    likeliest,
+    parted,
     problem_of,
     rows_of,
     text_of,
@@ -41,22 +44,41 @@ SHORTEST_STAND = 15.0  # length (m) of a stand: two short joints
 SAME_BORE = 1e-3  # by how much (m) a bore may differ from that of the catalogue's pipe
 
 
-_SUM = re.compile(r"\b(sub-?)?(total|sum)s?\b")
+_SUM = re.compile(r"\b(sub-?)?(total|sum|summe|somme|suma|totaal|totalt)s?\b")
 _REMARK = re.compile(
     r":|\b(bha|assembly|string|drillstring|remarks?|notes?|date|page|end of|\w+ed by)\b"
 )
-_PIPE = re.compile(r"\bd\.?p\b|\bpipe|hw|heavy")
+_PIPE = re.compile(
+    r"\bd\.?p\b|pipe|\bhw|hwdp|heavy|hevi|gestänge|borerør|tungvekt|(?<!masse)(?<!masse[ -])tige"
+)
+_TYPES = {"hybrid": "hybrid|kymera", "roller-cone": r"cone|\btci\b|mill|rolle", "pdc": "pdc"}
+_BIT = re.compile(
+    r"\bbits?$|^bits?\b(?!.*\bsub\b)|\bbit\b *\(|\bpdc\b|tri-?con|"
+    r"mei(ß|ss)el|borekrone|^outil\b|tr[ée]pan"
+)
 
 
 @dataclass(frozen=True)
 class Tally:
     """A tally as it was read."""
 
+    place: str  # file, and sheet of a workbook
     text: str  # its lines
     begins: str  # end that its first line is at
     sections: tuple[dict[str, Any], ...]  # from top to bottom, as in a design file
     columns: tuple[tuple[str, str, str], ...]  # head, what it was read as, unit
     notes: tuple[str, ...]  # what was concluded, line by line
+    in_feet: bool  # whether most of its lengths are
+
+    @property
+    def bit(self) -> tuple[float | None, str | None]:
+        """Diameter (m) and type of the bit, as far as its lines say."""
+        bits = [one for one in self.sections if _is_bit(one["name"])]
+        if not bits:
+            return None, None
+        size, name = bits[-1].get("outer_diameter"), bits[-1]["name"].lower()
+        types = (kind for kind, words in _TYPES.items() if re.search(words, name))
+        return None if size is None else units.parse(size, units.DIAMETER), next(types, None)
 
 
 class _Cell(NamedTuple):
@@ -92,13 +114,13 @@ def read(source: object, begins: object, folder: Path, where: str = "drillstring
         raise InputError(
             f"{'is missing' if begins is None else f'got {shown(begins)}'}: does the first line "
             'of the tally stand at the "top" or at the "bit"?',
-            f"{where}_from" if where.endswith("tally") else where,
+            "--from" if where.startswith("--") else f"{where}_from",
         )
     if "\n" in source.strip():
         place, text = where, source.lstrip("\n")
     else:
         path = folder / Path(source).expanduser()
-        place, text = str(path), text_of(path, where)
+        place, text = text_of(path, where)
     try:
         rows = [(n, row) for n, row in enumerate(rows_of(text), 1) if any(row)]
     except csv.Error as error:
@@ -109,8 +131,8 @@ def read(source: object, begins: object, folder: Path, where: str = "drillstring
 def _read(place: str, text: str, rows: list[tuple[int, list[str]]], begins: str) -> Tally:
     if len(rows) < 2:
         raise InputError("holds no lines below its heads", place)
-    last, heads = heads_of(rows) or (0, rows[0][1])
-    rest = rows[last + 1 :]
+    last, heads = heads_of(rows) or likeliest(rows)
+    heads, rest = parted(heads, rows[last + 1 :])
     columns = columns_of(heads, [row for _, row in rest], f"{place}: line {rows[last][0]}")
     if not rest:
         raise InputError("holds no lines below its heads", place)
@@ -123,7 +145,10 @@ def _read(place: str, text: str, rows: list[tuple[int, list[str]]], begins: str)
         notes.append("the length of a line counts as that of all its pieces: no piece is so long")
         for line in lines:
             line.of_all_pieces()
+    if _adds_up(lines):
+        notes.append("the total length adds up from line to line: not used")
     sections: list[dict[str, Any]] = []
+    said: tuple[str, list[str]] = ("", [])
     for line in lines:
         if line.adds_up or line.is_sum_of(sections):
             notes.append(
@@ -133,17 +158,21 @@ def _read(place: str, text: str, rows: list[tuple[int, list[str]]], begins: str)
             notes.append(f"line {line.number}: {line.name!r} left out, a title or remark")
         elif line.cells:
             sections.append(line.section())
-            notes += [f"line {line.number}, {line.name}: {note}" for note in line.notes]
+            if line.notes and (line.name, line.notes) != said:  # once for a list of joints
+                notes += [f"line {line.number}, {line.name}: {note}" for note in line.notes]
+            said = (line.name, line.notes)
     if not sections:
         raise InputError("holds no lines below its heads", place)
     _refuse_upside_down(sections, begins == "bit", place)
-    sections = sections[::-1] if begins == "bit" else sections
+    sections = list(_joined(sections[::-1] if begins == "bit" else sections, notes))
     return Tally(
+        place,
         text,
         begins,
         tuple(_numbered(sections, notes)),
         tuple((c.text, c.field or "not used", c.unit) for c in columns if c.text),
         tuple(notes),
+        2 * sum(line.in_feet for line in lines) > len(sections),
     )
 
 
@@ -195,6 +224,23 @@ class _Line:
         self.columns["total length"] = self.columns["length"]
         if "length" in self.cells:
             self.cells["total length"] = self.cells.pop("length")
+
+    @property
+    def in_feet(self) -> bool:
+        """Whether its length is in feet."""
+        own = ({"length", "total length"} & set(self.cells)) and not self.adds_up
+        field = "length" if "length" in self.cells else "total length"
+        return bool(own) and bool(
+            re.search(r"f(ee|oo)?t|['\u2032\u2019]", self._quantity(field).lower())
+        )
+
+    def own_length(self) -> float:
+        """Length of all its pieces (m), by the length of one."""
+        return self._value("length") * self._count()
+
+    def total_length(self) -> float:
+        """As the line gives it (m)."""
+        return self._value("total length")
 
     def section(self) -> dict[str, Any]:
         """Keys of a section as in a design file."""
@@ -275,6 +321,11 @@ class _Line:
             return self._by_name(grade)
         outer = self._quantity("od")
         if "id" in self.cells:
+            if self._value("id") >= self._value("od"):
+                raise InputError(
+                    f"inner diameter {self._quantity('id')} is not less than the outer, {outer}",
+                    self.cells["id"].where,
+                )
             return {"outer_diameter": outer, "inner_diameter": self._quantity("id")}
         bore, how = self._bore()
         self.notes.append(f"no inner diameter: {how}")
@@ -319,20 +370,39 @@ class _Line:
     def _joints(self, section: dict[str, Any]) -> dict[str, Any]:
         fields = ("joint od", "joint id", "joint length")
         given = [field for field in fields if field in self.cells]
-        if not given:
+        if "pipe" in section or "joint od" not in given:
             return self._joints_of_catalogue(section)
-        if "pipe" in section or "joint length" not in given or "joint od" not in given:
-            self.notes.append("tool joint left out: it has no outer diameter and length of its own")
-            return {}
         keys = {FIELDS[field].key: self._quantity(field) for field in given}
+        if "joint length" not in given:
+            known = self._like()
+            if known is None:
+                return {}  # a tool with the size of its connection
+            length = next(iter(PIPES[known].joints.values())).length
+            keys["joint_length"] = f"{length!r} m"
+            self.notes.append(f"tool joint as long as that of {known}, {length / 0.0254:g} in")
         if "joint id" not in given:
             keys["joint_inner_diameter"] = section["inner_diameter"]
             self.notes.append("tool joint with the bore of the body")
-        if "joint spacing" in self.cells:
-            keys["joint_spacing"] = self._quantity("joint spacing")
-        elif "repeat" not in section:
+        if "joint spacing" not in self.cells and "repeat" not in section:
             self.notes.append("a tool joint every 31 ft (a typical joint of pipe), or one in all")
-        return keys
+        return keys | self._spacing(section, RANGE_2)
+
+    def _spacing(self, section: dict[str, Any], usual: float) -> dict[str, Any]:
+        """How far tool joints are apart where the pieces are not joints of pipe: in stands."""
+        if "joint spacing" in self.cells:
+            return {"joint_spacing": self._quantity("joint spacing")}
+        length = units.parse(section["length"], units.LENGTH)
+        if length < SHORTEST_STAND or "repeat" not in section:
+            return {}
+        return {"joint_spacing": f"{length / round(length / usual):.6g} m"}
+
+    def _like(self) -> str | None:
+        """The pipe of the catalogue that is next in size."""
+        if not _PIPE.search(self.name.lower()):
+            return None
+        kind, outer = kind_in(self.name), self._value("od")
+        known = [name for name, pipe in PIPES.items() if pipe.kind == kind]
+        return min(known, key=lambda name: abs(PIPES[name].outer_diameter - outer), default=None)
 
     def _joints_of_catalogue(self, section: dict[str, Any]) -> dict[str, Any]:
         """Tool joints of a pipe that gives none: of its size, weight or bore, and grade."""
@@ -342,21 +412,17 @@ class _Line:
         weight = self._value("weight") if "weight" in self.cells else None
         known = drill_pipe(outer, weight, kind_in(self.name) == "HWDP", bore)
         if known is None or abs(PIPES[known].inner_diameter - bore) > SAME_BORE:
-            self.notes.append("no tool joints: no pipe of the catalogue has its size and bore")
+            self.notes.append(
+                "no tool joints: no pipe of the catalogue has its size and bore; give TJ OD, TJ ID"
+            )
             return {}
         grade, pipe = section.get("grade", ""), PIPES[known]
-        length, keys = units.parse(section["length"], units.LENGTH), {}
-        if "joint spacing" in self.cells:
-            keys["joint_spacing"] = self._quantity("joint spacing")
-        elif length > SHORTEST_STAND and "repeat" in section:  # stands
-            each = length / round(length / pipe.joint_spacing)
-            keys["joint_spacing"] = f"{each:.6g} m"
         lowest = (
-            "" if kind_in(known) == "HWDP" else f" of the lowest grade, {next(iter(pipe.joints))}"
+            "" if kind_in(known) == "HWDP" else f" of the lowest grade, {next(iter(pipe.joints))},"
         )
         said = f" of {grade}" if grade in pipe.joints else lowest
         self.notes.append(f"tool joints: those of {known}{said} in the catalogue")
-        return {"pipe": known, "tool_joints": True, **keys}
+        return {"pipe": known, "tool_joints": True, **self._spacing(section, pipe.joint_spacing)}
 
     def _grade(self) -> dict[str, Any]:
         named = re.search(r"\b(E-?75|X-?95|G-?105|S-?135)\b", self.name.upper())
@@ -388,13 +454,41 @@ class _Line:
         return f"{self.where}, column {heads[0]!r}" if heads else self.where
 
 
+def _adds_up(lines: list[_Line]) -> bool:
+    """Whether total lengths are those from one end to each line; then they are left out."""
+    both = [one for one in lines if {"length", "total length"} <= set(one.cells)]
+    for way in (both, both[::-1]):
+        so_far, adds = 0.0, len(both) > 2
+        for one in way:
+            so_far += one.own_length()
+            adds = adds and abs(one.total_length() / so_far - 1.0) < 0.01
+        if adds:
+            for one in both:
+                del one.cells["total length"]
+            return True
+    return False
+
+
+def _joined(sections: Iterable[dict[str, Any]], notes: list[str]) -> Iterable[dict[str, Any]]:
+    """A list of joints, a line each, as a section of so many pieces of their mean length."""
+    alike = itertools.groupby(sections, lambda one: {k: v for k, v in one.items() if k != "length"})
+    for keys, group in alike:
+        pieces = list(group)
+        if len(pieces) < 3 or "repeat" in keys or "inertia" in keys:
+            yield from pieces
+            continue
+        mean = sum(map(_span, pieces)) / len(pieces)
+        notes.append(f"{keys['name']!r}: {len(pieces)} lines are pieces of {mean:.4g} m on average")
+        yield {**pieces[0], "repeat": len(pieces), "length": f"{mean:.10g} m"}
+
+
 def _span(section: Mapping[str, Any]) -> float:
     """Length of a section (m)."""
     return units.parse(section["length"], units.LENGTH) * int(section.get("repeat", 1))
 
 
 def _is_bit(name: str) -> bool:
-    return bool(re.search(r"\bbit$|^bit\b(?!.*\bsub\b)|\bpdc\b|\btricone\b", name.lower()))
+    return bool(_BIT.search(name.lower()))
 
 
 def _refuse_upside_down(sections: list[dict[str, Any]], upwards: bool, place: str) -> None:

@@ -24,17 +24,43 @@ class Field(NamedTuple):
     heads: str  # pattern of the heads, in lower case, without unit
 
 
+_WORDS = {
+    "outer": "ytre utvendig extérieur exterieur exterior uitwendige",
+    "inner": "indre innvendig intérieur interieur interior inwendige",
+    "od": "außendurchmesser aussendurchmesser buitendiameter ad",
+    "id": "innendurchmesser binnendiameter",
+    "diameter": "durchmesser diamètre diametre diámetro diametro ø",
+    "length": "länge laenge lengde lengte longueur longitud",
+    "each length": "einzellänge",
+    "total length": "gesamtlänge",
+    "each": "unitaire unitaria",
+    "per": "pr",
+    "total": "totale gesamt",
+    "count": "anzahl antall aantal nombre cantidad stück stk",
+    "component": "bezeichnung benennung komponente komponent komponenten désignation designation "
+    "omschrijving onderdeel descripción descripcion élément elemento",
+    "weight": "gewicht vekt poids peso masse masa",
+    "cumulative": "akkumuliert akkumulert kumuliert kumulativ cumulée cumulé acumulada acumulado",
+    "grade": "stahlgüte stålkvalitet kvalitet güte nuance grado",
+    "inertia": "trägheitsmoment treghetsmoment inertie inercia",
+}
+_ENGLISH = {word: english for english, words in _WORDS.items() for word in words.split()}
 _JOINT = r"(?=.*\b(tj|tool ?joints?|joint|connection|conn)\b).*"
-_OUTER, _INNER = r"\b(od|o d|outer|outside|external)\b", r"\b(id|i d|inner|inside|internal|bore)\b"
+_OUTER = r"\b(od|o d|do|d o|outer|outside|external|diameter (out|ext))\b"
+_INNER = r"\b(id|i d|di|d i|inner|inside|internal|bore|diameter in[tn]?)\b"
 _UNUSED = (
-    r"\b(cum\w*|accum\w*|running|depth|serial|sn|asset|part|fn|fish\w*|from|to|max|blade|gauge|"
-    r"neck|drift|remarks?)\b"
+    r"\b(a?cum\w*|acc|accum\w*|running|depth|serial|sn|asset|part|fn|fish\w*|from|to|max|blade|"
+    r"gauge|neck|drift|remarks?)\b|\b(stand|joint|jt) ?(#|no|nr|number)$|\bpos$"
 )
-_EACH = r"length (per|of (a|each)) |length each|each length|avg length"
+_EACH = (
+    r"(length|len) (per|of (a|each)) |(length|len) each|each (length|len)|"
+    r"(avg|single|unit) (length|len)"
+)
 _COUNT = r"\b(count|qty|quantity|number|no|nos|nr|joints|jts|pieces|pcs)\b|^#$"
+_PIECES = r"\b(count|qty|quantity|joints|jts|pieces|pcs)\b"  # what no number of a line is called
 _PIPE_JOINT = r"\b(average|avg|mean|range) (joint|jt)s? (length|len)\b"
 _NAME = r"\b(name|component|item|description|tool|element|section|type|bha)\b"
-_LENGTH = r"\b(length|len)\b"
+_LENGTH = r"\b(length|len)\b|^l$"
 _TOTAL = r"\b(total|sum|section) (length|len)\b|\blength total\b"
 FIELDS = {
     "not used": Field("", None, _UNUSED),
@@ -46,11 +72,11 @@ FIELDS = {
     "length of a piece": Field("length", units.LENGTH, _EACH),
     "joint length": Field("joint_length", units.LENGTH, _JOINT + _LENGTH),
     "total length": Field("", units.LENGTH, _TOTAL),
-    "weight": Field("", units.LINEAR_MASS, r"\b(weight|wt|ppf|mass|lb ft|kg m)\b"),
+    "weight": Field("", units.LINEAR_MASS, r"\b(weight|wt|ppf|mass|lb per ft|kg per m)\b|^[mwq]$"),
     "grade": Field("grade", None, r"\bgrade\b"),
     "inertia": Field("inertia", units.INERTIA, r"\binertia\b"),
     "stands": Field("repeat", None, r"\bstands?\b"),
-    "od": Field("outer_diameter", units.DIAMETER, _OUTER + r"|^(diameter|dia|size)\b"),
+    "od": Field("outer_diameter", units.DIAMETER, _OUTER + r"|^(diameter|dia|size)\b(?! in)"),
     "id": Field("inner_diameter", units.DIAMETER, _INNER),
     "count": Field("repeat", None, _COUNT),
     "length": Field("length", units.LENGTH, _LENGTH),
@@ -67,17 +93,28 @@ class Head(NamedTuple):
     field: str
     unit: str
 
+    @property
+    def is_of_a_piece(self) -> bool:
+        """Whether a length says that it is of a piece."""
+        return bool(re.search(_EACH, _plain(self.text)))
 
-def text_of(path: Path, where: str) -> str:
-    """Lines of a file; of a workbook the first sheet that holds a tally, as CSV."""
+
+def text_of(path: Path, where: str) -> tuple[str, str]:
+    """Where a tally stands, and its lines: a file, or the likeliest sheet of a workbook."""
     content = catalog.read_bytes(path, f"{where}: {path}")
     if path.suffix.lower() in (".xlsx", ".xlsm"):
         sheets = _of_workbook(path, content)
-        rows = next((one for one in sheets if heads_of(list(enumerate(one)))), sheets[0])
+        name = max(sheets, key=lambda one: _known_heads(sheets[one]))
         stream = io.StringIO()
-        csv.writer(stream, lineterminator="\n").writerows(rows)
-        return stream.getvalue()
-    return _decoded(content).rstrip("\n") + "\n"
+        csv.writer(stream, lineterminator="\n").writerows(sheets[name])
+        return f"{path}, sheet {name!r}" if len(sheets) > 1 else str(path), stream.getvalue()
+    return str(path), _decoded(content).rstrip("\n") + "\n"
+
+
+def _known_heads(rows: list[list[str]]) -> int:
+    """How many columns of a tally a sheet has."""
+    found = heads_of(list(enumerate(rows)))
+    return 0 if found is None else len({_head(text).field for text in found[1]} - {""})
 
 
 def _decoded(content: bytes) -> str:
@@ -90,8 +127,8 @@ def _decoded(content: bytes) -> str:
         return content.decode("cp1252", "replace")
 
 
-def _of_workbook(path: Path, content: bytes) -> list[list[list[str]]]:
-    """The sheets of a workbook."""
+def _of_workbook(path: Path, content: bytes) -> dict[str, list[list[str]]]:
+    """The sheets of a workbook by name."""
     try:
         import openpyxl
     except ImportError:
@@ -100,10 +137,12 @@ def _of_workbook(path: Path, content: bytes) -> list[list[list[str]]]:
         ) from None
     try:
         book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
-        sheets = [list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets]
+        sheets = {one.title: list(one.iter_rows(values_only=True)) for one in book.worksheets}
     except Exception as error:  # what is no workbook fails in many ways
         raise InputError(f"{path} is no workbook: {error}") from None
-    return [[[_written(cell) for cell in row] for row in sheet] for sheet in sheets]
+    return {
+        name: [[_written(cell) for cell in row] for row in rows] for name, rows in sheets.items()
+    }
 
 
 def _written(value: object) -> str:
@@ -118,7 +157,9 @@ def rows_of(text: str) -> list[list[str]]:
     some = [line for line in lines[:40] if line.strip()]
     often = (one for one in ";\t|" if 2 * sum(line.count(one) > 1 for line in some) > len(some))
     most = max(",;\t|", key=lambda one: max(line.count(one) for line in lines[:10]))
-    delimiter = next(often, most)
+    told = re.match(r"sep=(.)$", some[0].strip()) if some else None  # as Excel writes it
+    delimiter = told[1] if told else next(often, most)
+    lines = ["\n", *lines[1:]] if told else lines
     rows: list[list[str]] = []
     reader = csv.reader(lines, delimiter=delimiter)
     for row in reader:
@@ -131,7 +172,12 @@ def rows_of(text: str) -> list[list[str]]:
         delimiter == ";" or _with_comma(cells)
     ):
         rows = [[_with_point(cell) for cell in row] for row in rows]
+    elif any(re.match(r"\d*\.\d", cell) for cell in cells):  # then a comma parts thousands
+        rows = [[_THOUSANDS.sub("", cell) for cell in row] for row in rows]
     return rows
+
+
+_THOUSANDS = re.compile(r"(?:(?<=^\d)|(?<=^\d\d)|(?<=^\d{3})),(?=\d{3}(?![\d,.]))")
 
 
 def _with_comma(cells: list[str]) -> bool:
@@ -170,6 +216,18 @@ def heads_of(rows: list[tuple[int, list[str]]]) -> tuple[int, list[str]] | None:
     return None
 
 
+def likeliest(rows: list[tuple[int, list[str]]]) -> tuple[int, list[str]]:
+    """The row that looks most like heads where none has all: by known ones, then by words."""
+
+    def like(place: int) -> tuple[int, int]:
+        row = rows[place][1]
+        words = [cell for cell in row if cell and not re.search(r"^\W*\d", cell)]
+        return sum(bool(_head(cell).field) for cell in words), len(words)
+
+    best = max(range(min(len(rows), TITLES)), key=like)
+    return best, rows[best][1]
+
+
 def _ways(rows: list[tuple[int, list[str]]], last: int) -> Iterable[list[str]]:
     """What heads that end in a row may say, the likelier first."""
     own = rows[last][1]
@@ -203,18 +261,44 @@ def _filled(row: list[str], spread: bool) -> list[str]:
     return filled
 
 
+def parted(
+    heads: list[str], rows: list[tuple[int, list[str]]]
+) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Columns that hold two diameters, `OD x ID`, as two columns."""
+    for place in reversed(range(len(heads))):
+        words, unit = _unit_of(heads[place])
+        both = re.search(r"(?i)\b(o\.?d\.?)\s*[x×/]\s*(i\.?d\.?)(?=\W|$)", words)
+        if both is None:
+            continue
+        rest = f"{words[: both.start()]}{{}}{words[both.end() :]}{f' ({unit})' if unit else ''}"
+        heads = [*heads[:place], rest.format("OD"), rest.format("ID"), *heads[place + 1 :]]
+        rows = [
+            (n, [*row[:place], *_two(row[place : place + 1]), *row[place + 1 :]]) for n, row in rows
+        ]
+    return heads, rows
+
+
+def _two(cell: list[str]) -> list[str]:
+    """A cell of two diameters as two cells; what has one is the outer."""
+    first, _, second = (cell or [""])[0].replace("×", "x").replace("X", "x").partition("x")
+    if not second:
+        first, _, second = first.partition(" / ")
+    return [first.strip(), second.strip()]
+
+
 def columns_of(heads: list[str], rows: list[list[str]], where: str) -> list[Head]:
     """The columns under some heads; refused where one is missing or there twice."""
     columns = [_head(text) for text in heads]
     for place, column in enumerate(columns):
         values = [row[place] for row in rows if place < len(row) and row[place].isdigit()]
-        numbered = values == [str(n) for n in range(1, len(values) + 1)]
+        numbered = [str(n) for n in range(1, len(values) + 1)]
         most = len(values) >= 0.5 * len(rows)  # others are of units, or add up
-        if column.field in ("count", "name") and numbered and most:
+        may = column.field == "name" or (
+            column.field == "count" and not re.search(_PIECES, _plain(column.text))
+        )
+        if may and values in (numbered, numbered[::-1]) and most:
             columns[place] = column._replace(field="")  # it counts the lines
-        of_pipe = column.field == "joint length" and not re.search("tool|tj", column.text.lower())
-        if of_pipe and not {"length", "total length"} & {one.field for one in columns}:
-            columns[place] = column._replace(field="length")
+    columns = _lengths_of(columns)
     fields = {one.field for one in columns}
     for field in ("od", "length"):
         instead = {"total length"} if field == "length" else {"name"}
@@ -222,7 +306,11 @@ def columns_of(heads: list[str], rows: list[list[str]], where: str) -> list[Head
             instead = set()
         if not {field, *instead} & fields:
             names = ", ".join(repr(c.text) for c in columns if c.text)
-            raise InputError(f"no column is the {field} of a component; there are {names}", where)
+            raise InputError(
+                f"no column is the {_CALLED[field]} of a component: call one {_HEADS[field]!r}; "
+                f"there are {names}",
+                where,
+            )
     found: list[Head] = []
     for place, column in enumerate(columns):
         twice = [one.field for one in columns].count(column.field) > 1
@@ -239,24 +327,59 @@ def columns_of(heads: list[str], rows: list[list[str]], where: str) -> list[Head
     return found
 
 
+_CALLED = {"od": "outer diameter", "length": "length"}
+_HEADS = {"od": "OD", "length": "Length"}
+
+
+def _lengths_of(columns: list[Head]) -> list[Head]:
+    """Columns of lengths: of a piece, of a line or of a tool joint, as the others tell."""
+    fields = [one.field for one in columns]
+    each = [one for one in columns if one.field == "length" and one.is_of_a_piece]
+    made = []
+    for one in columns:
+        field = one.field
+        of_pipe = field == "joint length" and not re.search("tool|tj", one.text.lower())
+        if of_pipe and "joint od" not in fields:
+            field = "joint spacing" if "length" in fields else "length"
+        elif of_pipe and not {"length", "total length"} & set(fields):
+            field = "length"
+        elif field == "length" and each and one not in each and "total length" not in fields:
+            field = "total length"
+        made.append(one._replace(field=field))
+    return made
+
+
 def _head(text: str) -> Head:
     """A head: its words, and the unit in brackets, behind a comma or as its last word."""
+    words, unit = _unit_of(text)
+    plain = _plain(words)
+    for field, about in FIELDS.items():
+        if re.search(about.heads, plain):
+            if field == "weight" and (not unit) and plain in ("ppf", "lb per ft"):
+                unit = "lb/ft"
+            used = field if field != "not used" and _fits(unit, about.kind) else ""
+            return Head(text.strip(), {"length of a piece": "length"}.get(used, used), unit)
+    return Head(text.strip(), "", unit)
+
+
+def _unit_of(text: str) -> tuple[str, str]:
+    """Words of a head, and the unit in brackets, behind a comma or as its last word."""
     words, unit = text.strip(), ""
     bracket = re.search(r"[\[(]([^\])]*)[\])]\s*$", words)
     if bracket:
         words, unit = words[: bracket.start()], bracket[1].strip()
     else:
         last = re.search(r"(?<=[\w.\"])[\s,_/]+([^\s,_]+)$", words)
-        if last and (_is_unit(last[1]) or _is_unit(last[1].lower())):
+        alone = last and last[1] == "#" and not re.search(r"^w", words.lower())  # of a number
+        if last and not alone and (_is_unit(last[1]) or _is_unit(last[1].lower())):
             words, unit = words[: last.start()], last[1]
-    plain = re.sub(r"[\s._\-/]+", " ", words.lower()).strip()
-    for field, about in FIELDS.items():
-        if re.search(about.heads, plain):
-            if field == "weight" and (not unit) and plain in ("ppf", "lb ft"):
-                unit = "lb/ft"
-            used = field if field != "not used" and _fits(unit, about.kind) else ""
-            return Head(text.strip(), {"length of a piece": "length"}.get(used, used), unit)
-    return Head(text.strip(), "", unit)
+    return words, unit
+
+
+def _plain(words: str) -> str:
+    """A head in small letters, in English, without signs."""
+    plain = re.sub(r"[\s._\-]+", " ", words.lower().replace("/", " per ")).strip()
+    return " ".join(_ENGLISH.get(word, word) for word in plain.split())
 
 
 def _is_unit(text: str) -> bool:

@@ -141,6 +141,11 @@ def _run(table: SectionTable, top: float, bottom: float, hole: float | None) -> 
     return Run(table.name, top, bottom, mass, displaced, 0.5 * contact, bending, clearance)
 
 
+def mass_in_air(tables: DesignTables) -> float:
+    """Mass of the string (kg)."""
+    return sum(_steel(one)[0] * one.span for one in tables.drillstring.sections)
+
+
 def _steel(table: SectionTable) -> tuple[float, float]:
     """Mass of the steel per length (kg/m), and outer less inner area (m2)."""
     tool = PIPES[table.pipe] if table.pipe is not None else None

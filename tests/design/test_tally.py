@@ -158,14 +158,17 @@ def test_ways_of_writing_the_same(tmp_path, lines, same):
         ("name,length,OD,ID\np,9 m,5,4 in\n", r"line 2, column 'OD': 5 has no unit.*5 in"),
         (
             "name,length [m],OD [in],ID [in]\np,9,5,5.5\n",
-            r"line 2, column 'ID \[in\]': inner.*must be less than",
+            r"line 2, column 'ID \[in\]': inner diameter 5.5 in is not less than the outer, 5 in",
         ),
         ('name,"length\n[m]",OD [in],ID [in]\np,9,5,4\nJar,,5,3\n', "line 4, column"),
         ("name,length [m],OD [in],ID [in]\np,9,5,4\nJar,,5,3\n", r"line 3, column 'length \[m\]'"),
         ("name,length [m],OD [in],ID [in]\np,x,5,4\n", r"line 2, column 'length \[m\]'"),
         ('name,length [ft],OD [in],ID [in]\np,"13,360",5,4\n', "13360 or 13.360"),
         ("name,length [m],OD [in],ID [in],count\np,9,5,4,some\n", "not a number of pieces"),
-        ("name,length [m],bore [in]\np,9,4\n", r"line 1: no column is the od"),
+        (
+            "name,length [m],bore [in]\np,9,4\n",
+            r"line 1: no column is the outer diameter.*call one 'OD'",
+        ),
         ("name,length [m],OD [in],diameter [in],ID [in]\np,9,5,5,4\n", "both read as od"),
         ("name,length [m],OD [in],ID [in]\np,9,5,-\n", "no inner diameter"),
         (
@@ -342,3 +345,119 @@ def test_a_column_that_counts_the_lines_names_nothing(tmp_path):
     made = read(text, "bit", tmp_path)
     assert [one["name"] for one in made.sections] == ["Pipe", "Bit"]
     assert dict(column[:2] for column in made.columns)["Item"] == "not used"
+
+
+JOINTS = {"pipe": "5 in 19.5 lb/ft", "tool_joints": True}
+DP = {
+    "name": "5 in DP 19.5#",
+    "repeat": 300,
+    "outer_diameter": "5 in",
+    "inner_diameter": "4.276 in",
+}
+
+
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        (  # stands have a joint of pipe's tool joint, as long as the catalogue has it
+            "Item #,Description,Stands,OD (in),ID (in),TJ OD (in),TJ ID (in),Length (ft)\n"
+            "1,5 in DP 19.5#,300,5,4.276,6-5/8,3.5,93.0\n2,Jar,,6.5,2.75,6.5,,32\n",
+            {**DP, "length": "93.0 ft", "joint_outer_diameter": "6-5/8 in", "joint_spacing":
+             "9.4488 m", "joint_inner_diameter": "3.5 in", "joint_length": "0.5334 m"},
+        ),
+        (  # a joint's length beside the total, a weight with tool joints that is another's
+            "Component,Qty,OD,ID,Adj. Weight,Joint Length,Total Length,Max TJ OD\n"
+            ',,in,in,lb/ft,ft,ft,in\n5 in DP 19.5#,300,5.000,4.276,25.6,31.45,"9,435",6.625\n'
+            "Float Sub,1,6.5,2.813,,2.5,2.5,\n",
+            {"name": "5 in DP 19.5#", "repeat": 300, "length": "31.45 ft", **JOINTS},
+        ),
+        (  # numbers of stands, average beside total lengths, two diameters in a column
+            "Stand No.,Component,# Jts,Avg Len/Jt (ft),OD x ID (in),TJ OD/ID (in),Length (ft)\n"
+            '8,5 in DP 19.5#,300,31.6,5 x 4.276,6-5/8 X 3-1/4,"9,480.0"\n,Jar,1,,6.5 x 2.75,,32\n',
+            {**DP, "length": "31.6 ft", "joint_outer_diameter": "6-5/8 in",
+             "joint_inner_diameter": "3-1/4 in", "joint_length": "0.5334 m"},
+        ),
+        (  # a list of joints, a line each
+            "Stand #,Jt #,Description,OD (in),ID (in),Length (ft),Running Total (ft)\n"
+            '8,22,5 in DP 19.5#,5.000,4.276,31.1,31.1\n8,23,5 in DP 19.5#,5.000,4.276,31.2,62.3\n'
+            "8,24,5 in DP 19.5#,5.000,4.276,30.7,93.0\n,,Jar,6.5,2.75,32,125\n",
+            {"name": "5 in DP 19.5#", "repeat": 3, "length": "9.4488 m", **JOINTS},
+        ),
+        (  # German, a total that adds up from line to line, as Excel writes it
+            "sep=;\nPos.;Bezeichnung;Anzahl;Länge (m);Außendurchmesser (mm);ID (mm);"
+            "Gesamtlänge (m)\n"
+            '1;Bohrgestänge 5";300;9,5;127;108,6;2850\n2;Schwerstange 8";6;9,1;203,2;71,4;2904,6\n'
+            '3;Bohrmeißel 8 1/2";1;0,3;215,9;;2904,9\n;Summe;;;;;2904,9\n',
+            {"name": 'Bohrgestänge 5"', "repeat": 300, "length": "9.5 m", **JOINTS},
+        ),
+        (  # Norwegian and French
+            "Komponent,Antall,Lengde pr. stk (m),Ytre diameter (mm),Indre diameter (mm),"
+            "Vekt (kg/m)\n"
+            "Borerør,300,9.5,127,108.6,29\nBorekrone,1,0.3,216,,\n",
+            {"name": "Borerør", "repeat": 300, "length": "9.5 m", **JOINTS},
+        ),
+        (
+            "Désignation;Nombre;Longueur unitaire (m);Diamètre extérieur (mm);"
+            "Diamètre intérieur (mm)\n"
+            "Tiges 5in;300;9,5;127;108,6\nOutil PDC;1;0,3;216;\n",
+            {"name": "Tiges 5in", "repeat": 300, "length": "9.5 m", **JOINTS},
+        ),
+        (
+            "Name,No,L [m],D_o [mm],D_i [mm],m [kg/m]\nDP,300,9.5,127,108.6,29\nBit,1,.3,216,0,\n",
+            {"name": "DP", "repeat": 300, "length": "9.5 m", **JOINTS},
+        ),
+        (
+            "Name,Qty.,Single length (m),Ø out (mm),Ø in (mm)\nDP,300,9.5,127,108.6\n"
+            "Bit,1,.3,216,0\n",
+            {"name": "DP", "repeat": 300, "length": "9.5 m", **JOINTS},
+        ),
+    ],
+    ids=["stands", "adjusted", "pairs", "joints", "German", "Norwegian", "French", "letters",
+         "signs"],
+)  # fmt: skip
+def test_tallies_of_contractors(tmp_path, lines, expected):
+    made = read(lines, "top", tmp_path)
+    assert made.sections[0] == expected
+    assert len(made.sections) == (3 if "Summe" in lines else 2)
+
+
+def test_the_sheet_with_most_columns_is_the_tally(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["Hole", "Length [m]", "OD [in]"], ['12 1/4"', 2600, 12.25]):
+        book.active.append(row)
+    sheet = book.create_sheet("String")
+    for row in (["Component", "Length [m]", "OD [in]", "ID [in]"], ["p", 9.5, 5, 4.276]):
+        sheet.append(row)
+    book.save(tmp_path / "tally.xlsx")
+    made = read("tally.xlsx", "top", tmp_path)
+    assert [one["name"] for one in made.sections] == ["p"]
+    assert made.place.endswith("tally.xlsx, sheet 'String'")
+
+
+def test_a_new_file_has_the_units_and_the_bit_of_its_tally(tmp_path, monkeypatch, capsys):
+    from drillctl.cli.app import run
+
+    monkeypatch.chdir(tmp_path)
+    text = (
+        "Component,Count,Length (ft),OD (in),ID (in)\nDP,300,31.0,5.0,4.276\nTricone,1,1.0,12.25,\n"
+    )
+    (tmp_path / "tally.csv").write_text(text, encoding="utf-8")
+    assert run(["new", "mine", "--tally", "tally.csv", "--from", "top"]) == 0
+    tables = drillctl.load("mine.toml").tables
+    assert tables.units == "field"
+    assert tables.bit_rock.bit_diameter == pytest.approx(12.25 * INCH)
+    assert tables.bit_rock.bit_type == "roller-cone"
+    # 5 in 19.5 lb/ft of the lowest grade weighs some 20.85 lb/ft with its tool joints
+    said = capsys.readouterr().out
+    assert "9301 ft in all, " in said
+    weight = float(said.partition("ft in all, ")[2].partition(" klbf in air")[0])
+    assert weight == pytest.approx(9300 * 20.85e-3, rel=0.02)
+
+
+def test_a_missing_tally_is_called_by_its_option(tmp_path, monkeypatch, capfd):
+    from drillctl.cli.app import run
+
+    monkeypatch.chdir(tmp_path)
+    assert run(["new", "mine", "--tally", "no.csv", "--from", "top"]) == 2
+    assert "--tally: no.csv: cannot be read" in capfd.readouterr().err

@@ -161,8 +161,10 @@ PIPES: dict[str, Pipe] = dict(_read())
 """Every component by name."""
 
 _KINDS = {
-    "HWDP": r"hw|heavy", "collar": r"collar|\bn?m?dc\b", "jar": r"\bjar", "stabiliser": r"stab",
-    "MWD": r"\b[ml]wd\b", "motor": r"motor|\bpdm\b",
+    "HWDP": r"\bhw|hwdp|heavy|hevi|tungvekt|lourde|schwergest",
+    "collar": r"collar|\bn?m?dcs?\b|monel|schwerstange|vektrør|masse-?tige|zwaarstang",
+    "jar": r"\bjar|schlagschere|coulisse", "stabiliser": r"stab",
+    "MWD": r"\b[ml]wd\b", "motor": r"moto|moteur|\bpdm\b",
 }  # fmt: skip
 _SIZE = re.compile(
     r"""(?:(?P<whole>\d+)[ -])?(?P<over>\d+)/(?P<under>\d+)|(?P<decimal>\d+(?:\.\d+)?|\.\d+)"""
@@ -207,10 +209,12 @@ def drill_pipe(
 ) -> str | None:
     """The pipe of an outer diameter (m) and a nominal mass per length (kg/m) or a bore (m)."""
     for name, pipe in PIPES.items():
-        of_weight = weight is not None and abs(pipe.weight - weight) < 0.012 * pipe.weight
+        if bore:  # a weight that stands beside it may be that with tool joints
+            meant = abs(pipe.inner_diameter - bore) < 6e-4
+        else:
+            meant = weight is not None and abs(pipe.weight - weight) < 0.012 * pipe.weight
         if pipe.kind == ("HWDP" if heavy else "drill pipe") and (
-            abs(pipe.outer_diameter - outer_diameter) < 3e-4
-            and (heavy or of_weight or abs(pipe.inner_diameter - bore) < 6e-4)
+            abs(pipe.outer_diameter - outer_diameter) < 3e-4 and (heavy or meant)
         ):
             return name
     return None
