@@ -50,7 +50,7 @@ class Settings(Table):
     fragile_tolerance: q.Share = 0.05
     fragile_delay: q.TimeOrZero = 0.02
     fragile_window: q.Share = 0.02
-    rated_torque: q.Torque | None = None
+    rated_torque: q.TorqueLimit = None
     rated_speed: q.PositiveSpeed | None = None
     speed_step: q.PositiveSpeed = RPM
     weight_step: q.PositiveWeight = 1e3

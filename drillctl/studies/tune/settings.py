@@ -55,8 +55,8 @@ class TuneConstraintsTable(Table):
     ratio of its first modes, and a delay at the top torque that it bears.
     """
 
-    peak_top_torque: q.Torque | None = None
-    mean_weight_on_bit: q.Weight | None = None
+    peak_top_torque: q.TorqueLimit = None
+    mean_weight_on_bit: q.PositiveWeight | None = None
     slope_reserve: q.Damping | None = None
     peak_sensitivity: q.PositiveNumber | None = None
     damping_ratio: q.PositiveNumber | None = None

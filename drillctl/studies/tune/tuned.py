@@ -231,8 +231,6 @@ def drive_numbers(
 
 
 def tracked(design: Design, numbers: dict[str, Any]) -> dict[str, Any]:
-    """Numbers of a drive with the rate of its anti-windup, where that follows from the gains."""
+    """Numbers of a drive with the rate of its anti-windup, which follows from the gains."""
     drive = design.tables.controller.drive
-    if drive.anti_windup == "none" or drive.tracking_time is not None:
-        return numbers
     return numbers | {"tracking": tracking(numbers["kp"], numbers["ki"], drive)}

@@ -45,15 +45,16 @@ def bounds(**paths):
         (bounds(controller__absorption=(0.1, 1)), {"controller.law": "z-torque"} | LAGS),
         (bounds(operating_point__weight_on_bit=("100 kN", "150 kN")), {}),
         (bounds(bha__inertia=("300 kg*m^2", "500 kg*m^2")), {}),
+        (bounds(controller__ki=(0, 200)), LAGS | {"controller.drive.tracking_time": "1 s"}),
     ],
 )
 def test_runs_are_those_of_the_design_with_the_gains(parameters, values):
     design = tuning(parameters, values)
     tuned = tuned_parameters(design)
     runs = GainRuns(design, tuned, 8, 5)
-    points = np.array([[0.3 * t.low + 0.7 * t.high for t in tuned], [t.high for t in tuned]])
+    points = np.array([[a * t.low + (1.0 - a) * t.high for t in tuned] for a in (0.3, 0.0, 1.0)])
     found = runs.measures(points, ("j1", "peak_top_torque"))
-    assert runs.trajectories == 16
+    assert runs.trajectories == 24
     for row, point in enumerate(points):
         variant = put(design, tuned, point)
         expected = run_draws(drawn_lanes(variant, draw(variant, 8, 5)), 8).measures
@@ -201,6 +202,8 @@ def test_bounds_that_cannot_be_used_are_refused(table, told):
         ({"quantile": 1.0}, "more than 0 and less than 1"),
         ({"constraints": {"peak_sensitivity": 1.0}}, "more than 1"),
         ({"constraints": {"peak_top_torque": 9000}}, "N"),
+        ({"constraints": {"peak_top_torque": "0 kN*m"}}, "greater than 0"),
+        ({"constraints": {"mean_weight_on_bit": "0 kN"}}, "greater than 0"),
         ({"realizations": 1}, "2 or more"),
         ({"weights": {"effort": -1}}, "0 or more"),
         ({"parameters": {"controller.kp": {"min": 1}}}, "max"),
