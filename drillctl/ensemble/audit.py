@@ -57,6 +57,7 @@ class Compared(NamedTuple):
     tolerance: float  # share of the value, or of what it counts for at least
     worst: float | None  # largest difference that is not excused, in the same way; None without
     beyond: int  # cells that differ by more and are not excused
+    excused: int  # those that are
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +125,7 @@ class Audit:
         """`ok`, `check` when a cell differs too much or failed, `none` without audited cells."""
         if not len(self.cells):
             return "none"
-        often = self.beyond.sum() > max(1.0, MOST_EXCUSED * len(self.cells))
-        return "check" if self.failed.any() or self.wrong or often else "ok"
+        return "check" if self.failed.any() or self.wrong or self.unsettled else "ok"
 
     @cached_property
     def compared(self) -> tuple[Compared, ...]:
@@ -133,10 +133,10 @@ class Audit:
         results = []
         for name in self.batch:
             excused = self.verge | self._excused(name)
-            apart = np.where(excused, np.nan, self._apart(name, self.reference))
-            tolerance = _tolerance(name)
-            beyond = int((apart > tolerance).sum())
-            results.append(Compared(name, tolerance, _largest(apart), beyond))
+            apart, tolerance = self._apart(name, self.reference), _tolerance(name)
+            kept, beyond = np.where(excused, np.nan, apart), apart > tolerance
+            counts = int((beyond & ~excused).sum()), int((beyond & excused).sum())
+            results.append(Compared(name, tolerance, _largest(kept), *counts))
         return tuple(results)
 
     def sentence(self, what: str) -> str:
@@ -150,13 +150,21 @@ class Audit:
             text += f", {self.verge.sum()} on the verge of another stick"
         if self.wrong:
             text += f"; beyond tolerance: {', '.join(self.wrong)}"
+        if self.unsettled:
+            text += f"; another at a finer step too often: {', '.join(self.unsettled)}"
         return text
 
     @property
     def wrong(self) -> list[str]:
         """What differs by more than its tolerance and is not excused."""
-        names = [one.name for one in self.compared if one.beyond]
-        return [MEASURES[name].label if name in MEASURES else name for name in names]
+        return [measure_label(one.name) for one in self.compared if one.beyond]
+
+    @property
+    def unsettled(self) -> list[str]:
+        """What differs and is excused, where that is too many cells for one stick in some."""
+        if self.beyond.sum() <= max(1.0, MOST_EXCUSED * len(self.cells)):
+            return []
+        return [measure_label(one.name) for one in self.compared if one.excused]
 
     def summary(self) -> dict[str, Any]:
         """Verdict, number of cells, differences by measure, estimated errors, the verge."""
@@ -193,6 +201,11 @@ class Audit:
         if not self.finer:
             return np.zeros(len(self.cells), dtype=bool)
         return self._apart(name, self.finer) > MOVED * _tolerance(name)
+
+
+def measure_label(name: str) -> str:
+    """A measure or the status as people call it."""
+    return MEASURES[name].label if name in MEASURES else name
 
 
 def _tolerance(name: str) -> float:

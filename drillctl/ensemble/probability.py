@@ -239,3 +239,16 @@ def _jackknife(
     half = scatter.quantile(confidence) * float(np.sqrt(spread))
     value = float(result.region(probability).mean())
     return max(value - half, 0.0), min(value + half, 1.0)
+
+
+MEANINGS = {
+    "mean": "least mean of J1",
+    "q95": "least 95 % quantile of J1",
+    "cvar95": "least mean of the worst 5 % of J1",
+}
+
+
+def called(objective: str) -> str:
+    """An objective as people call it."""
+    level = objective.removeprefix("probability_")
+    return MEANINGS.get(objective, f"largest P(J1 ≤ {level} s)" if level != objective else level)

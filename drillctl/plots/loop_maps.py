@@ -37,7 +37,6 @@ NAMES = {
     "unstable_roots": "roots in the right half-plane",
 }
 """What the colour bar says; the unit comes from `displayed`."""
-REASONS = {"peak_sensitivity": "grey: loop not stable, or no steady drilling"}
 
 
 @dataclass(frozen=True)
@@ -188,9 +187,11 @@ def _varies(values: Array) -> bool:
 def _caption(result: LoopMap, quantity: str) -> str:
     values = result.values[quantity]
     notes = [f"{int(result.stable.sum())} of {result.stable.size} cells stable"]
-    if np.isnan(values).any():
-        unstable = "loop not stable, or " if quantity == "peak_sensitivity" else ""
-        notes.append(f"grey: {unstable}no steady drilling")
+    empty, at_rest = np.isnan(values), np.isnan(result.values.get("slope", values))
+    unstable = "unstable" if quantity == "peak_sensitivity" else "unstable without any slope too"
+    why = [unstable] * bool((empty & ~at_rest).any()) + ["no steady drilling"] * bool(at_rest.any())
+    if empty.any():
+        notes.append(f"grey: {', or '.join(why)}")
     if quantity == "spectral_abscissa" and np.isfinite(values).any():
         least, most = float(np.nanmin(values)), float(np.nanmax(np.abs(values)))
         if -1e-3 * most < least < 0.0:

@@ -15,6 +15,7 @@ from drillctl import units
 from drillctl.design import parameter
 from drillctl.design.paths import USUAL_NAMES
 from drillctl.plots import style
+from drillctl.store.tables import quantity
 
 if TYPE_CHECKING:
     from drillctl.simulation import Simulation
@@ -81,10 +82,10 @@ def _title(run: Simulation, paths: Sequence[str], system: units.System) -> str:
         numbers = numbers or run.design.tables.controller.law
     elif run.design.simple_drive:
         law = run.design.linear_drive._asdict()  # type: ignore[attr-defined]
-        shown = (units.displayed(v, LAW_UNITS.get(k, "N*m"), system) for k, v in law.items())
         numbers = ", ".join(
-            f"{USUAL_NAMES.get(f'controller.{k}', k)} {v:g} {unit}"
-            for k, (v, unit) in zip(law, shown, strict=True)
+            f"{USUAL_NAMES.get(f'controller.{k}', k)} "
+            f"{quantity(v, LAW_UNITS.get(k, 'N*m'), system)}"
+            for k, v in law.items()
         )
     else:
         numbers = run.design.tables.controller.law
@@ -96,8 +97,8 @@ def _title(run: Simulation, paths: Sequence[str], system: units.System) -> str:
 def _named(run: Simulation, path: str, system: units.System) -> str:
     """A parameter of the run's design by its usual name, in the units people read."""
     result = parameter(run.design, path)
-    value, unit = units.displayed(result.value, result.si_unit, system)
-    return f"{USUAL_NAMES.get(path, path.rpartition('.')[2])} {value:g} {unit}".rstrip()
+    shown = quantity(result.value, result.si_unit, system)
+    return f"{USUAL_NAMES.get(path, path.rpartition('.')[2])} {shown}"
 
 
 @style.picture(

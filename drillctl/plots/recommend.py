@@ -26,7 +26,7 @@ def recommended(
 ) -> Figure:
     """J1, probability, speeds and weights without sticking, slope margin; a row a setting."""
     some = result.candidates
-    figure, panels = style.grid_or_new(ax, 1, 5, 13.0, 2.2 + ROW * len(some), share_y=True)
+    figure, panels = style.grid_or_new(ax, 1, 5, 11.0, 2.2 + ROW * len(some), share_y=True)
     spread, chance, speed, weight, margin = panels
     for place, one in enumerate(some):
         colour = style.VERMILLION if one is result.recommended else style.BLUE
@@ -50,6 +50,7 @@ def recommended(
     spread.set_ylim(len(some) - 0.5, -0.5)
     spread.set_xlim(left=0.0)
     chance.set_xlim(-0.03, 1.03)
+    chance.set_xticks([0.0, 0.5, 1.0])  # ends beside those of the other panels
     margin.set_xlim(left=0.0)
     names = (
         "J1 (s)", f"P(J1 ≤ {table.level:g} s)",
@@ -64,10 +65,19 @@ def recommended(
         f"{len(result.present.j1)} fresh draws (seed {result.seed}): 5 to 95 % (line), 25 to 75 % "
         "(bar), median (dot) of J1; 95 % interval of the probability. Bars: speeds and weights "
         "without sticking in the last 20 s at nominal rock. Dashed: limits; dotted: as designed. "
-        f"{result.recommended.name} is recommended: {result.verdict}."
+        f"{_chosen(result)}."
     )
     figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
     return figure
+
+
+def _chosen(result: Recommendation) -> str:
+    name = result.recommended.name
+    return {
+        "passes": f"{name} (red) is recommended: it passes",
+        "fragile": f"{name} (red) is recommended: it passes, but is fragile",
+        "none": f"No setting passes; {name} (red) is the least bad",
+    }[result.verdict]
 
 
 def _spread(ax: Axes, place: int, one: Assessed, colour: str) -> None:

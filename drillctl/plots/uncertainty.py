@@ -20,9 +20,10 @@ from drillctl import units
 from drillctl.arrays import Array
 from drillctl.design.paths import USUAL_NAMES
 from drillctl.ensemble.envelopes import ENVELOPED
-from drillctl.ensemble.probability import INNER, MEDIAN, OUTER, needed
+from drillctl.ensemble.probability import INNER, MEDIAN, OUTER, called, needed
 from drillctl.errors import InputError
 from drillctl.plots import style
+from drillctl.store.tables import quantity
 
 if TYPE_CHECKING:
     from drillctl.studies import Axis, Uncertainty
@@ -86,7 +87,7 @@ def cell_distributions(
     ax.set_ylim(0.0, 1.02)
     title = style.heading(result, "Distribution of J1 over the draws")
     style.dress(ax, "J1 (s)", "share of the draws at or under it", title)
-    ax.legend(fontsize=style.SMALL, frameon=False, loc="lower right")
+    style.legend_under(ax, 1)
     figure.supxlabel(f"{result.realizations} draws; levels dashed", fontsize=style.SMALL)
     return figure
 
@@ -121,18 +122,18 @@ def _named(result: Uncertainty) -> dict[int, str]:
     """Cells worth a look, with what they are best by."""
     results: dict[int, list[str]] = {}
     if not np.isnan(result.nominal).all():
-        results.setdefault(int(np.nanargmin(result.nominal)), []).append("J1 without draws")
+        results.setdefault(int(np.nanargmin(result.nominal)), []).append("least J1 without draws")
     for name in BEST:
         try:
-            results.setdefault(result.best(name).cell, []).append(name)
+            results.setdefault(result.best(name).cell, []).append(called(name))
         except InputError:  # not known without --full
             continue
-    return {cell: f"best by {', '.join(names)}" for cell, names in results.items()}
+    return {cell: ", ".join(names) for cell, names in results.items()}
 
 
 def _shown(result: Uncertainty, cell: int, axis: Axis, system: units.System) -> str:
-    value, unit = units.displayed(result.at(cell)[axis.path], axis.unit, system)
-    return f"{USUAL_NAMES.get(axis.path, axis.path)} {f'{value:g} {unit}'.rstrip()}"
+    value = quantity(result.at(cell)[axis.path], axis.unit, system)
+    return f"{USUAL_NAMES.get(axis.path, axis.path)} {value}"
 
 
 @style.picture(result="With indices.", raises="The result has no indices.")

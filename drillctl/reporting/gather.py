@@ -215,7 +215,7 @@ class Gathered:
         if recipe.says is not None:
             return Shown(tuple(map(Text, recipe.says(study.summary))), (), ())
         result, system = study.result, self.words.system
-        said = tuple(Text(remark) for remark in kind.remarks(result, system))
+        said = tuple(Text(one[0].upper() + one[1:]) for one in kind.remarks(result, system))
         draw = partial(drawn, kind.pictures, study.folder, study.key, system=system)
         pictures = [
             (one.name, figure(one, name, partial(draw, name=one.name), system), True)

@@ -22,7 +22,10 @@ _UNIT = re.compile(
     r"(?<=[\d∞]) (?=%|(?:s|Hz|ms|rpm|kN|klbf|ft|m|N|kg|lb|dB|in|mm|kJ)\b)"
     r"|(?<=\bN) (?=m\b)|(?<=\bN m) (?=s\b)|(?<=\bklbf) (?=ft\b)|(?<=\bkN) (?=m\b)"
 )
-_NUMBER = re.compile(r"^[−-]?[\d.]+( × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?( [%°]| s| Hz| ms)?$|^–$|^∞$")
+_ONE = r"[+−-]?[\d.]+(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
+_NUMBER = re.compile(
+    rf"^{_ONE}(?: \((?:{_ONE} to|at least|at most) {_ONE}\))?( [%°]| s| Hz| ms)?$|^–$|^∞$"
+)
 
 _LONG = re.compile(r"[\w./=-]{15,}")
 _JOINT = re.compile(r"([./_=])(?=\w)")
@@ -65,8 +68,11 @@ def _environment() -> Any:
 
 
 def _figures(rows: tuple[tuple[str, ...], ...], column: int) -> bool:
-    """Whether a column holds only numbers, which are right-aligned."""
-    return column > 0 and all(_NUMBER.match(row[column]) for row in rows)
+    """Whether a column holds numbers, which are right-aligned; a word among them is as well."""
+    if column == 0:
+        return False
+    numbers = sum(bool(_NUMBER.match(row[column])) for row in rows)
+    return 2 * numbers > len(rows) and _short(rows, column)
 
 
 def _kept(text: str) -> Any:

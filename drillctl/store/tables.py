@@ -128,6 +128,8 @@ class Column:
         if cell.interval is None or cell.value is None:
             return text
         low, high = (self._number(end, system) for end in cell.interval)
+        if NOTHING in (low, high):  # an open end
+            return f"{text} ({f'at most {high}' if low == NOTHING else f'at least {low}'})"
         return f"{text} ({low} to {high})"
 
     def heads(self, system: units.System) -> list[str]:

@@ -326,20 +326,29 @@ def doubted(audit: Audit) -> Iterator[str]:
     if audit.verdict == "check":
         reasons = [f"the reference solver fails in {n}"] if (n := audit.failed.sum()) else []
         reasons += [f"the engines differ in {', '.join(audit.wrong)}"] if audit.wrong else []
-        yield f"audit: check: {'; '.join(reasons) or 'the step is too long for most of them'}"
+        if audit.unsettled:
+            reasons.append(f"the step is too long for {', '.join(audit.unsettled)}")
+        yield f"audit: check: {'; '.join(reasons)}"
 
 
 def audit_tables(
     audit: Audit, place: Callable[[int], str], ending: str = "", of: str = ""
 ) -> Iterator[Table]:
     """What was compared, and where one stick more or less decides."""
+    from drillctl.ensemble.audit import measure_label
+
     if not len(audit.cells):
         return
     columns = (
-        Column("measure"), Column("worst", "largest difference", digits=2),
+        Column("measure", hidden=True), Column("label", "measure"),
+        Column("worst", "largest difference", digits=2),
         Column("tolerance", "tolerance", digits=2), Column("beyond", "beyond it"),
+        Column("excused", "another at a finer step"),
     )  # fmt: skip
-    rows = [[one.name, one.worst, one.tolerance, one.beyond] for one in audit.compared]
+    rows = [
+        [one.name, measure_label(one.name), one.worst, one.tolerance, one.beyond, one.excused]
+        for one in audit.compared
+    ]
     title = f"{of}audit: batch engine against reference solver, of {len(audit.cells)} {audit.of}s"
     yield Table(f"audit{ending}", title, columns, rows, shown=audit.verdict == "check")
     runs = (audit.batch, audit.finer, audit.reference)

@@ -13,6 +13,7 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import modes
 from drillctl.rig.drillstring import Section, assemble
+from drillctl.studies.modes import pictures
 
 HOLDS = (
     (
@@ -344,3 +345,15 @@ def test_count_is_one_or_more(count):
     with pytest.raises(InputError, match="count"):
         of(count=count)
     assert len(of(count=1).free_free) == len(of(count=1).fixed_top) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "at"),
+    [
+        ("monteiro-trindade-140kn", "each weight of the friction table"),
+        ("navarro-lopez-2dof-bistable", "the weight on bit"),
+    ],
+)
+def test_a_caption_tells_of_a_friction_table_where_there_is_one(name, at):
+    captions = {one.name: one.caption for one in pictures(modes(drillctl.load(name)))}
+    assert captions["friction"] == f"Bit torque against bit speed, at {at}."

@@ -345,6 +345,22 @@ def test_map_draws_each_quantity(gains_map, quantity):
     assert "grey" in figure.get_supxlabel()
 
 
+def test_grey_is_told_by_its_reason(gains_map):
+    slope, margin = gains_map.values["slope"], gains_map.values["slope_margin"]
+    unstable = dataclasses.replace(
+        gains_map, values=gains_map.values | {"slope_margin": np.nan * margin}
+    )
+    assert (
+        "unstable without any slope too, or no steady drilling"
+        in (plots.loop_map(unstable).get_supxlabel())
+    ) == bool(np.isnan(slope).any())
+    turning = {"slope": np.nan_to_num(slope), "slope_margin": np.nan * margin}
+    told = plots.loop_map(
+        dataclasses.replace(unstable, values=gains_map.values | turning)
+    ).get_supxlabel()
+    assert told.endswith("grey: unstable without any slope too")
+
+
 def test_map_of_margins_and_the_boundary(gains_map, boundary):
     figure = plots.loop_map(gains_map, boundary=boundary)
     ax, bar = figure.axes

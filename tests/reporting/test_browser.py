@@ -188,13 +188,31 @@ def test_nothing_stands_in_the_way_of_reading(browser, small, scheme, width):
     seen.context.close()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_serious(browser, small, scheme, serious):
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 1280), ("light", 400)])
+def test_axe_finds_nothing_serious(browser, small, scheme, width, serious):
     """In the open parts of the page."""
-    seen = Seen(browser, small, color_scheme=scheme, viewport={"width": 1280, "height": 900})
+    seen = Seen(browser, small, color_scheme=scheme, viewport={"width": width, "height": 900})
     holding, found = serious(seen.page)
     assert found == []
     assert holding > 20
+    seen.context.close()
+
+
+def test_labels_of_pictures_can_be_read_on_a_phone(browser, small):
+    seen = Seen(browser, small, viewport={"width": 400, "height": 900})
+    shares = seen.page.evaluate(
+        "() => [...document.images].map(one => one.width / one.naturalWidth)"
+    )
+    assert min(shares) > 0.7  # of letters of 12 pixels
+    seen.context.close()
+
+
+def test_a_wide_table_breaks_its_heads_before_it_is_scrolled(browser, small):
+    seen = Seen(browser, small, viewport={"width": 1280, "height": 900})
+    widest = seen.page.evaluate(
+        "() => Math.max(...[...document.querySelectorAll('table')].map(one => one.offsetWidth))"
+    )
+    assert widest < 1.3 * seen.page.locator("main").bounding_box()["width"]
     seen.context.close()
 
 

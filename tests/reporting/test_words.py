@@ -7,7 +7,8 @@ import math
 import pytest
 
 from drillctl.reporting.blocks import Words
-from drillctl.store.tables import between, chance, number, percent
+from drillctl.reporting.pages import _figures
+from drillctl.store.tables import Column, between, chance, number, open_estimate, percent
 
 
 @pytest.mark.parametrize(
@@ -20,6 +21,20 @@ from drillctl.store.tables import between, chance, number, percent
 )  # fmt: skip
 def test_numbers(value, told):
     assert number(value) == told
+
+
+@pytest.mark.parametrize(
+    ("cells", "aligned"),
+    [
+        (("0.1598", "rigid body", "0"), True),  # of modes
+        (("−3.02 (−3.42 to −2.59)", "+93 (+92.5 to +93.5)", "–"), True),
+        (("yes", "no", "–"), False),
+        (("19.4", "20.2", "lanes were stopped at the highest level"), False),
+    ],
+)
+def test_numbers_stand_under_each_other_and_a_word_among_them(cells, aligned):
+    assert _figures(tuple(("row", cell) for cell in cells), 1) == aligned
+    assert not _figures(tuple((cell, "row") for cell in cells), 0)
 
 
 def test_shares_and_spans():
@@ -42,3 +57,18 @@ def test_quantities_in_either_system():
     assert Words("field").quantity(2122.3, "kg*m^2") == "50363 lb ft²"
     assert Words("field").quantity(473.0, "N*m/rad") == "2.192 klbf ft/rev"
     assert Words("si").quantity(290.1, "N*m*s/rad") == "290.1 N m s"
+
+
+@pytest.mark.parametrize(
+    ("ends", "told"),
+    [
+        ((25.7, None), "29.3 (at least 25.7)"),  # runs that were stopped
+        ((None, 31.0), "29.3 (at most 31)"),
+        ((25.7, 31.0), "29.3 (25.7 to 31)"),
+        ((None, None), "29.3"),
+    ],
+)
+def test_an_interval_with_an_open_end(ends, told):
+    text = Column("q95", interval=True).text(open_estimate(29.3, ends), "si")
+    assert text == told
+    assert _figures((("row", text),), 1)

@@ -165,7 +165,9 @@ def test_a_step_that_is_too_long_is_no_verge():
     assert found.verge.sum() == 2
     assert found.wrong == []
     assert found.verdict == "check"
-    assert "step is too long" in next(doubted(found))
+    assert found.unsettled == ["J1"]
+    assert "step is too long for J1" in next(doubted(found))
+    assert found.sentence("cells").endswith("another at a finer step too often: J1")
 
 
 def test_a_settling_time_that_jumps_by_a_swing_is_excused_alone():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import drillctl
-from drillctl import units
+from drillctl import plots, units
 from drillctl.errors import InputError
 from drillctl.linear import loop
 from drillctl.linear.loop_margins import Margins
@@ -16,9 +16,11 @@ from drillctl.reporting.sections.summary import _margins
 from drillctl.simulation import simulate
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.recommend import help as help_
+from drillctl.studies.recommend import remarks, tables
 from drillctl.studies.recommend.assess import FAILS, FRAGILE, PASSES, best_of
 from drillctl.studies.recommend.candidates import (
     ROBUST,
+    Confirmed,
     by_rules,
     gains_of,
     pi_problem,
@@ -35,7 +37,13 @@ from drillctl.studies.recommend.criteria import (
 )
 from drillctl.studies.recommend.deeper import at_depth, depth_of
 from drillctl.studies.recommend.window import Line, window
-from drillctl.studies.recommend.words import detail, in_drive_units, numbers_of, others
+from drillctl.studies.recommend.words import (
+    _told_apart,
+    detail,
+    in_drive_units,
+    numbers_of,
+    others,
+)
 from drillctl.studies.tune.certificate import FreshDraws
 from drillctl.studies.tune.search import search
 
@@ -154,25 +162,40 @@ def test_each_criterion_of_the_loop_is_kept_or_missed_alone(changed, missed):
 
 
 @pytest.mark.parametrize(
-    ("j1", "status", "low", "missed"),
+    ("j1", "status", "interval", "missed"),
     [
-        (20.0, "ok", 0.96, []),
-        (20.0, "not_settled", 0.95, []),
-        (34.0, "ok", 0.96, ["j1"]),
-        (20.0, "sticking", 0.96, ["j1"]),
-        (20.0, "ok", 0.94, ["probability"]),
+        (20.0, "ok", (0.96, 0.98), []),
+        (20.0, "not_settled", (0.95, 0.97), []),
+        (34.0, "ok", (0.96, 0.98), ["j1"]),
+        (20.0, "sticking", (0.96, 0.98), ["j1"]),
+        (20.0, "ok", (0.94, 0.98), ["probability"]),
     ],
 )
-def test_criteria_of_the_runs(j1, status, low, missed):
-    kept = run_criteria(j1, status, 33.0, 0.96, low, 0.95)
+def test_criteria_of_the_runs(j1, status, interval, missed):
+    kept = run_criteria(j1, status, 33.0, 0.96, interval, 0.95)
     assert [one.name for one in kept if not one.kept] == missed
 
 
-def test_what_is_kept_is_told_with_its_limit():
+@pytest.mark.parametrize(
+    ("share", "interval", "ending"),
+    [
+        (0.944, (0.92, 0.962), "94.4 % (92 to 96.2 %), 95 % is not shown"),
+        (0.742, (0.701, 0.78), "74.2 % (70.1 to 78 %), 95 % required"),
+    ],
+)
+def test_draws_that_leave_it_open_are_told_from_those_that_say_no(share, interval, ending):
+    _, probable = run_criteria(20.0, "ok", 33.0, share, interval, 0.95)
+    assert probable.said == f"P(J1 <= 33 s) is {ending}"
+
+
+def test_what_is_kept_is_told_with_its_numbers(result):
     design = drillctl.load("monteiro-trindade-140kn")
-    told = [detail(one) for one in loop_criteria(design, figures(), design.tables.recommend)]
+    kept = loop_criteria(design, figures(), design.tables.recommend)
+    told = [detail(result.present, one) for one in kept]
     assert told[0] == "the loop bears 150 N*m*s/rad, the rock falls by 100 N*m*s/rad"
-    assert told[1:] == ["1.5, limit 1.1", "2, limit 2.5", "0.05 s, limit 0 s"]
+    assert told[1:] == ["1.5 times", "2", "it bears 50 ms, 0 ms asked"]
+    for one in result.candidates:
+        assert all(detail(one, criterion) for criterion in one.criteria)
 
 
 def test_a_report_asks_for_the_margins_too():
@@ -274,7 +297,7 @@ def test_a_rig_without_a_pi_has_one_to_tune():
 
 def test_the_sentence_names_setting_limit_and_room(result):
     best = result.recommended
-    assert numbers_of(best) in result.sentence
+    assert numbers_of(best.design, best.gains) in result.sentence
     assert all(text in result.sentence for text in (*result.limits, "What limits it is"))
     said = others(result)
     assert len(said) == len(result.candidates) - 1
@@ -283,7 +306,9 @@ def test_the_sentence_names_setting_limit_and_room(result):
     assert soft.endswith(f"it misses {len(of_soft.missed) - 1} other criteria")
     last, fails = result.until
     assert last >= depth_of(best.design) - 1e-9
-    assert f"it passes to {units.full(last, 'm', 5)}" in result.sentence
+    assert f"passes {'at' if fails is None else 'down to'} {units.full(last, 'm', 5)}" in (
+        result.sentence
+    )
     if fails is not None:
         assert not help_._passes(at_depth(best.design, fails))
     summary = result.summary()
@@ -325,3 +350,39 @@ def test_a_loop_that_is_unstable_under_a_rock_that_does_not_fall_is_told(margin)
     assert not found["stable"].kept
     assert not found["slope_reserve"].kept
     assert found["stable"].miss == found["slope_reserve"].miss == 1.0
+
+
+def test_laws_left_out_for_the_same_reason_are_told_in_one_line(result):
+    told = replace(result, left_out={"stiff": "no pipe", "soft torque": "no pipe", "PI": "no"})
+    assert list(remarks(told, "si"))[-2:] == [
+        "left out: stiff, soft torque: no pipe",
+        "left out: PI: no",
+    ]
+
+
+def test_a_loop_that_is_unstable_is_told_once(result):
+    """Margins that it has not follow from it."""
+    design = drillctl.load("monteiro-trindade-140kn")
+    missed = [x for x in loop_criteria(design, figures(margin=90.0), design.tables.recommend)
+              if not x.kept]  # fmt: skip
+    assert [one.name for one in _told_apart(missed)] == ["stable"]
+    least_bad = replace(result.recommended, criteria=tuple(missed))
+    told = replace(result, candidates=(least_bad,), until=None)
+    assert "which misses by 10 %: unstable in the first mode" in told.sentence
+    assert "margin" not in told.sentence
+    tables_ = {one.name: one.title for one in tables(told)}
+    assert tables_["settings"].endswith("(* the least bad: none passes)")
+    assert tables_["numbers"].endswith(", which does not pass")
+    assert "the least bad" in plots.recommended(told).get_supxlabel()
+
+
+@pytest.mark.parametrize(
+    ("counts", "told"),
+    [
+        ((0, 0, 0), "none keeps the slope margin"),
+        ((30, 0, 0), "30 keep the slope margin, none of these the probability"),
+        ((30, 2, 1), "30 keep the slope margin, 2 of these the probability, 1 of these all else"),
+    ],
+)
+def test_what_a_grid_says(counts, told):
+    assert Confirmed("PI", 169, *counts).sentence == f"PI, grid of 169 settings: {told}"

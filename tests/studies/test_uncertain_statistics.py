@@ -13,6 +13,7 @@ from drillctl.ensemble.probability import (
     INNER,
     OUTER,
     Scatter,
+    called,
     needed,
     probability_map,
     region_areas,
@@ -272,6 +273,8 @@ def test_objectives_are_what_they_are_called():
     assert [one.name for one in (Mean(), Quantile(), TailMean(), Exceedance(40.0))] == [
         "mean", "q95", "cvar95", "probability_40"
     ]  # fmt: skip
+    assert called("probability_40") == "largest P(J1 ≤ 40 s)"
+    assert called("q95") == "least 95 % quantile of J1"
 
 
 @pytest.mark.parametrize("objective", [Mean(), Quantile(), TailMean(), Exceedance(20.0)])

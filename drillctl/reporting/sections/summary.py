@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from drillctl import units
+from drillctl.ensemble.probability import called
 from drillctl.reporting.blocks import Block, Check, Checks, Table, Text
 from drillctl.reporting.gather import Gathered
 from drillctl.store.tables import NOTHING, between, chance, number, percent
+from drillctl.studies.recommend.candidates import NAMES, gains_of
+from drillctl.studies.recommend.words import numbers_of
 
 STATUS = {
     "ok": "settles",
@@ -56,10 +59,12 @@ def _stable(gathered: Gathered) -> Check | None:
         return None
     result, words = study.summary, gathered.words
     margin = result["slope_margin"]
-    tolerated = "any slope" if margin is None and result["stable"] else words.quantity(
-        margin, "N*m*s/rad"
-    )  # fmt: skip
-    detail = f"falling slope {words.quantity(result['slope'], 'N*m*s/rad')}, tolerated {tolerated}"
+    slope = words.quantity(result["slope"], "N*m*s/rad")
+    if margin is None:
+        tolerated = "any slope is tolerated" if result["stable"] else "unstable even without it"
+    else:
+        tolerated = f"tolerated {words.quantity(margin, 'N*m*s/rad')}"
+    detail = f"falling slope {slope}, {tolerated}"
     return Check("Is steady drilling stable to small disturbances?", bool(result["stable"]), detail)
 
 
@@ -100,7 +105,7 @@ def _margins(gathered: Gathered) -> Check | None:
     criteria = next(iter(study.summary["candidates"].values()))["criteria"]
     asked = [one for one in criteria if one["name"] in MARGINS]
     missed = [one["said"] for one in asked if not one["kept"]]
-    detail = units.told("; ".join(missed), gathered.words.system) or "all that [recommend] asks"
+    detail = units.told("; ".join(missed), gathered.words.system) or "it keeps all of them"
     return Check("Does the loop keep its margins?", not missed, detail)
 
 
@@ -156,14 +161,9 @@ def _kind(word: str) -> Literal["note", "open", "warning"]:
 def setting(gathered: Gathered) -> str:
     """The current setting as text: drive with its numbers, weight, speed."""
     design, words = gathered.design, gathered.words
-    table = design.tables.controller
-    numbers = [
-        words.named(design, path, getattr(table, name))
-        for name, path in (("kp", "controller.kp"), ("ki", "controller.ki"))
-        if getattr(table, name, None) is not None
-    ]
-    drive = ", ".join([table.law, *numbers])
-    point = design.tables.operating_point
+    law, point = design.tables.controller.law, design.tables.operating_point
+    numbers = units.told(numbers_of(design, gains_of(design)), words.system)
+    drive = f"{NAMES.get(law, law)}, {numbers}"
     return (
         f"{drive}, {words.quantity(point.weight_on_bit, 'N')} on bit, "
         f"{words.quantity(point.speed, 'rad/s')}"
@@ -209,20 +209,12 @@ def _best(gathered: Gathered) -> Table | None:
     return Table("best", "Best settings", heads, tuple(rows))
 
 
-MEANINGS = {
-    "mean": "least mean of J1",
-    "q95": "least 95 % quantile of J1",
-    "cvar95": "least mean of the worst 5 % of J1",
-}
-
-
 def _best_of_draws(gathered: Gathered, name: str, best: dict[str, Any]) -> tuple[str, ...]:
     place = gathered.words.place(gathered.design, best["at"])
     value, (low, high) = best["value"], best["interval_95"]
     if name.startswith("probability_"):
-        level = name.removeprefix("probability_")
         ends = f"{between(100.0 * low, 100.0 * high, 3)} %"
-        return f"largest P(J1 ≤ {level} s)", place, percent(value), ends
+        return called(name), place, percent(value), ends
     # Runs stopped early leave the upper end of the interval open.
     ends = f"at least {number(low)} s" if high is None else f"{between(low, high)} s"
-    return MEANINGS.get(name, name), place, f"{number(value)} s", ends
+    return called(name), place, f"{number(value)} s", ends

@@ -438,13 +438,7 @@ class Advantage(Result, kind="advantage"):
     @property
     def objective(self) -> str:
         """What the gains are tuned to."""
-        tune = self.design.tables.tune
-        return {
-            "mean": "mean of J1",
-            "quantile": f"{tune.quantile:.0%} quantile of J1",
-            "cvar": f"mean of J1 beyond its {tune.quantile:.0%} quantile",
-            "worst": "worst J1",
-        }[tune.objective]
+        return self.design.tables.tune.objective_said
 
     def derived(self) -> dict[str, Any]:
         """Names of policies and gains."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -56,7 +57,7 @@ def tables(result: Doctor) -> Iterator[Table]:
 def _scheme(scheme: dict[str, Any]) -> Table:
     from drillctl.studies.doctor.compute import FORMS
 
-    why = f"{scheme['decided_by']}, and whole steps to the run"
+    why = f"{scheme['decided_by'].replace('_', ' ')}, and whole steps to the run"
     if scheme["decided_by"] == "sampling":
         why = f"{scheme['sampling']} to a period of the sampled controller"
     if scheme["decided_by"] == "program":
@@ -64,10 +65,10 @@ def _scheme(scheme: dict[str, Any]) -> Table:
     rows = [["step", f"{1e3 * scheme['step']:.4g} ms", why]]
     for name, step in sorted(scheme["bounds"].items(), key=lambda bound: bound[1]):
         reason = Told(scheme["reasons"][name])
-        rows.append([f"bound: {name}", f"{1e3 * step:.4g} ms", reason])
+        rows.append([f"bound: {name.replace('_', ' ')}", f"{1e3 * step:.4g} ms", reason])
     left = f", {scheme['modes_left_out']} left out" if scheme["modes_left_out"] else ""
     rows.append(["modes", f"{scheme['modes']}{left}", MODES[scheme["modes_by"]]])
-    turn = Told(f"turns {scheme['turn']:.2f} rad in a step")
+    turn = f"turns {math.degrees(scheme['turn']):.2g}° in a step"
     rows.append(["highest mode", f"{scheme['highest_frequency_hz']:.3g} Hz", turn])
     strings = scheme["strings"]
     several = "" if strings == 1 else f"the shortest step of {strings} strings"

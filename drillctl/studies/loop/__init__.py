@@ -35,7 +35,8 @@ def tables(result: LoopAnalysis) -> Iterator[Table]:
     from drillctl.studies.loop_mapping import tables as of_map
 
     pair = (Column("quantity"), Column("value"), Column("unit", hidden=True))
-    more = (*pair, Column("mesh", ""), Column("exact_string", "exact string"))
+    own = not result.mesh_limited  # no figure is the mesh's
+    more = (*pair, Column("mesh", hidden=own), Column("exact_string", "exact string", hidden=own))
     yield Table("operating-point", "steady drilling", pair, _operating_point(result))
     yield Table("margins", "margins of the loop about steady drilling", more, _margins(result))
     columns = (
@@ -87,10 +88,7 @@ def _operating_point(result: LoopAnalysis) -> list[list[Any]]:
             ("speed above which axial motion alone is stable", cut.boundary_speed, "rad/s"),
             ("roots in the right half-plane", float(cut.unstable_roots), "1"),
         )
-    return [
-        [name, "none" if value is None else Quantity(value, unit), Unit(unit)]
-        for name, value, unit in rows
-    ]
+    return [[name, _or_none(value, unit), Unit(unit)] for name, value, unit in rows]
 
 
 def _margins(result: LoopAnalysis) -> list[list[Any]]:
@@ -111,7 +109,7 @@ def _margins(result: LoopAnalysis) -> list[list[Any]]:
             ("largest sensitivity", margins.peak_sensitivity, "1", "peak_sensitivity"),
             ("frequency of the largest sensitivity", margins.peak_sensitivity_hz, "Hz", ""),
             ("delay at the top torque that is tolerated", margins.delay, "s", "delay_margin"),
-            ("deciding frequency", margins.delay_hz, "Hz", ""),
+            ("frequency that decides this delay", margins.delay_hz, "Hz", ""),
         ]
     if result.weight_delay_margin is not None:
         rows.append(("further delay of the moving weight that is tolerated",
@@ -125,11 +123,16 @@ def _margin_row(
 ) -> list[Any]:
     """A figure, and beside one that the mesh decides that of the exact string."""
     head, value, unit, name = row
-    own = [head, Quantity(value, unit), Unit(unit)]
+    own = [head, _or_none(value, unit), Unit(unit)]
     if name not in limited:
         return [*own, "", ""]
     exact = limited[name]
-    return [*own, "mesh-limited", "none" if exact is None else Quantity(exact, unit)]
+    return [*own, "mesh-limited", _or_none(exact, unit)]
+
+
+def _or_none(value: float | None, unit: str) -> str | Quantity:
+    """A figure, or that there is none."""
+    return "none" if value is None or math.isnan(value) else Quantity(value, unit)
 
 
 def pictures(result: LoopAnalysis) -> Iterator[Picture]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
-from drillctl.store.tables import Column, Table, place
+from drillctl.store.tables import Column, Table, percent, place
 from drillctl.studies.base import (
     Check,
     Option,
@@ -108,7 +108,7 @@ def remarks(result: Sweep, system: units.System) -> Iterator[str]:
         yield f"minimum J1 {value:.3f} s at {units.told(where, system)}"
     for name, one in result.over_yield.items():
         yield (
-            f"peak torque in {name}: up to {one['largest_share']:.0%} of its torsional yield, "
+            f"peak torque in {name}: up to {percent(one['largest_share'])} of its torsional yield, "
             f"above it in {one['cells']} cells"
         )
     yield result.audit.sentence("cells")

@@ -79,8 +79,10 @@ def pictures(result: Modes) -> Iterator[Picture]:
             frequency_response(design.string, telling_frequencies(design.string)), system=system
         ),
     )  # fmt: skip
+    tabled = getattr(design.tables.bit_rock, "table", None)
+    each = "each weight of the friction table" if tabled else "the weight on bit"
     yield Picture(
-        "friction", "Bit torque against bit speed, at each weight of the friction table.",
+        "friction", f"Bit torque against bit speed, at {each}.",
         "Curves of bit torque over bit speed: the torque is largest at rest and falls as the bit "
         "turns faster, which is what drives stick-slip.",
         lambda system: plots.friction_curves(design, system=system),

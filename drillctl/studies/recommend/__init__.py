@@ -48,8 +48,8 @@ def _settings(result: Recommendation) -> Table:
 
     rows = [
         [
-            _named(result, one.name), one.law, Told(numbers_of(one)), one.verdict,
-            one.nominal["j1"], one.nominal["stick_slip_index"],
+            _named(result, one.name), one.law, Told(numbers_of(one.design, one.gains)), one.verdict,
+            one.nominal["j1"], round(one.nominal["stick_slip_index"], 4),
             Estimate(one.probability, one.interval), one.objective,
             None if one is result.present else result.less(one),
         ]
@@ -63,7 +63,13 @@ def _settings(result: Recommendation) -> Table:
         Column("less", "mean J1 less that now", "s", 3, signed=True, interval=True),
     )  # fmt: skip
     draws = len(result.present.j1)
-    return Table("settings", f"at the same {draws} fresh draws (* recommended)", columns, rows)
+    title = f"at the same {draws} fresh draws (* {_chosen(result)})"
+    return Table("settings", title, columns, rows)
+
+
+def _chosen(result: Recommendation) -> str:
+    """What the setting is that is put first."""
+    return "the least bad: none passes" if result.verdict == "none" else "recommended"
 
 
 def _limits(result: Recommendation) -> Table:
@@ -111,9 +117,10 @@ def _numbers(result: Recommendation) -> Table:
     for name, value in best.controller.items():
         si = SI_OF[name]
         each = told[name]
+        written = float(f"{value:.5g}")  # the same in all units, and in the sentence
         both = [
-            f"{v:.5g} {k.replace('*s/rad', '*s').replace('/rad', '').replace('*', ' ')}"
-            for k, v in list(each.items())[:2]
+            f"{v:.5g} {unit}"
+            for v, unit in (units.displayed(written, si, of) for of in ("si", "field"))
         ]
         per = next((v for k, v in each.items() if k.startswith("per unit")), None)
         drift = drifts.get(f"controller.{name}")
@@ -127,7 +134,8 @@ def _numbers(result: Recommendation) -> Table:
         Column("per_unit", "per unit", hidden=told["rated_torque"] is None),
         Column("low", "may be off down to"), Column("high", "up to"),
     )  # fmt: skip
-    return Table("numbers", f"numbers for the drive: {best.name}", columns, rows)
+    missed = ", which does not pass" if result.verdict == "none" else ""
+    return Table("numbers", f"numbers for the drive: {best.name}{missed}", columns, rows)
 
 
 def _criteria(result: Recommendation) -> Table:
@@ -154,7 +162,7 @@ def pictures(result: Recommendation) -> Iterator[Picture]:
     yield Picture(
         "recommended", "Settings side by side: J1, probability, window, loop.",
         f"J1, probability of the level, speeds and weights without sticking and slope margin of "
-        f"{len(result.candidates)} settings; recommended: {result.recommended.name}.",
+        f"{len(result.candidates)} settings; {_chosen(result)}: {result.recommended.name}.",
         lambda system: plots.recommended(result, system=system),
     )  # fmt: skip
 
@@ -166,7 +174,10 @@ def remarks(result: Recommendation, system: units.System) -> Iterator[str]:
     yield units.told(result.sentence, system)
     yield from (units.told(text, system) for text in others(result))
     yield from (one.sentence for one in result.confirmed)
-    yield from (f"{name}: left out: {why}" for name, why in result.left_out.items())
+    names: dict[str, list[str]] = {}
+    for name, why in result.left_out.items():
+        names.setdefault(why, []).append(name)
+    yield from (f"left out: {', '.join(some)}: {why}" for why, some in names.items())
 
 
 def checks(result: Recommendation) -> Iterator[Check]:
@@ -174,7 +185,7 @@ def checks(result: Recommendation) -> Iterator[Check]:
     from drillctl.studies.recommend.words import detail, question
 
     for one in result.recommended.criteria:
-        yield Check(question(result.recommended, one), one.kept, detail(one))
+        yield Check(question(result.recommended, one), one.kept, detail(result.recommended, one))
 
 
 def notes(result: Recommendation) -> Iterator[str]:

@@ -124,14 +124,14 @@ def assessed(one: c.Candidate, design: Design) -> Assessed:
     j1, limited = drawn(design)
     figures = loop_figures(design, asked.slope_share)
     hits = int(np.count_nonzero(j1 <= table.level))
-    share, (low, _) = hits / len(j1), share_interval(hits, len(j1))
+    share, interval = hits / len(j1), share_interval(hits, len(j1))
     criteria = (
         *loop_criteria(design, figures, asked),
-        *run_criteria(nominal["j1"], run.status, table.level, share, low, table.probability),
+        *run_criteria(nominal["j1"], run.status, table.level, share, interval, table.probability),
         limit_criterion(limited, asked.time_at_limit),
     )
     where = window(design)
-    drift = _tolerances(design, share) if low >= table.probability else ()
+    drift = _tolerances(design, share) if interval[0] >= table.probability else ()
     result = Assessed(
         name=one.name,
         law=one.law or design.tables.controller.law,

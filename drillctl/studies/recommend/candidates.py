@@ -131,7 +131,8 @@ def by_rules(design: Design) -> list[Candidate]:
             _ = made.top_drive
             results.append(Candidate(NAMES[law], made, law))
         except InputError as error:
-            results.append(Candidate(NAMES[law], None, law, error.problem))
+            why = error.problem.removeprefix(f"{law} is ")
+            results.append(Candidate(NAMES[law], None, law, why))
     return results
 
 
@@ -171,10 +172,17 @@ class Confirmed:
     @property
     def sentence(self) -> str:
         """For people."""
-        return (
-            f"{self.law}, grid of {self.cells} settings: {self.stable} keep the slope margin, "
-            f"{self.probable} of these the probability, {self.passing} of these all else"
-        )
+        counts = (
+            (self.stable, "the slope margin"), (self.probable, "the probability"),
+            (self.passing, "all else"),
+        )  # fmt: skip
+        told: list[str] = []
+        for count, what in counts:
+            verb = ("keeps" if count < 2 else "keep") if not told else "of these"
+            told.append(f"{count or 'none'} {verb} {what}")
+            if not count:
+                break
+        return f"{self.law}, grid of {self.cells} settings: {', '.join(told)}"
 
 
 def all_kept(design: Design, tuned: tuple[Tuned, ...], law: str) -> tuple[Design | None, Confirmed]:

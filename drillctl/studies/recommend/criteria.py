@@ -11,6 +11,7 @@ import numpy as np
 from drillctl import units
 from drillctl.arrays import finite
 from drillctl.design import Design, parts
+from drillctl.ensemble.cases import Interval
 from drillctl.errors import InputError
 from drillctl.linear.ends import bit_side, ends_of
 from drillctl.linear.loop_analysis import tolerated_slope
@@ -21,6 +22,7 @@ from drillctl.rig.drillstring.frequencies import followed, natural_frequencies
 from drillctl.rig.top_drive.law import DriveTable
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked, strict
+from drillctl.store.tables import chance, percent
 from drillctl.studies.recommend.settings import Settings
 
 NAMED_MODES = 12  # modes with the top held that a frequency is named after
@@ -215,7 +217,7 @@ def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Cri
 
 
 def run_criteria(
-    j1: float, status: str, level: float, share: float, low: float, required: float
+    j1: float, status: str, level: float, share: float, interval: Interval, required: float
 ) -> list[Criterion]:
     """What the runs must keep: J1 without sticking at the end, and its probability."""
     sticks = status in ("sticking", "stalled", "failed")
@@ -224,10 +226,9 @@ def run_criteria(
     if sticks and nominal.kept:
         said = f"the bit is {status} in the last 20 s, with J1 {j1:.3g} s"
         nominal = Criterion("j1", False, j1, level, 0.1, said)
-    shown = "" if low >= required else (
-        f"P(J1 <= {level:g} s) is {share:.3f}, {required:g} required" if share < required else
-        f"P(J1 <= {level:g} s) is {share:.3f}, but {required:g} is not shown: it may be {low:.3f}"
-    )  # fmt: skip
+    low, high = interval
+    asked = f"{percent(required)} {'required' if high < required else 'is not shown'}"
+    shown = f"P(J1 <= {level:g} s) is {chance(share, interval)}, {asked}"
     probable = _criterion("probability", low, required, True, shown)
     return [nominal, probable]
 

@@ -34,12 +34,15 @@ def what_helps(one: Assessed) -> tuple[str, ...]:
 def _room(one: Assessed) -> Iterator[str]:
     window = one.window
     low, high = window.lowest_speed, window.highest_weight
+    ends = []
     if low is not None:
-        least = "at least " if window.speed_open else ""
-        yield f"the bit does not stick down to {least}{units.full(low, 'rad/s', 7)}"
+        last = ", the lowest that was run" if window.speed_open else ""
+        ends.append(f"down to {units.full(low, 'rad/s', 7)}{last}")
     if high is not None:
-        least = "at least " if window.weight_open else ""
-        yield f"nor up to {least}{units.full(high, 'N', 4)} on bit"
+        last = ", the highest that was run" if window.weight_open else ""
+        ends.append(f"up to {units.full(high, 'N', 4)} on bit{last}")
+    if ends:
+        yield f"the bit does not stick {', nor '.join(ends)}"
 
 
 def until_depth(one: Assessed) -> tuple[float, float | None] | None:

@@ -3,29 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.design.paths import SI_OF, USUAL_NAMES
-from drillctl.store.tables import percent
+from drillctl.store.tables import chance, percent
 from drillctl.studies.recommend.assess import FAILS, FRAGILE, Assessed
 from drillctl.studies.recommend.candidates import NAMES, PRESENT
 from drillctl.studies.recommend.criteria import Criterion, drive_of, mode_at
+from drillctl.studies.recommend.deeper import depth_of
 
 if TYPE_CHECKING:
     from drillctl.studies.recommend.compute import Recommendation
 
 
-def numbers_of(one: Assessed) -> str:
-    """The numbers of a setting, in full."""
+def numbers_of(design: Design, gains: Mapping[str, float]) -> str:
+    """The numbers of a drive, in full."""
 
     def unit(path: str) -> str:  # gains that a law has of the string are no keys of its design
-        return SI_OF.get(path.rpartition(".")[2]) or parameter(one.design, path).si_unit
+        return SI_OF.get(path.rpartition(".")[2]) or parameter(design, path).si_unit
 
     return ", ".join(
         f"{USUAL_NAMES.get(path, path)} {units.full(value, unit(path), 5)}"
-        for path, value in one.gains.items()
+        for path, value in gains.items()
     )
 
 
@@ -98,30 +100,36 @@ def _peak_mode(one: Assessed) -> str:
 def sentence(result: Recommendation) -> str:
     """What to set, what limits it, what would help next."""
     best = result.recommended
-    numbers = numbers_of(best)
+    numbers = numbers_of(best.design, best.gains)
     kept = best.name == PRESENT
-    chance = (
-        f"J1 <= {best.design.tables.tune.level:g} s with probability {percent(best.probability)}"
-    )
+    level, share = best.design.tables.tune.level, percent(best.probability)
+    kept_at = f"J1 is at or under {level:g} s with a probability of {share}"
     helps = "; ".join(result.helps)
     if best.verdict == FAILS:
-        worst = max(best.missed, key=lambda one: one.miss)
+        apart = _told_apart(best.missed)
+        worst = max(apart, key=lambda one: one.miss)
         by = "far" if worst.miss >= 1.0 else f"{100 * worst.miss:.0f} %"
         missed = f"misses by {by}: {worst.said}"
-        others = [one.said for one in best.missed if one is not worst]
+        others = [one.said for one in apart if one is not worst]
         also = f"; also {'; '.join(others)}" if others else ""
         return (
             f"No setting passes; the least bad is {best.name} ({numbers}), which {missed}{also}. "
             f"{helps[:1].upper()}{helps[1:]}."
         )
-    what = f"Keep what is in the drive ({numbers})" if kept else f"Set {best.name}: {numbers}"
-    verdict = "passes"
+    what = f"Keep what is in the drive: {numbers}" if kept else f"Set {numbers} ({best.name})"
+    verdict = "It passes"
     if best.verdict == FRAGILE:
-        verdict = f"passes, but fragile: {'; '.join(best.fragile)}"
+        verdict = f"It passes, but is fragile: {'; '.join(best.fragile)}"
     room = f" {helps[:1].upper()}{helps[1:]}." if helps else ""
     limit = "; ".join(limits_of(best))
     deeper = f" {_deeper(result)}" if result.until else ""
-    return f"{what}. It {verdict}. It has {chance}. What limits it is {limit}.{room}{deeper}"
+    return f"{what}. {verdict}. {kept_at}. What limits it is {limit}.{room}{deeper}"
+
+
+def _told_apart(missed: Sequence[Criterion]) -> list[Criterion]:
+    """What is missed, without what follows from a loop that is unstable."""
+    follows = ("slope_reserve", "delay") if missed[0].name == "stable" else ()
+    return [one for one in missed if one.name not in follows]
 
 
 def _deeper(result: Recommendation) -> str:
@@ -129,8 +137,10 @@ def _deeper(result: Recommendation) -> str:
     assert result.until is not None
     last, fails = (None if x is None else units.full(x, "m", 5) for x in result.until)
     if fails is None:
-        return f"As pipe is added at the top it passes to {last} at least."
-    return f"As pipe is added at the top it passes to {last}, and no longer at {fails}."
+        return f"With pipe added at the top it still passes at {last}, the deepest that was tried."
+    if result.until[0] == depth_of(result.recommended.design):
+        return f"With pipe added at the top it no longer passes at {fails}."
+    return f"With pipe added at the top it passes down to {last}, and no longer at {fails}."
 
 
 def others(result: Recommendation) -> list[str]:
@@ -149,7 +159,9 @@ def others(result: Recommendation) -> list[str]:
             texts.append(f"{name}: {stable}{first.said}{more}")
         else:
             words = f", but fragile: {'; '.join(one.fragile)}" if one.fragile else ""
-            texts.append(f"{name}: passes too{words}; objective {one.objective:.4g} s")
+            objective = one.design.tables.tune.objective_said
+            compared = f"{objective} {one.objective:.3g} s, {best.objective:.3g} s recommended"
+            texts.append(f"{name}: passes too{words}; {compared}")
     return texts
 
 
@@ -158,18 +170,20 @@ def question(one: Assessed, criterion: Criterion) -> str:
     asked, table = one.design.tables.recommend, one.design.tables.tune
     return {
         "stable": "Is steady drilling stable to small disturbances?",
-        "slope_reserve": f"Is the slope margin {asked.slope_reserve:g} times the rock's slope?",
+        "slope_reserve": f"Is the slope margin at least {asked.slope_reserve:g} times the rock's "
+        "slope?",
         "peak_sensitivity": f"Is the peak sensitivity at {asked.slope_share:g} of that slope at "
         f"most {asked.peak_sensitivity:g}?",
-        "delay": "Does the loop bear as much delay again as the drive has?",
+        "delay": "Does the loop bear the further delay that is asked of it?",
         "j1": f"Is J1 ≤ {table.level:g} s at nominal rock, without sticking at the end?",
-        "probability": f"Is P(J1 ≤ {table.level:g} s) shown to be {percent(table.probability)}?",
+        "probability": f"Is P(J1 ≤ {table.level:g} s) shown to be at least "
+        f"{percent(table.probability)}?",
         "time_at_limit": f"Is the drive at its limit less than {percent(asked.time_at_limit)} of "
         "the time?",
     }[criterion.name]
 
 
-def detail(criterion: Criterion) -> str:
+def detail(one: Assessed, criterion: Criterion) -> str:
     """What a criterion comes to, in full: what is missed, else its number beside its limit."""
     value, limit = criterion.value, criterion.limit
     if criterion.said or value is None:
@@ -179,8 +193,12 @@ def detail(criterion: Criterion) -> str:
             f"the loop bears {units.full(value, 'N*m*s/rad', 4)}, the rock falls by "
             f"{units.full(limit, 'N*m*s/rad', 4)}"
         )
-    if criterion.name in ("delay", "j1"):
-        return f"{units.full(value, 's', 3)}, limit {units.full(limit, 's', 3)}"
-    if criterion.name in ("probability", "time_at_limit"):
-        return f"{percent(value)}, limit {percent(limit)}"
-    return f"{value:.3g}, limit {limit:.3g}"
+    if criterion.name == "probability":
+        return f"it is {chance(one.probability, one.interval)} of {len(one.j1)} draws"
+    return {
+        "slope_reserve": f"{value:.3g} times",
+        "peak_sensitivity": f"{value:.3g}",
+        "delay": f"it bears {1e3 * value:.3g} ms, {1e3 * limit:.3g} ms asked",
+        "j1": f"J1 {units.full(value, 's', 3)}",
+        "time_at_limit": percent(value),
+    }[criterion.name]

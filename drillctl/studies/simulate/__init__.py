@@ -16,6 +16,7 @@ from drillctl.store.tables import (
     Unit,
     in_columns,
     number,
+    percent,
     write_columns,
 )
 from drillctl.studies.base import Check, Option, Picture, Recipe, Requested, Run, Study, in_batch
@@ -58,9 +59,9 @@ def tables(result: Simulation) -> Iterator[Table]:
         if getattr(result.measures, TOLD_BY.get(one.name, "j1")) is not None
     ]
     if result.share_of_yield is not None:
-        rows.append(["peak pipe torque over torsional yield", f"{result.share_of_yield:.1%}", ""])
+        rows.append(["peak pipe torque over torsional yield", percent(result.share_of_yield), ""])
     if len(result.yields) > 1:
-        rows += [[f"of {name}", f"{one['share']:.1%}", ""] for name, one in result.yields.items()]
+        rows += [[f"of {name}", percent(one["share"]), ""] for name, one in result.yields.items()]
     if result.energy is not None:
         residual = f"{result.energy.relative_residual:.0e} of the work"
         rows.append(["energy residual", residual, ""])

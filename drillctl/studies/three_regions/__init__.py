@@ -77,7 +77,7 @@ def pictures(result: ThreeRegions) -> Iterator[Picture]:
 def remarks(result: ThreeRegions, system: units.System) -> Iterator[str]:
     """What attraction means here."""
     yield (
-        f"Attracted: within {result.band:.0%} of the operating speed throughout the last "
+        f"Attracted: within {100 * result.band:g} % of the operating speed throughout the last "
         f"{result.window:g} s of {result.horizon:g} s. Local stability is of the linear loop, J1 "
         "of one run over a finite time, attraction of long runs from far away: none of them "
         "implies another."

@@ -140,6 +140,17 @@ class TuneTable(Table):
         return self.objective + (f" {self.quantile:g}" if named else "")
 
     @property
+    def objective_said(self) -> str:
+        """The objective in words."""
+        share = f"{100 * self.quantile:g} %"
+        return {
+            "mean": "mean of J1",
+            "quantile": f"{share} quantile of J1",
+            "cvar": f"mean of J1 beyond its {share} quantile",
+            "worst": "worst J1",
+        }[self.objective]
+
+    @property
     def fresh_seed(self) -> int:
         """Seed of the certificate's draws."""
         given = self.certificate.seed

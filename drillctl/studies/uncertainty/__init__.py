@@ -23,6 +23,7 @@ from drillctl.store.tables import (
     chance,
     number,
     open_estimate,
+    percent,
     place,
 )
 from drillctl.studies.base import (
@@ -128,8 +129,10 @@ def _areas(name: str, title: str, result: Uncertainty) -> Table:
 
 
 def _best(result: Uncertainty) -> Table:
+    from drillctl.ensemble.probability import called
+
     columns = (
-        Column("objective", "best by"), Column("value", interval=True),
+        Column("objective", hidden=True), Column("said", "best by"), Column("value", interval=True),
         *(Column(axis.path, unit=axis.unit) for axis in result.axes),
         Column("alike_cells", "cells not significantly worse"),
     )  # fmt: skip
@@ -138,11 +141,12 @@ def _best(result: Uncertainty) -> Table:
         try:
             best = result.best(name)
         except InputError as error:
-            rows.append([f"{name}: {error.problem}", *[None] * (len(columns) - 1)])
+            said = f"{called(name)}: {error.problem}"
+            rows.append([name, said, *[None] * (len(columns) - 2)])
             continue
         alike = None if best.alike is None else int(best.alike.sum())
         at = result.at(best.cell).values()
-        rows.append([name, open_estimate(best.value, best.interval), *at, alike])
+        rows.append([name, called(name), open_estimate(best.value, best.interval), *at, alike])
     return Table("best", "best cells over the draws (J1 in s, 95 % interval)", columns, rows)
 
 
@@ -198,7 +202,7 @@ def pictures(result: Uncertainty) -> Iterator[Picture]:
 
 
 def _maps(result: Uncertainty, ending: str) -> Iterator[Picture]:
-    areas = "; ".join(f"under {x:g} s {next(iter(a.values())).value:.1%}"
+    areas = "; ".join(f"under {x:g} s {percent(next(iter(a.values())).value, 2)}"
                       for x, a in result.areas.items())  # fmt: skip
     yield Picture(
         f"regions{ending}", "Regions by probability: kept in 95 %, 50 % and 5 % of the draws.",
@@ -222,17 +226,18 @@ def remarks(result: Uncertainty, system: units.System) -> Iterator[str]:
     for seen in result.looks:
         low, high = seen.interval
         yield (
-            f"look at {seen.realizations} realizations: area {seen.area:.2%} ({low:.2%} to "
-            f"{high:.2%}, {seen.confidence:.2%} interval)"
+            f"look at {seen.realizations} realizations: area {percent(seen.area)} "
+            f"({percent(low)} to {percent(high)}, {percent(seen.confidence, 4)} interval)"
         )
     for failure in result.failures:
         yield failure.sentence(result.realizations)
     if result.censored.any():
         yield (
-            f"{result.censored.mean():.1%} of the lanes were stopped once J1 had passed "
+            f"{percent(result.censored.mean())} of the lanes were stopped once J1 had passed "
             f"{result.levels[-1]:g} s: they are outside every region, their J1 is a lower bound"
         )
-    yield result.audit.sentence("lanes")
+    if len(result.audit.cells):
+        yield result.audit.sentence("lanes")
     method = result.design.tables.uncertainty.sampling
     yield f"{result.realizations} draws ({method}, seed {result.seed}): {', '.join(result.drawn)}"
     yield (
