@@ -73,10 +73,11 @@ def page() -> str:
 
 
 UNITS = (
-    "Capitals count as small letters where that has no other meaning (`RPM`, `KN`); between force",
-    "and arm of a torque `-`, `.` or a space are as good as `*`. Numbers may be fractions",
-    "(`4 1/2`, `5½`) and have a decimal comma (`171,45 mm`) or marks between thousands",
-    "(`9,842.5 ft`, `4 500 m`); `13,360 ft`, which may be either, is refused.",
+    "Capitals count as small letters where that has no other meaning (`RPM`, `KN`). Between units",
+    "`-`, `.`, a space, or nothing in `Nm` and `ftlb`, are as good as `*`: `ft-lbf/rpm`, `Nms`,",
+    "`kg-m²`. Numbers may be fractions (`4 1/2`, `5½`) and have a decimal comma (`171,45 mm`) or",
+    "marks between thousands (`9,842.5 ft`, `4 500 m`, `4.500,5 m`); `13,360 ft`, which may be",
+    "either, is refused, as `lbs` of a force and `ton` are.",
 )
 
 

@@ -62,6 +62,7 @@ TIME = Kind("time", "s", ("s", "ms", "min"))
 RATE = Kind("rate", "1/s", ("1/s",))
 INERTIA = Kind("inertia", "kg*m^2", ("kg*m^2",))
 DENSITY = Kind("density", "kg/m^3", ("kg/m^3",), (700.0, 20e3))
+MUD = Kind("density", "kg/m^3", ("kg/m^3", "g/cm^3", "lb/gal"), (700.0, 2600.0))
 MASS = Kind("mass", "kg", ("kg",), (1.0, 1e6))
 AXIAL_DAMPING = Kind("axial damping", "N*s/m", ("N*s/m", "kN*s/m"))
 LINEAR_MASS = Kind("mass per length", "kg/m", ("kg/m", "lb/ft"))
@@ -128,12 +129,18 @@ _KNOWN: dict[str, dict[str, float]] = {
 
 # How drillers spell them, by what each is in SI; a thousand pounds are never a mass here.
 _POUNDS, _KIPS = ("lbf", "lb", "lbs"), ("klbf", "klb", "klbs", "kip", "kips", "k lbf", "k lbs")
-_SIGNS = re.compile(r"[-.\u00b7 ]+")  # between force and arm
+_SIGNS = re.compile(r"(?<=[^\W\d_])[-.\u00b7\u22c5\u2022\u00d7\s]+(?=[^\W\d_])")  # for a `*`
 _SPELLED: dict[str, dict[str, str]] = {
-    "rad/s": {"r/min": "rev/min", "revs/min": "rev/min", "rad/sec": "rad/s"},
+    "rad/s": {
+        **dict.fromkeys(("r/min", "revs/min", "r.p.m.", "U/min", "tr/min", "o/min"), "rev/min"),
+        "rad/sec": "rad/s",
+    },
     "N": {
         **dict.fromkeys(_KIPS, "klbf"),
-        **dict.fromkeys(("t", "te", "tonf", "tonnef", "tonne", "tonnes"), "tf"),
+        **dict.fromkeys(
+            ("t", "te", "mt", "tonf", "tonnef", "tonne", "tonnes", "metric tons", "metric tonnes"),
+            "tf",
+        ),
     },
     "N*m": {  # with `*` for the other signs between force and arm
         **{one: "lbf*ft" for lb in _POUNDS for one in (f"{lb}*ft", f"ft*{lb}", f"ft{lb}")},
@@ -164,6 +171,9 @@ _AMBIGUOUS = {
     **dict.fromkeys(
         ("ton", "tons"), 'metric ton-force ("tf", 9.807 kN) or short ton-force, 2 klbf (8.896 kN)'
     ),
+    **dict.fromkeys(
+        ("mlb", "mlbs", "mlbf"), 'thousands of pounds-force, "klbf", or millions, "1000 klbf"'
+    ),
     "mph": 'metres per hour ("m/h") or miles per hour ("mi/h")',
 }
 """Units of two meanings."""
@@ -173,11 +183,13 @@ _TEXT = re.compile(
     r"^\s*(?:(?:(?P<whole>[-+]?\d+)[\s-]+)?(?P<over>\d+)\s*/\s*(?P<under>\d+)"
     rf"|(?P<number>{_NUMBER}))\s*(?P<unit>.*?)\s*$"
 )
+_RAISED = str.maketrans({"\u00b2": "^2", "\u00b3": "^3", "\u2074": "^4"})
 _VULGAR = re.compile("[\u00bc-\u00be\u2150-\u215e]")  # fractions in one character
 _FEET_AND_INCHES = re.compile(
     r"""^\s*(\d+)\s*(?:ft|'|\u2032|\u2019)[\s-]*(\d[\d\s./-]*?)\s*(?:in|"|\u2033|\u201d|'')\s*$"""
 )
-_SPACED = re.compile(r"^\s*[-+]?\d{1,3}(?:[ \u00a0\u202f]\d{3})+(?![\d/])")
+_SPACED = re.compile(r"^\s*[-+]?\d{1,3}(?:[ \u00a0\u202f'\u2019]\d{3})+(?![\d/])")
+_POINTS = re.compile(r"^\s*[-+]?\d{1,3}(?:\.\d{3})+,\d+")
 _COMMAS = re.compile(r"^\s*[-+]?\d{1,3}((?:,\d{3})+)(\.\d+)?(?![\d,])")
 _POWER = re.compile(r"\b((?:[kcmd]?m)|in|ft|s)([234])\b")
 
@@ -193,6 +205,7 @@ def registry() -> Any:
         units = pint.UnitRegistry()
     units.define("rev = revolution")
     units.define("klbf = 1000 * force_pound")
+    units.define("kdaN = 10 * kilonewton")
     units.define("tf = 1000 * kilogram * standard_gravity")
     return units
 
@@ -200,32 +213,48 @@ def registry() -> Any:
 @functools.lru_cache(maxsize=512)
 def factor(unit: str, kind: Kind) -> float:
     """SI value of one `unit`, refused (`InputError`) if it does not measure `kind`."""
-    if unit.lower() in _AMBIGUOUS:
+    if unit.lower() in _AMBIGUOUS and not (kind.si == "kg" and unit.lower() in _POUNDS):
         raise InputError(f"{unit!r} has two meanings: {_AMBIGUOUS[unit.lower()]}")
     known, spelled = _KNOWN[kind.si], _SPELLED.get(kind.si, {})
-    unit = _SIGNS.sub("*", unit) if kind is TORQUE else unit
-    name = spelled.get(unit, unit)
-    if name in known:
-        return known[name]
-    alike = [one for one in (*known, *spelled) if one != unit and one.lower() == unit.lower()]
+    ways = (unit, _joined(unit, kind))
+    names = [spelled.get(one, one) for one in ways]
+    found = next((one for one in names if one in known), None)
+    if found is not None:
+        return known[found]
+    low = {one.lower() for one in ways}
+    alike = [one for one in (*known, *spelled) if one not in ways and one.lower() in low]
     if alike and (kind is SPEED or unit == unit.upper()):  # in capitals
         return factor(alike[0], kind)
     if kind is SPEED:
         raise InputError(f"a speed is given in {_join(SPEED.examples)}, not in {unit!r}")
     try:
-        return _by_pint(name, kind)
+        return _by_pint(unit, names[1], kind)
     except InputError:
         if alike:
             return factor(alike[0], kind)
         raise
 
 
-def _by_pint(unit: str, kind: Kind) -> float:
+def _joined(unit: str, kind: Kind) -> str:
+    """A unit of several, with `*` between them however it is written: `ft-lbs/rpm`, `Nms`."""
+    unit = re.sub(r"\s+per\s+", "/", unit.translate(_RAISED))
+    unit = re.sub(r"\b[kK]\*(?=(?i:lb|ft))", "k", _SIGNS.sub("*", unit))
+    if kind.si == "kg*m^2":
+        return re.sub(r"^kg\*?m", "kg*m", unit)
+    if "N" not in kind.si:
+        return re.sub(r"\b(lbs|lbm)\b", "lb", unit)
+    unit = re.sub(r"\b(k|M|da|kda)?Nm(s?)\b", lambda m: f"{m[1] or ''}N*m{'*s' * len(m[2])}", unit)
+    unit = re.sub(r"\b(k?)(ft|in)\*?lb[sf]?\b", r"\1lbf*\2", unit)
+    unit = re.sub(r"\b(k?)lb[sf]?\*?(ft|in)\b", r"\1lbf*\2", unit)
+    return re.sub(r"\bt\b", "tf", re.sub(r"\b(k?)lbs?\b", r"\1lbf", unit))
+
+
+def _by_pint(unit: str, name: str, kind: Kind) -> float:
     import pint
 
     units = registry()
     try:
-        measure = units.Quantity(1.0, _POWER.sub(r"\1^\2", unit))
+        measure = units.Quantity(1.0, _POWER.sub(r"\1^\2", name))
         return float(measure.to(kind.si).magnitude)
     except pint.DimensionalityError as error:
         raise InputError(
@@ -298,7 +327,7 @@ def parse(value: object, kind: Kind) -> float:
         raise _no_quantity(value, kind)
     if not isinstance(value, str):
         return _bare(value, kind)
-    feet = _FEET_AND_INCHES.match(value) if kind.si == "m" else None
+    feet = _FEET_AND_INCHES.match(_parted(value)) if kind.si == "m" else None
     if feet is not None:
         inches = parse(f"{feet[2]} in", kind)
         return float(feet[1]) * factor("ft", kind) + inches
@@ -322,7 +351,8 @@ def bare(text: str) -> bool:
 
 def pointed(text: str) -> str:
     """A number without marks between its thousands, and a comma for a point as a point."""
-    text = _SPACED.sub(lambda one: re.sub(r"(?<=\d)\s", "", one[0]), text)
+    text = _SPACED.sub(lambda one: re.sub(r"(?<=\d)[\s'\u2019]", "", one[0]), text)
+    text = _POINTS.sub(lambda one: one[0].replace(".", "").replace(",", "."), text)
     if re.match(r"\s*[-+]?\d+,(\d{1,2}|\d{4,})(?![\d,])", text):
         return text.replace(",", ".", 1)
     grouped = _COMMAS.match(text)
@@ -339,6 +369,7 @@ def pointed(text: str) -> str:
 
 def _parted(text: str) -> str:
     """A text with `½` and the like as `1/2`, apart from the number before."""
+    text = text.replace("\u2044", "/")
     return _VULGAR.sub(lambda one: f" {normalize('NFKC', one[0]).replace(chr(0x2044), '/')}", text)
 
 

@@ -400,7 +400,7 @@ class WellTable(Table):
 
     survey: tuple[tuple[q.Depth, q.Angle, q.Angle], ...] = ()
     holes: tuple[HoleTable, ...] = ()
-    mud_density: q.Density | None = None
+    mud_density: q.MudDensity | None = None
     mud_viscosity: q.Viscosity | None = None
     friction_factor: q.FrictionFactor | None = None
     friction_ratio: q.Share = 1.0

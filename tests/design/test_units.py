@@ -98,6 +98,34 @@ def bits(value):
         ("75 pcf", units.DENSITY, 75 * 0.45359237 / 0.3048**3),
         ("20 fph", units.VELOCITY, 20 * 0.3048 / 3600),
         ("23 kgm2", units.INERTIA, 23.0),
+        ("23 kg-m²", units.INERTIA, 23.0),
+        ("68800 lb-ft²", units.INERTIA, 68800 * 0.45359237 * 0.3048**2),
+        ("2140 lbf-ft-s2", units.INERTIA, 2140 * 4.4482216152605 * 0.3048),
+        ("900 in-lbs", units.TORQUE, 900 * 4.4482216152605 * 0.0254),
+        ("12 kftlbs", units.TORQUE, 12e3 * 4.4482216152605 * 0.3048),
+        ("900 lb\u00b7ft", units.TORQUE, 900 * 4.4482216152605 * 0.3048),
+        ("1.2 t\u00a0m", units.TORQUE, 1200 * 9.80665),
+        ("15 mT", units.FORCE, 15e3 * 9.80665),
+        ("15 kdaN", units.FORCE, 150e3),
+        ("625 Nms", units.PROPORTIONAL_GAIN, 625.0),
+        ("625 Nm/(rad/s)", units.PROPORTIONAL_GAIN, 625.0),
+        ("50 ft-lbf/rpm", units.PROPORTIONAL_GAIN, 50 * 4.4482216152605 * 0.3048 / RPM),
+        ("1 kNms/rad", units.DAMPING, 1000.0),
+        ("125 Nm/rad", units.INTEGRAL_GAIN, 125.0),
+        ("310 ft-lbf/rad", units.STIFFNESS, 310 * 4.4482216152605 * 0.3048),
+        ("30 kNm/s", units.TORQUE_RATE, 30e3),
+        ("20 kft-lbf/s", units.TORQUE_RATE, 20e3 * 4.4482216152605 * 0.3048),
+        ("5 klbs/s", units.FORCE_RATE, 5e3 * 4.4482216152605),
+        ("2 t/s", units.FORCE_RATE, 2e3 * 9.80665),
+        ("1100 lbs", units.MASS, 1100 * 0.45359237),
+        ("21.9 lbs per ft", units.LINEAR_MASS, 21.9 * 0.45359237 / 0.3048),
+        ("120 r.p.m.", units.SPEED, 120 * RPM),
+        ("120 U/min", units.SPEED, 120 * RPM),
+        ("1.25 S.G.", units.MUD, 1250.0),
+        ("4.500,5 m", units.LENGTH, 4500.5),
+        ("4’500 m", units.LENGTH, 4500.0),
+        ("31’6½”", units.LENGTH, 31.5 * 0.3048 + 0.0127),
+        ("9 5⁄8 in", units.DIAMETER, 9.625 * 0.0254),
     ],
 )
 def test_text_is_read_in_its_unit(text, kind, si):
@@ -141,6 +169,7 @@ def test_a_speed_comes_in_four_units_only(text):
     [
         ("13,360 ft", units.LENGTH, "may be 13360 or 13.360"),
         ("20 mph", units.VELOCITY, "two meanings"),
+        ("35 Mlbf", units.FORCE, 'thousands of pounds-force, "klbf", or millions'),
         ("13 Ton", units.FORCE, "two meanings"),
         ("1,23,4 m", units.LENGTH, "not a known unit"),
     ],
@@ -184,6 +213,8 @@ def test_what_is_no_unit_is_refused(text):
         (5.875, units.DIAMETER, '"5.875 in"'),
         (127, units.DIAMETER, '"127 mm"'),
         (10, units.TORQUE, '"10 kN*m"'),
+        (1.25, units.MUD, '"1.25 g/cm^3"'),
+        (10.2, units.MUD, '"10.2 lb/gal"'),
         (1234567.25, units.LENGTH, '"1234567.25 m"'),
         (-3, units.LENGTH, '"-3 m"'),
     ],
@@ -296,4 +327,4 @@ def test_common_units_are_known_without_pint_and_as_pint_has_them(kind):
     known = units._KNOWN[kind.si]
     assert {*kind.examples, kind.si} <= set(known)
     for unit, factor in known.items():
-        assert math.isclose(factor, units._by_pint(unit, kind), rel_tol=2.3e-16)
+        assert math.isclose(factor, units._by_pint(unit, unit, kind), rel_tol=2.3e-16)
