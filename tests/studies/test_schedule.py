@@ -1,12 +1,14 @@
 """Gains over depth against exact lines, rules and the search; where they must be changed."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 import drillctl
+from drillctl import units
 from drillctl.errors import InputError
 from drillctl.studies.recommend.candidates import gains_of
 from drillctl.studies.schedule.compute import reflection, schedule, searched
@@ -91,6 +93,8 @@ def test_a_heavy_drive_needs_a_schedule_and_changes_where_it_reflects_too_much(h
         there, before = along.by_rule(one.depth), along.by_rule(one.before)
         kept = reflection(there.replace(gains_of(before)))
         assert kept - reflection(there) == pytest.approx(0.1, abs=1e-3)
+    told = ", ".join(units.full(one.depth, "m", 5) for one in heavy.changes)
+    assert f"set new gains at {told} (there the old ones reflect 0.1 more" in heavy.sentence
     assert [one.before for one in heavy.changes] == [2000.0, *(x.depth for x in heavy.changes[:-1])]
 
 
@@ -100,7 +104,12 @@ def test_a_light_drive_needs_almost_none():
     assert light.costs < 0.01
     assert light.changes == ()
     assert light.sentence.startswith("Almost no schedule is needed from 2500 m to 3000 m")
+    assert light.sentence.endswith("the gains of 2500 m do to the end.")
     assert light.summary()["change_at"] == []
+    row = replace(light.rows[-1], hits=20, stale_hits=2)
+    lost = replace(light, rows=(light.rows[0], row)).sentence
+    assert lost.startswith("A schedule is needed")
+    assert "and lose the required probability at 3000 m" in lost
 
 
 def test_the_table_of_stands_holds_the_rule_at_each(heavy):

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from drillctl import plots, units
-from drillctl.store.tables import Column, Estimate, Table, Told
+from drillctl.store.tables import Column, Estimate, Table, Told, percent
 from drillctl.studies.base import (
     Check,
     Option,
@@ -45,10 +45,12 @@ def tables(result: Schedule) -> Iterator[Table]:
     ]  # fmt: skip
     columns = (
         where, Column("period", unit="s"), *gains, Column("reflection", digits=3),
-        Column("stale_reflection", f"gains of {share:g} of it", digits=3),
+        Column("stale_reflection", f"reflection, gains of {share:g} of it", digits=3),
         Column("j1", "median J1", "s", 3),
         Column("probability", "probability of the level", percent=True, digits=3, interval=True),
-        Column("stale_probability", f"gains of {share:g} of it", percent=True, digits=3),
+        Column(
+            "stale_probability", f"probability, gains of {share:g} of it", percent=True, digits=3
+        ),
         Column("lowest_speed", "no sticking from", "rad/s", 3),
         Column("highest_weight_on_bit", "up to WOB", "N", 3),
         *(Column(f"stale {path}", unit=unit_of[path], hidden=True) for path in paths),
@@ -94,8 +96,8 @@ def remarks(result: Schedule, system: units.System) -> Iterator[str]:
     if result.short:
         level, required = result.design.tables.tune.level, result.design.tables.tune.probability
         said = (
-            f"P(J1 <= {level:g} s) stays under {required:g} in tune at {_places(result)}: there a "
-            "schedule is not enough"
+            f"P(J1 <= {level:g} s) is under {percent(required)} even in tune at "
+            f"{_places(result)}: there a schedule is not enough"
         )
         yield units.told(said, system)
 

@@ -21,6 +21,7 @@ from drillctl.provenance import provenance
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked, strict
 from drillctl.store.result import Result
+from drillctl.store.tables import percent
 from drillctl.studies.recommend.assess import drawn
 from drillctl.studies.recommend.candidates import gains_of
 from drillctl.studies.recommend.window import window
@@ -113,9 +114,13 @@ class Schedule(Result, kind="schedule"):
     @property
     def hardly_needed(self) -> bool:
         """Whether keeping gains over `kept_from` to 1 of a depth costs next to nothing."""
+        return bool(self.costs <= self.design.tables.schedule.material and not self.lost)
+
+    @property
+    def lost(self) -> tuple[Row, ...]:
+        """Depths at which gains in tune keep the required probability, and earlier ones do not."""
         required = self.design.tables.tune.probability
-        lost = any(x.probability >= required > x.stale_probability for x in self.rows)
-        return bool(self.costs <= self.design.tables.schedule.material and not lost)
+        return tuple(x for x in self.rows if x.probability >= required > x.stale_probability)
 
     @property
     def short(self) -> tuple[Row, ...]:
@@ -126,20 +131,26 @@ class Schedule(Result, kind="schedule"):
     @property
     def sentence(self) -> str:
         """Whether a schedule is needed, and where gains must change; quantities in full."""
-        share = self.design.tables.schedule.kept_from
+        table = self.design.tables.schedule
         first, last = (units.full(x.depth, self.unit, 5) for x in (self.rows[0], self.rows[-1]))
-        over = f"{100.0 * (1.0 / share - 1.0):.0f} % deeper"
-        cost = "" if math.isnan(self.costs) else (
-            f": gains kept {over} reflect at most {self.costs:.3f} more than those in tune"
-        )  # fmt: skip
-        if self.hardly_needed:
-            begin = f"Almost no schedule is needed from {first} to {last}{cost}"
-        else:
-            begin = f"A schedule is needed from {first} to {last}{cost}"
+        over = f"{100.0 * (1.0 / table.kept_from - 1.0):.0f} %"
+        further = f"{over} deeper" if self.path == "depth" else f"{over} further in {self.path}"
+        costs = []
+        if not math.isnan(self.costs):
+            costs.append(f"reflect up to {self.costs:.3f} more than gains in tune")
+        if self.lost:
+            at = ", ".join(units.full(one.depth, self.unit, 5) for one in self.lost)
+            costs.append(f"lose the required probability at {at}")
+        cost = f": gains kept until it is {further} {' and '.join(costs)}" if costs else ""
+        needed = "Almost no schedule is needed" if self.hardly_needed else "A schedule is needed"
+        begin = f"{needed} from {first} to {last}{cost}"
         if not self.changes:
-            return f"{begin}; the gains of {first} do to the end."
-        places = ", ".join(units.full(one.depth, self.unit, 5) for one in self.changes)
-        return f"{begin}. Going deeper, change the gains at {places} ({self.changes[0].reason})."
+            return f"{begin}. Going on, the gains of {first} do to the end."
+        places: dict[str, list[str]] = {}
+        for one in self.changes:
+            places.setdefault(one.reason, []).append(units.full(one.depth, self.unit, 5))
+        changes = "; ".join(f"at {', '.join(at)} ({why})" for why, at in places.items())
+        return f"{begin}. Going on, set new gains {changes}."
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI."""
@@ -303,7 +314,7 @@ def _changes(tuned: _Tuned, rows: tuple[Row, ...]) -> tuple[Change, ...]:
     for above, row in itertools.pairwise(rows):
         while held < row.depth and (reason := _worn(tuned, held, row)):
             last = max(held, above.depth)
-            depth = _place(tuned, held, last, row.depth) if "reflects" in reason else last
+            depth = _place(tuned, held, last, row.depth) if "reflect" in reason else last
             depth = row.depth if depth <= held else depth
             results.append(Change(depth, held, reason))
             held = depth
@@ -317,13 +328,13 @@ def _worn(tuned: _Tuned, held: float, row: Row) -> str:
     kept = tuned.design(row.depth, gains)
     added = reflection(kept) - row.reflection
     if added > asked.reflection:
-        return f"there the drive reflects {asked.reflection:g} more than one in tune"
+        return f"there the old ones reflect {asked.reflection:g} more than those in tune"
     if row.probability < table.probability:
         return ""
     j1, _ = drawn(kept, asked.realizations)
     share = float(np.mean(j1 <= table.level))
     if share < table.probability:
-        return f"deeper P(J1 <= {table.level:g} s) falls to {share:.3f}"
+        return f"further on the old ones have P(J1 <= {table.level:g} s) of {percent(share)}"
     return ""
 
 
