@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -83,6 +84,7 @@ def show(
 def _derived(design: Design) -> Iterator[str]:
     """What follows from a design, as comments; quantities in full."""
     yield from _rock(design)
+    yield from _drive(design)
     yield "\n# Elements of the sections:"
     for one in design.mesh:
         count = f"{one.elements} of {full(one.length, 'm', 4)}, " if one.length > 0.0 else ""
@@ -113,6 +115,22 @@ def _rock(design: Design) -> Iterator[str]:
         f"{numbers.aggressiveness:.4g}, high-speed ratio "
         f"{numbers.high_speed_ratio:.4g}, speed scale {full(numbers.speed_scale, 'rad/s')}"
     )
+
+
+def _drive(design: Design) -> Iterator[str]:
+    """A drive behind a gear as it counts at the pipe."""
+    drive = design.tables.top_drive
+    if drive.gear_ratio is None:
+        return
+    limits = drive.limits
+    told = (
+        ("torque to", limits.torque, "N*m"),
+        ("power to", limits.power, "W"),
+        ("speed to", limits.speed, "rad/s"),
+        ("continuous torque", limits.continuous, "N*m"),
+    )
+    known = [f", {name} {full(value, unit)}" for name, value, unit in told if math.isfinite(value)]
+    yield f"\n# Drive at the pipe: inertia {full(drive.at_pipe, 'kg*m^2')}{''.join(known)}"
 
 
 def _mud(design: Design) -> Iterator[str]:

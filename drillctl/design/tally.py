@@ -45,6 +45,8 @@ SAME_BORE = 1e-3  # by how much (m) a bore may differ from that of the catalogue
 
 
 _SUM = re.compile(r"\b(sub-?)?(total|sum|summe|somme|suma|totaal|totalt)s?\b")
+_WHOLE = re.compile(r"\b(length|footage|bha|assembly|string|drillstring)\b")
+_WIDE = re.compile(r"stab|reamer|opener|hole|casing|liner|centrali")
 _REMARK = re.compile(
     r":|\b(bha|assembly|string|drillstring|remarks?|notes?|date|page|end of|\w+ed by)\b"
 )
@@ -205,12 +207,16 @@ class _Line:
         return list(self.cells) == ["name"] and bool(_REMARK.search(self.name.lower()))
 
     def is_sum_of(self, sections: list[dict[str, Any]]) -> bool:
-        """Whether it has no name and no more than the length of those before."""
+        """Whether it has no diameter, and the length of those before, of all or of the last."""
         own = {"length", "total length"} & set(self.cells)
-        if self.name or "od" in self.cells or not own or not sections:
+        if "od" in self.cells or not own or (self.name and not _WHOLE.search(self.name.lower())):
             return False
-        whole = sum(_span(section) for section in sections)
-        return abs(self._value(own.pop()) / whole - 1.0) < 0.01
+        length, whole = self._value(own.pop()), 0.0
+        for section in reversed(sections):
+            whole += _span(section)
+            if abs(length / whole - 1.0) < 0.01 and (self.name or section is sections[0]):
+                return True
+        return False
 
     @property
     def longer_than_a_piece(self) -> bool:
@@ -251,6 +257,8 @@ class _Line:
         section |= self._joints(section)
         if "pipe" in section:
             section = {k: v for k, v in section.items() if not k.endswith("er_diameter")}
+        if kind_in(self.name) == "motor":
+            self.notes.append("the speed that a mud motor adds to the bit is not in the model")
         if "inertia" in self.cells:
             section["inertia"] = self._quantity("inertia")
         self._check(section)
@@ -320,12 +328,20 @@ class _Line:
         if "od" not in self.cells:
             return self._by_name(grade)
         outer = self._quantity("od")
+        wide = _is_bit(self.name) or _WIDE.search(self.name.lower())
+        if not 0.02 <= self._value("od") <= (1.0 if wide else 0.36):
+            raise InputError(
+                f"{outer} is no outer diameter of a component: is it of another column, "
+                "or in another unit?",
+                self.cells["od"].where,
+            )
         if "id" in self.cells:
             if self._value("id") >= self._value("od"):
                 raise InputError(
                     f"inner diameter {self._quantity('id')} is not less than the outer, {outer}",
                     self.cells["id"].where,
                 )
+            self._compare_weight()
             return {"outer_diameter": outer, "inner_diameter": self._quantity("id")}
         bore, how = self._bore()
         self.notes.append(f"no inner diameter: {how}")
@@ -344,6 +360,17 @@ class _Line:
             return {"outer_diameter": f"{sizes[0]:g} in", "inner_diameter": "0 mm"}
         raise InputError("the component has no outer diameter", self._at("od"))
 
+    def _compare_weight(self) -> None:
+        """Say where a weight is not that of the diameters, which count."""
+        if "weight" in self.cells:
+            body = 0.25 * math.pi * STEEL * (self._value("od") ** 2 - self._value("id") ** 2)
+            share = self._value("weight") / body
+            if not 0.6 < share < 1.8:
+                self.notes.append(
+                    f"{self._quantity('weight')} is {share:.2g} times what steel of its diameters "
+                    "weighs; the diameters count"
+                )
+
     def _bore(self) -> tuple[float, str]:
         """An inner diameter (m) that no cell gives, and where it is from."""
         outer = self._value("od")
@@ -355,7 +382,8 @@ class _Line:
             square = outer**2 - 4.0 * weight / (math.pi * STEEL)
             if square < 0.0:
                 raise InputError(
-                    "is more than a solid bar of steel weighs", self.cells["weight"].where
+                    f"{self._quantity('weight')} is more than a solid bar of steel weighs",
+                    self.cells["weight"].where,
                 )
             return math.sqrt(square), f"{math.sqrt(square) * 1e3:.1f} mm by its weight"
         if _is_bit(self.name):
@@ -445,8 +473,8 @@ class _Line:
             problem = error.errors()[0]
             text = str(problem.get("ctx", {}).get("error", problem["msg"]))
             key = str(problem["loc"][-1]) if problem["loc"] else text.partition(" ")[0]
-            field = next((f for f, about in FIELDS.items() if about.key == key), "")
-            raise InputError(text, self._at(field)) from None
+            fields = [field for field, about in FIELDS.items() if about.key == key]
+            raise InputError(text, self._at(*fields, "total length")) from None
 
     def _at(self, *fields: str) -> str:
         """The line, and its column of one of some fields if there is one."""

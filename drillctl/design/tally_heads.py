@@ -50,7 +50,8 @@ _OUTER = r"\b(od|o d|do|d o|outer|outside|external|diameter (out|ext))\b"
 _INNER = r"\b(id|i d|di|d i|inner|inside|internal|bore|diameter in[tn]?)\b"
 _UNUSED = (
     r"\b(a?cum\w*|acc|accum\w*|running|depth|serial|sn|asset|part|fn|fish\w*|from|to|max|blade|"
-    r"gauge|neck|drift|remarks?)\b|\b(stand|joint|jt) ?(#|no|nr|number)$|\bpos$"
+    r"gauge|neck|drift|remarks?)\b|\b(stand|joint|jt) ?(#|no|nr|number)$|\bpos$|"
+    r"\b(joints|jts|pieces) per stand\b"
 )
 _EACH = (
     r"(length|len) (per|of (a|each)) |(length|len) each|each (length|len)|"
@@ -60,7 +61,7 @@ _COUNT = r"\b(count|qty|quantity|number|no|nos|nr|joints|jts|pieces|pcs)\b|^#$"
 _PIECES = r"\b(count|qty|quantity|joints|jts|pieces|pcs)\b"  # what no number of a line is called
 _PIPE_JOINT = r"\b(average|avg|mean|range) (joint|jt)s? (length|len)\b"
 _NAME = r"\b(name|component|item|description|tool|element|section|type|bha)\b"
-_LENGTH = r"\b(length|len)\b|^l$"
+_LENGTH = r"\b(length|len|footage)\b|^l$"
 _TOTAL = r"\b(total|sum|section) (length|len)\b|\blength total\b"
 FIELDS = {
     "not used": Field("", None, _UNUSED),

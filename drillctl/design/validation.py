@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from difflib import get_close_matches
@@ -120,6 +121,13 @@ def _telling(problems: list[Any]) -> list[Any]:
     return [one for one in problems if one["type"] != "missing" or one["loc"][:-1] not in misspelt]
 
 
+_RATED = "power|rated|rating|rpm|speed|hp|kw"
+_OF_A_MOTOR = (
+    "power and speeds of a motor are points of torque_speed, torque being power over speed: 400 kW "
+    "at 1150 rpm are 3.32 kN*m; "
+)
+
+
 def _reported(problem: Any, tree: Tree) -> InputError:
     """A pydantic error as one of ours."""
     where = dotted(problem["loc"], tree)
@@ -132,7 +140,8 @@ def _reported(problem: Any, tree: Tree) -> InputError:
         homes = [] if misspelt else _homes(DesignTables, str(key))
         homes = [f"[{home}]" for home in homes if home != here]
         elsewhere = f"; it stands in {' or '.join(homes[:3])}" if homes else ""
-        return InputError(f"unknown key{elsewhere}; {nearest(str(key), allowed)}", where)
+        hint = _OF_A_MOTOR if here == "top_drive" and re.search(_RATED, str(key)) else ""
+        return InputError(f"unknown key{elsewhere}; {hint}{nearest(str(key), allowed)}", where)
     if kind == "missing":
         return InputError("is missing", where)
     if kind == "value_error":

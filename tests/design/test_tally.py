@@ -171,6 +171,14 @@ def test_ways_of_writing_the_same(tmp_path, lines, same):
         ),
         ("name,length [m],OD [in],diameter [in],ID [in]\np,9,5,5,4\n", "both read as od"),
         ("name,length [m],OD [in],ID [in]\np,9,5,-\n", "no inner diameter"),
+        ("name,length [m],OD [in],ID [in]\np,-9,5,4\n", r"line 2, column 'length \[m\]'.*greater"),
+        ("name,length [m],OD [in],ID [in]\np,0,5,4\n", r"line 2, column 'length \[m\]'.*greater"),
+        ("name,OD [in],length [m],ID [in]\np,31,5,4\n", r"column 'OD \[in\]': 31 in is no outer"),
+        ("name,length [m],OD [mm],ID [mm]\np,9,5,4\n", r"column 'OD \[mm\]': 5 mm is no.*unit"),
+        (
+            "name,length [m],OD [in],weight [ppf]\nDC,9,6.5,300\n",
+            r"line 2, column 'weight \[ppf\]': 300 ppf is more than a solid bar",
+        ),
         (
             "name,length [m],OD [in],ID [in]\nbit,0.3,8.5,0\np,9,5,4\n",
             "first line.*begin at the top",
@@ -461,3 +469,15 @@ def test_a_missing_tally_is_called_by_its_option(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     assert run(["new", "mine", "--tally", "no.csv", "--from", "top"]) == 2
     assert "--tally: no.csv: cannot be read" in capfd.readouterr().err
+
+
+def test_lengths_of_a_part_are_no_component(tmp_path):
+    text = (
+        "Description,Stands,Jts per stand,Footage (ft),OD (in),ID (in),Weight (ppf)\n"
+        "DP,100,3,93,5.0,4.276,195\nDC,2,,90,6.5,2.25,\nBit,1,,1,8.5,,\n"
+        "BHA length,,,181,,,\nTotal string,,,9481,,,\n"
+    )
+    made = read(text, "top", tmp_path)
+    assert [one["name"] for one in made.sections] == ["DP", "DC", "Bit"]
+    assert any("BHA length" in note and "a sum" in note for note in made.notes)
+    assert any("195 ppf is 11 times what steel of its diameters weighs" in n for n in made.notes)

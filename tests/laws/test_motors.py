@@ -175,3 +175,20 @@ def test_an_ideal_drive_is_at_no_limit():
     assert (run.time_at_torque_limit, run.time_over_continuous) == (0.0, 0.0)
     assert run.peak_drive_power is None
     assert math.isfinite(run.peak_top_torque)
+
+
+def test_show_prints_a_drive_behind_a_gear_at_the_pipe(capsys):
+    from drillctl.cli.app import run
+
+    sets = [f"top_drive.{key.partition('.')[2]}={value}" for key, value in GEAR.items()]
+    sets += ["top_drive.limits_at=motor", "top_drive.continuous_torque=5 kNm"]
+    words = [word for one in sets for word in ("--set", one)]
+    assert run(["show", "monteiro-trindade-120kn", *words]) == 0
+    said = capsys.readouterr().out
+    assert "# Drive at the pipe: inertia 2122.32 kg m², continuous torque 36 kN m" in said
+
+
+@pytest.mark.parametrize("key", ["power", "rated_speed", "max_rpm"])
+def test_a_name_plate_is_told_where_it_goes(key):
+    with pytest.raises(InputError, match=f"{key}: unknown key.*points of torque_speed.*3.32 kN"):
+        rig(**{f"top_drive.{key}": "400 kW"})
