@@ -219,6 +219,9 @@ _BODY = re.compile(r"^\[bha\]\ninertia = .*\n", flags=re.M)
 _DAMPING = re.compile("^# Typical internal damping.*?^stiffness_damping.*?\n", flags=re.M | re.S)
 
 
+TYPICAL_BIT = 0.2159  # diameter (m) that the weight of the starter is typical of
+
+
 def _of_tally(text: str, tally: Tally) -> str:
     """A new file with the bit and the units of its tally."""
 
@@ -234,6 +237,9 @@ def _of_tally(text: str, tally: Tally) -> str:
     if size is not None:
         across = f"{size / 0.0254:.6g} in" if tally.in_feet else units.write(size, units.DIAMETER)
         put("bit_diameter", across, "of the tally")
+        share = size / TYPICAL_BIT
+        weight = f"{27 * share:.0f} klbf" if tally.in_feet else f"{5 * round(24 * share)} kN"
+        put("weight_on_bit", weight, f"typical for a bit of {across}")
     if kind is not None:
         put("bit_type", kind, 'of the tally; "pdc", "hybrid" or "roller-cone"')
     return text

@@ -456,6 +456,7 @@ def test_a_new_file_has_the_units_and_the_bit_of_its_tally(tmp_path, monkeypatch
     assert tables.units == "field"
     assert tables.bit_rock.bit_diameter == pytest.approx(12.25 * INCH)
     assert tables.bit_rock.bit_type == "roller-cone"
+    assert 'weight_on_bit = "39 klbf"' in (tmp_path / "mine.toml").read_text(encoding="utf-8")
     # 5 in 19.5 lb/ft of the lowest grade weighs some 20.85 lb/ft with its tool joints
     said = capsys.readouterr().out
     assert "9301 ft in all, " in said

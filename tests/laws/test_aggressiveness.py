@@ -73,3 +73,12 @@ def test_a_design_with_measured_numbers_does_not():
 def test_without_type_and_number_both_are_named():
     with pytest.raises(InputError, match='missing: give it, or bit_type = "pdc"'):
         drillctl.load(PAPER, bit_rock={"law": "bit-aggressiveness", "bit_diameter": "8 1/2 in"})
+
+
+def test_types_are_read_in_capitals_and_a_wrong_one_is_the_only_error():
+    assert of(bit_type="PDC", rock="Hard").bit_rock == of(rock="hard").bit_rock
+    assert of(bit_type="Roller cone").tables.bit_rock.bit_type == "roller-cone"
+    for more in ({"rock": "granite"}, {"bit_type": "tricone"}, {"rock": ["hard"]}):
+        with pytest.raises(InputError) as caught:
+            of(**more)
+        assert "is missing" not in str(caught.value)

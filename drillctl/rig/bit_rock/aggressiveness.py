@@ -103,14 +103,16 @@ class BitAggressivenessTable(RockTable):
     @model_validator(mode="before")
     @classmethod
     def _typical_of_its_type(cls, data: Any) -> Any:
-        if not isinstance(data, dict) or data.get("aggressiveness") is not None:
+        if not isinstance(data, dict):
             return data
-        bit, rock = data.get("bit_type"), data.get("rock", "medium")
-        if not (isinstance(bit, str) and isinstance(rock, str)):
+        words = {key: data[key] for key in ("bit_type", "rock") if isinstance(data.get(key), str)}
+        data = {**data, **{key: "-".join(word.lower().split()) for key, word in words.items()}}
+        if data.get("aggressiveness") is not None or "bit_type" not in words:
             return data
-        if bit not in SLIDING or rock not in STRENGTH:
-            return data
-        return {**data, "aggressiveness": typical(bit, rock).aggressiveness}
+        bit, rock = data["bit_type"], data.get("rock", "medium")
+        # What is wrong with them is the one error.
+        known = bit in SLIDING and isinstance(rock, str) and rock in STRENGTH
+        return {**data, "aggressiveness": typical(bit, rock).aggressiveness if known else 1.0}
 
     @model_validator(mode="before")
     @classmethod
