@@ -394,6 +394,13 @@ def test_the_lock_lies_in_a_folder_that_nothing_can_lie_beside(design, tmp_path,
     (tmp_path / "above").chmod(0o700)
 
 
+def test_a_place_without_files_is_not_called_in_use(design):
+    if not Path("/proc/self").is_dir():
+        pytest.skip("needs a file system that takes no files")
+    with pytest.raises(InputError, match="takes no lock: nothing can be written there"):
+        claim("map", design, "/proc/self/run")
+
+
 def test_a_finished_run_is_shown_where_nothing_can_be_written(
     finished, design, tmp_path, permissions_count
 ):

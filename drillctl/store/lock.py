@@ -34,6 +34,10 @@ class FolderLock:
         try:
             self._lock.acquire()
         except Timeout:
+            if not path.exists():
+                raise InputError(
+                    "takes no lock: nothing can be written there, or it was in use until now", where
+                ) from None
             raise InputError(
                 f"is in use by {self._holder()}; wait for it, or give another folder", where
             ) from None
