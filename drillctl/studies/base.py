@@ -156,8 +156,8 @@ class Section:
     title: str
     reads: tuple[str, ...]  # recipes
     order: int  # place among the sections
-    # tables and pictures in their order; by default remarks, checks, pictures and tables of all
-    # recipes, except for what another section of the study shows
+    # tables, pictures and `remarks` of the first in their order; by default remarks, checks,
+    # pictures and tables of all recipes, except for what another section of the study shows
     shows: tuple[str, ...] = ()
     # why none of `shows` is there
     absent: Callable[[Design], str] = lambda design: "nothing of it was computed"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 import warnings
+from dataclasses import replace
 
 import control
 import numpy as np
@@ -306,6 +307,12 @@ def test_a_delay_margin_that_the_mesh_decides_is_said_to_be_mesh_limited(element
     (row,) = [row for row in margin_rows(found) if "delay" in row[0]]
     assert row[3:] == ["mesh-limited", "none"]
     assert any("marked mesh-limited" in one for one in STUDY.remarks(found, "si"))
+
+
+@pytest.mark.parametrize(("exact", "rows"), [(None, 0), (90.0, 1)])
+def test_a_slope_margin_that_the_exact_string_has_not_stands_nowhere(exact, rows):
+    found = replace(loop(paper()), mesh_limited={"slope_margin": exact})
+    assert sum("continuous string" in row[0] for row in margin_rows(found)) == rows
 
 
 @pytest.mark.parametrize("elements", [15, 30, 60])

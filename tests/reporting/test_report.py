@@ -321,3 +321,17 @@ def test_indices_are_for_the_longer_profiles(tmp_path):
     assert made.problems == ()
     few = drillctl.report(design, tmp_path / "s", replace(TINY, points=3), sections=["sensitivity"])
     assert "--profile standard" in few.content["left_out"]["Sensitivity"]
+
+
+def test_the_loop_of_a_cutting_bit_shows_no_gains_that_another_rock_would_allow(tmp_path):
+    """Its roots decide: slope margin and stable gains are of a torque that does not fall."""
+    made = drillctl.report(
+        drillctl.load("richard-detournay-2dof"), tmp_path / "made", sections=["loop"],
+        formats=["md"],
+    )  # fmt: skip
+    told = made.files["md"].read_text(encoding="utf-8")
+    assert "Stability is that of the roots of the cutting bit" in told
+    assert "cutting-roots" in {path.stem.removeprefix("loop-") for path in
+                               (made.folder / "tables").iterdir()}  # fmt: skip
+    for name in ("boundary", "root-locus", "slope-margin"):
+        assert f"figures/{name}.png" not in told

@@ -50,6 +50,7 @@ def _generic(section: Section, others: set[str]) -> Callable[[Gathered], tuple[B
         gathered.need(section.reads[0])
         shown = [gathered.shown(name) for name in section.reads]
         parts = [part for one in shown for part in one.parts]
+        parts += [("remarks", remark, True) for remark in shown[0].remarks]
         blocks: list[Block] = []
         if section.shows:
             blocks += [part for want in section.shows for name, part, _ in parts if name == want]
@@ -59,7 +60,8 @@ def _generic(section: Section, others: set[str]) -> Callable[[Gathered], tuple[B
             blocks += [remark for one in shown for remark in one.remarks]
             if checks := tuple(check for one in shown for check in one.checks):
                 blocks.append(Checks("checks", "Checks", checks))
-            blocks += [part for name, part, usual in parts if usual and name not in others]
+            blocks += [part for one in shown for name, part, usual in one.parts
+                       if usual and name not in others]  # fmt: skip
         blocks += [Text(section.text)] if section.text else []
         return tuple(interactive(gathered, one) for one in blocks)
 

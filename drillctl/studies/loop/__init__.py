@@ -98,7 +98,8 @@ def _margins(result: LoopAnalysis) -> list[list[Any]]:
         ("slope margin D*", result.slope_margin, SLOPE, "slope_margin"),
         ("deciding frequency", result.deciding_frequency_hz, "Hz", ""),
     ]
-    if result.continuum_slope_margin is not None:
+    settles = result.mesh_limited.get("slope_margin", 0.0) is not None  # over modes of the string
+    if result.continuum_slope_margin is not None and settles:
         rows.append(("slope margin of the continuous string", result.continuum_slope_margin, SLOPE,
                      ""))  # fmt: skip
     margins = result.margins
@@ -109,7 +110,7 @@ def _margins(result: LoopAnalysis) -> list[list[Any]]:
             ("largest sensitivity", margins.peak_sensitivity, "1", "peak_sensitivity"),
             ("frequency of the largest sensitivity", margins.peak_sensitivity_hz, "Hz", ""),
             ("delay at the top torque that is tolerated", margins.delay, "s", "delay_margin"),
-            ("frequency that decides this delay", margins.delay_hz, "Hz", ""),
+            ("its deciding frequency", margins.delay_hz, "Hz", ""),
         ]
     if result.weight_delay_margin is not None:
         rows.append(("further delay of the moving weight that is tolerated",
@@ -216,7 +217,7 @@ STUDY = Study(
         ),
         Section(
             "loop", "The linear loop", ("loop", "slope-margin"), order=40,
-            shows=("margins", "closed-loop-modes", "mobility", "closed-loop", "nyquist",
+            shows=("margins", "remarks", "closed-loop-modes", "mobility", "closed-loop", "nyquist",
                    "nichols", "sensitivity", "boundary", "root-locus", "impedance",
                    "slope-margin", "cutting-roots"),
         ),

@@ -100,7 +100,8 @@ def loop_pictures(result: LoopAnalysis) -> Iterator[Picture]:
     if any(design.linear_drive.gains()):
         if bit.path is None or bit.path.observer is None:
             yield from _of_loop(result)
-        if design.simple_drive and bit.path is None:
+        # Gains at which a bit that cuts its own wake is stable are not those of its steady torque.
+        if design.simple_drive and bit.path is None and result.cutting is None:
             yield from _over_gains(design, bit.slope)
     if design.string.parts.sections[0].inertia > 0.0:
         yield Picture(

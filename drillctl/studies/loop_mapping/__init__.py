@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from drillctl import plots, units
 from drillctl.store.tables import Column, Table
-from drillctl.studies.base import Option, Picture, Recipe, Run, Study, over_two_axes
+from drillctl.studies.base import Option, Picture, Recipe, Requested, Run, Study, over_two_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,6 +76,13 @@ def slope_margin(result: LoopMap, system: units.System) -> Figure:
     return plots.loop_map(result, boundary=boundary, system=system)
 
 
+def not_applicable(request: Requested) -> str:
+    """Why a report has no map of the slope margin."""
+    if request.design.axial is not None:
+        return "its torque does not fall, the roots of the cutting bit decide"
+    return over_two_axes(request)
+
+
 STUDY = Study(
     module=__name__,
     name="loop-map",
@@ -85,7 +92,7 @@ STUDY = Study(
     axes=True,
     command=False,
     recipes=(
-        Recipe("slope-margin", "the slope margin over the map", over_two_axes,
+        Recipe("slope-margin", "the slope margin over the map", not_applicable,
                options={"quantities": ("slope_margin",)}, order=80),
     ),
 )  # fmt: skip

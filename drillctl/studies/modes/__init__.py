@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -80,11 +81,15 @@ def pictures(result: Modes) -> Iterator[Picture]:
         ),
     )  # fmt: skip
     tabled = getattr(design.tables.bit_rock, "table", None)
+    weight, rock = design.tables.operating_point.weight_on_bit, design.bit_rock
+    slow, fast = (rock.torque_and_slope(weight, x * design.speed, math.exp)[0] for x in (0.1, 1.0))
+    falls = slow > fast
     each = "each weight of the friction table" if tabled else "the weight on bit"
     yield Picture(
         "friction", f"Bit torque against bit speed, at {each}.",
-        "Curves of bit torque over bit speed: the torque is largest at rest and falls as the bit "
-        "turns faster, which is what drives stick-slip.",
+        "Curves of bit torque over bit speed"
+        + (": the torque is largest at rest and falls as the bit turns faster, which is what "
+           "drives stick-slip." if falls else "."),
         lambda system: plots.friction_curves(design, system=system),
     )  # fmt: skip
 
