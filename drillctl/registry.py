@@ -6,8 +6,11 @@ low in the house can reach what it does not know.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import ast
+import sys
+from collections.abc import Callable, Iterable
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 FRICTION_LAWS = (
@@ -67,20 +70,22 @@ def resolve(place: str) -> Any:
 
 
 def at_first_use(
-    package: str, modules: Mapping[str, tuple[str, ...]], place: str = ""
-) -> Callable[[str], Any]:
-    """The `__getattr__` of a package: each of its names is imported when it is first used.
+    package: str,
+) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+    """`__all__`, `__getattr__` and `__dir__` of a package whose names are imported at first use.
 
-    `place`: package that the modules are in, by default this one.
+    They are those that its source imports for the type checker alone, `from there import x as x`.
     """
-    home = {name: module for module, names in modules.items() for name in names}
+    tree = ast.parse(Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8"))
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    home = {one.asname: node.module for node in imports for one in node.names if one.asname}
 
     def look_up(name: str) -> Any:
         if name not in home:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return resolve(f"{place or package}.{home[name]}:{name}")
+        return resolve(f"{home[name]}:{name}")
 
-    return look_up
+    return list(home), look_up, lambda: sorted({*vars(sys.modules[package]), *home})
 
 
 def gathered(modules: Iterable[str], name: str) -> tuple[Any, ...]:

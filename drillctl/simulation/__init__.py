@@ -11,25 +11,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from drillctl.registry import resolve
+from drillctl.registry import at_first_use
 
 if TYPE_CHECKING:
     from drillctl.simulation.run import Simulation as Simulation
     from drillctl.simulation.run import simulate as simulate
 
-_HOME = {"Simulation": "run", "simulate": "run"}
-
-__all__ = [*_HOME]
-
-
-def __getattr__(name: str) -> Any:
-    # Lanes are made without the reference solver and what of SciPy it takes.
-    if name in _HOME:
-        return resolve(f"drillctl.simulation.{_HOME[name]}:{name}")
-    raise AttributeError(f"module 'drillctl.simulation' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+# Lanes are made without the reference solver and what of SciPy it takes.
+__all__, __getattr__, __dir__ = at_first_use(__name__)

@@ -29,15 +29,5 @@ if TYPE_CHECKING:
     from drillctl.store.result import Result as Result
     from drillctl.store.result import open as open
 
-_MODULES = {
-    "folder": ("RunFolder", "claim", "growing_realizations", "identity"),
-    "result": ("Result", "open"),
-}
-
-__all__ = [name for names in _MODULES.values() for name in names]
 # A list of names is written as JSON from here, and needs nothing of a design.
-__getattr__ = at_first_use(__name__, _MODULES)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__all__, __getattr__, __dir__ = at_first_use(__name__)

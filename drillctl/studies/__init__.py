@@ -30,22 +30,5 @@ if TYPE_CHECKING:
     from drillctl.studies.torque_drag.compute import TorqueDrag as TorqueDrag
     from drillctl.studies.uncertainty.result import Uncertainty as Uncertainty
 
-_MODULES = {
-    "ensemble.grid": ("Axis",),
-    "ensemble.parameters": ("Draws", "draw", "uncertain_parameters"),
-    "ensemble.sweeps": ("Region", "Sweep", "region", "responses", "stability_map", "sweep"),
-    "studies.compare.compute": ("Comparison",),
-    "studies.delay.compute": ("WeightDelay", "weight_delay"),
-    "studies.doctor.compute": ("Doctor", "doctor"),
-    "studies.loop_mapping.compute": ("LoopMap", "loop_map"),
-    "studies.torque_drag.compute": ("TorqueDrag",),
-    "studies.uncertainty.result": ("Uncertainty",),
-}
-
-__all__ = sorted(name for names in _MODULES.values() for name in names)
 # Commands import the package to list the studies: what computes comes with its first use.
-__getattr__ = at_first_use(__name__, _MODULES, "drillctl")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__all__, __getattr__, __dir__ = at_first_use(__name__)
