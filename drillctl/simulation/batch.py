@@ -24,7 +24,7 @@ from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.simulation import measures as m
 from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.propagator import StringStep, string_step
-from drillctl.simulation.scheme import Scheme, bit_inertia, choose_scheme
+from drillctl.simulation.scheme import Bound, Scheme, choose_scheme, step_bounds
 from drillctl.simulation.step_laws import (
     drive_step,
     observer_step,
@@ -66,14 +66,18 @@ class Prepared:
 def prepare(lanes: Lanes, table: SimulationTable) -> Prepared:
     """Choose step and modes and prepare the string."""
     _refuse_printed_law(lanes)
-    inertia = bit_inertia(lanes.string)
     period = lanes.drive.period if isinstance(lanes.drive, SampledDrive) else None
-    scheme = choose_scheme(
-        lanes.string, table, lanes.steepest_fall, inertia, _shared(period), _turns(lanes),
-        lanes.longest_step, lanes.wall is not None,
-    )  # fmt: skip
+    bounds, turns = bounds_of(lanes, table), _turns(lanes)
+    scheme = choose_scheme(lanes.string, table, bounds, _shared(period), turns)
     stepper = string_step(lanes.string, scheme.step, scheme.modes, lanes.wall)
     return Prepared(stepper, scheme, table.duration, table.j1_from)
+
+
+def bounds_of(lanes: Lanes, table: SimulationTable) -> tuple[Bound, ...]:
+    """What bounds the step of lanes."""
+    seen = "the rock along the way" if lanes.axial is None else "the cutting from blade to blade"
+    rock = Bound("rock", lanes.longest_step, f"{seen}, seen often enough")
+    return step_bounds(lanes.string, table, lanes.steepest_fall, rock, lanes.wall is not None)
 
 
 def _refuse_printed_law(lanes: Lanes) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,7 +106,7 @@ class Scheme:
     sampling: int = 0  # steps to a period of a sampled controller; 0 for a continuous one
 
 
-def share_of_longest(string: Drillstring, accuracy: Accuracy) -> float:
+def _share_of_longest(string: Drillstring, accuracy: Accuracy) -> float:
     """Share of the longest step in which the bit is followed as closely as an accuracy asks for.
 
     At the longest step itself each release of a light bit under pipe is off by a good part of the
@@ -114,51 +116,76 @@ def share_of_longest(string: Drillstring, accuracy: Accuracy) -> float:
     return 1.0 if lumped else accuracy.fall / STEEPEST
 
 
+class Bound(NamedTuple):
+    """A bound on the step."""
+
+    name: str  # 'accuracy', 'elastic_mode', 'friction', 'rock' or 'given'
+    step: float  # longest step that it allows (s)
+    reason: str  # in words
+
+
+def step_bounds(
+    string: Drillstring, table: SimulationTable, fall: float, rock: Bound, walled: bool
+) -> tuple[Bound, ...]:
+    """What bounds the step; a given one stands alone, and is refused where it is too long.
+
+    `fall`: steepest one of the friction (N m s/rad). `rock`: of one that is followed along the
+    way. `walled`: whether the wall rubs, node by node: fronts of slip run along the string.
+    """
+    accuracy = ACCURACIES[table.accuracy]
+    elastic = float(2.0 * math.pi / string.undamped_modes[0][1])
+    # Mobility over a step is about step / inertia: the bit has no time to move the string.
+    longest = STEEPEST * bit_inertia(string) / fall if fall > 0.0 else math.inf
+    if table.step is not None:
+        _refuse_long(table.step, elastic, longest, fall)
+        return (Bound("given", table.step, "simulation.step"),)
+    share, often = WALLED if walled else 1.0, accuracy.steps_per_period
+    wall = f", times {WALLED:g} for friction along the wall" if walled else ""
+    bounds = (
+        Bound("accuracy", share * accuracy.step, f"the longest step of '{table.accuracy}'{wall}"),
+        Bound(
+            "elastic_mode", share * (elastic / often),
+            f"{often:g} steps in a period of the first elastic mode, {elastic:.3g} s{wall}",
+        ),
+        Bound(
+            "friction", longest * _share_of_longest(string, accuracy),
+            f"the friction falls by up to {fall:.4g} N*m*s/rad: what a light bit follows",
+        ),
+        rock,
+    )  # fmt: skip
+    return tuple(bound for bound in bounds if bound.step < math.inf)
+
+
+def _refuse_long(step: float, elastic: float, longest: float, fall: float) -> None:
+    """Refuse a given step (s) that friction or string do not allow."""
+    for what, allowed in (
+        (f"friction law: its torque falls by {fall:.4g} N m s/rad", longest),
+        (f"string: its first elastic mode has a period of {elastic:.3g} s", elastic / FEWEST_STEPS),
+    ):
+        if step > allowed:
+            raise InputError(
+                f"{step:g} s is too long for this {what}, which allows {allowed:.3g} s at most",
+                "simulation.step",
+            )
+
+
 def choose_scheme(
     string: Drillstring,
     table: SimulationTable,
-    steepest_fall: float,
-    bit_inertia: float,
+    bounds: Iterable[Bound],
     period: float | None = None,
     turns: Array = NO_TURNS,
-    seen: float = math.inf,
-    walled: bool = False,
 ) -> Scheme:
-    """Step and modes from the accuracy asked for, unless they are given.
-
-    `seen`: longest step (s) that follows a rock along the way. `walled`: whether the wall rubs,
-    node by node: fronts of slip run along the string.
-    """
-    accuracy = ACCURACIES[table.accuracy]
+    """Step and modes from the accuracy asked for, unless they are given."""
     frequency, _ = string.undamped_modes
-    # Mobility over a step is about step / inertia: the bit has no time to move the string.
-    longest = STEEPEST * bit_inertia / steepest_fall if steepest_fall > 0.0 else math.inf
-    elastic = 2.0 * math.pi / frequency[1]
-    if table.step is None:
-        share = WALLED if walled else 1.0
-        usual = share * min(accuracy.step, elastic / accuracy.steps_per_period)
-        step = min(usual, longest * share_of_longest(string, accuracy), seen)
-    elif table.step > longest:
-        raise InputError(
-            f"{table.step:g} s is too long for this friction law: its torque falls by "
-            f"{steepest_fall:.4g} N m s/rad, which allows {longest:.3g} s at most",
-            "simulation.step",
-        )
-    elif table.step > elastic / FEWEST_STEPS:
-        raise InputError(
-            f"{table.step:g} s is too long for this string: its first elastic mode has a period "
-            f"of {elastic:.3g} s, which allows {elastic / FEWEST_STEPS:.3g} s at most",
-            "simulation.step",
-        )
-    else:
-        step = table.step
+    step = min(bound.step for bound in bounds)
     if table.duration / min(step, period or step) > MOST_STEPS:
         _refuse_steps(table, step, period)
     steps, sampling = _whole_steps(table.duration, step, period, turns)
     step = table.duration / steps
     modes = table.modes
     if modes is None:
-        modes = int((frequency * step <= accuracy.phase).sum())
+        modes = int((frequency * step <= ACCURACIES[table.accuracy].phase).sum())
     return Scheme(step, steps, min(max(modes, 2), string.nodes), sampling)
 
 
@@ -182,15 +209,20 @@ def _time(seconds: float) -> str:
     return f"{seconds * factor:.3g} {unit}"
 
 
+def plain_steps(duration: float, step: float) -> int:
+    """Number of steps in a run that nothing but its length bounds further."""
+    return max(1, math.ceil(duration / step * (1.0 - 1e-12)))
+
+
 def _whole_steps(
     duration: float, step: float, period: float | None, turns: Array
 ) -> tuple[int, int]:
     """Number of steps in a run, and in a period of the controller."""
     if period is not None:
         periods = max(1, round(duration / period))
-        sampling = max(1, math.ceil(period / step * (1.0 - 1e-12)))
+        sampling = plain_steps(period, step)
         return periods * sampling, sampling
-    steps = max(1, math.ceil(duration / step * (1.0 - 1e-12)))
+    steps = plain_steps(duration, step)
     if len(turns) == 0:
         return steps, 0
     numbers = np.arange(steps, steps + steps // 4 + 1)

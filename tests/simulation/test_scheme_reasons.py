@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import drillctl
 from benchmarks.cost import count
 from drillctl import catalog
-from drillctl.simulation.batch import Prepared, prepare
+from drillctl.simulation.batch import prepare
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.propagator import string_step
-from drillctl.studies.doctor import compute as scheme_reasons
 from drillctl.studies.doctor.compute import explain
 
 PAPER = "monteiro-trindade-140kn"
@@ -74,19 +71,6 @@ def test_what_decides(values, decided_by, modes_by):
 def test_the_string_is_told_by_its_form():
     assert reasons(PAPER)["string"] == "undamped"
     assert reasons(PAPER, **{"drillstring.modal_damping": 0.02})["string"] == "blocks"
-
-
-def test_another_scheme_than_the_reasons_give_is_an_error(monkeypatch):
-    design = drillctl.load(PAPER)
-    lanes, table = single_lane(design), design.tables.simulation
-    made = prepare(lanes, table)
-    wrong = Prepared(made.stepper, replace(made.scheme, modes=7), made.duration, made.j1_from)
-    with pytest.raises(RuntimeError, match="13 modes"):
-        explain(lanes, table, wrong)
-    shorter = replace(scheme_reasons.ACCURACIES["standard"], fall=1e-3)
-    monkeypatch.setitem(scheme_reasons.ACCURACIES, "standard", shorter)
-    with pytest.raises(RuntimeError, match="chosen was"):
-        explain(lanes, table, made)
 
 
 class Counted:

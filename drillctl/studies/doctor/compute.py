@@ -1,10 +1,8 @@
 """How a design is examined: what the batch engine does with it, why, how well and how fast.
 
-`choose_scheme` chooses step and modes. Here each of its bounds is computed once more and named,
-from the same constants and helpers, and the outcome is compared with what was chosen. A seeded
-sample of the cells of the design's map is simulated at that scheme and at finer ones, which gives
-an estimate of each lane's error from the engine alone; some of the lanes are simulated again with
-the reference solver.
+A seeded sample of the cells of the design's map is simulated at its scheme and at finer ones, which
+gives an estimate of each lane's error from the engine alone; some of the lanes are simulated again
+with the reference solver.
 """
 
 from __future__ import annotations
@@ -39,8 +37,7 @@ from drillctl.progress import SILENT, Progress
 from drillctl.provenance import provenance
 from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.rig.drillstring import Drillstring
-from drillctl.rig.top_drive import SampledDrive
-from drillctl.simulation.batch import Prepared, _shared, _turns, prepare
+from drillctl.simulation.batch import Prepared, bounds_of, prepare
 from drillctl.simulation.kernels.string_step import (
     BlockString,
     DriftString,
@@ -54,12 +51,9 @@ from drillctl.simulation.scheme import (
     PROMISES,
     ROUNDING,
     SMALLEST,
-    STEEPEST,
-    WALLED,
+    Bound,
     Scheme,
-    _whole_steps,
-    bit_inertia,
-    share_of_longest,
+    plain_steps,
 )
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
@@ -74,49 +68,25 @@ FORMS = {
 """Forms of the string, in words."""
 
 
-class Bound(NamedTuple):
-    """A bound on the step."""
-
-    name: str  # 'accuracy', 'elastic_mode', 'friction', 'rock' or 'given'
-    step: float  # longest step that it allows (s)
-    reason: str  # in words
-
-
 def explain(lanes: Lanes, table: SimulationTable, prepared: Prepared) -> dict[str, Any]:
     """A scheme and why it was chosen, as strict JSON values; SI units."""
     scheme, string = prepared.scheme, lanes.string
-    bounds = _bounds(string, table, lanes.steepest_fall, 1.0 if lanes.wall is None else WALLED)
-    if table.step is None and lanes.longest_step < math.inf:
-        seen = (
-            "the rock along the way" if lanes.axial is None else "the cutting from blade to blade"
-        )
-        bounds = (*bounds, Bound("rock", lanes.longest_step, f"{seen}, seen often enough"))
-    asked = min(bound.step for bound in bounds)
-    period = _shared(lanes.drive.period) if isinstance(lanes.drive, SampledDrive) else None
-    steps, sampling = _whole_steps(table.duration, asked, period, _turns(lanes))
-    modes, modes_by = _modes(string, table, scheme.step)
-    if (steps, sampling, modes) != (scheme.steps, scheme.sampling, scheme.modes):
-        raise RuntimeError(
-            f"reasons for {steps} steps, {sampling} to a sample, {modes} modes; chosen was {scheme}"
-        )
-    highest = float(string.undamped_modes[0][modes - 1])
+    bounds = bounds_of(lanes, table)
+    highest = float(string.undamped_modes[0][scheme.modes - 1])
     return {
         "accuracy": table.accuracy,
-        "step": scheme.step,
-        "steps": scheme.steps,
-        "modes": scheme.modes,
-        "sampling": scheme.sampling,
+        **picked(scheme, "step", "steps", "modes", "sampling"),
         # A bound, or 'sampling' or 'program' where the step is shorter for whole steps to a period
         # of the controller, or to what changes by the clock.
-        "decided_by": _decided(bounds, asked, table.duration, scheme),
+        "decided_by": _decided(bounds, table.duration, scheme),
         "bounds": {bound.name: bound.step for bound in bounds},  # a given step stands alone
         "reasons": {bound.name: bound.reason for bound in bounds},
         # Modes that turn little enough in a step, all of the string, two, or as given.
-        "modes_by": modes_by,
+        "modes_by": _modes_by(string, table, scheme),
         "highest_frequency_hz": highest / (2.0 * math.pi),
         "turn": highest * scheme.step,  # of that mode in a step (rad)
         # Modes that are not carried; their static share of the pipe torque is.
-        "modes_left_out": string.nodes - modes,
+        "modes_left_out": string.nodes - scheme.modes,
         "string": form_of(prepared.stepper.string),
     }
 
@@ -130,48 +100,22 @@ def form_of(string: Any) -> str:
     return "blocks" if isinstance(string, BlockString) else "dense"
 
 
-def _bounds(
-    string: Drillstring, table: SimulationTable, fall: float, share: float
-) -> tuple[Bound, ...]:
-    """What bounds the step; `share` of the usual ones is left where the wall rubs."""
-    if table.step is not None:
-        return (Bound("given", table.step, "simulation.step"),)
-    accuracy = ACCURACIES[table.accuracy]
-    elastic = float(2.0 * math.pi / string.undamped_modes[0][1])
-    wall = "" if share == 1.0 else f", times {share:g} for friction along the wall"
-    bounds = [
-        Bound("accuracy", share * accuracy.step, f"the longest step of '{table.accuracy}'{wall}"),
-        Bound(
-            "elastic_mode",
-            share * elastic / accuracy.steps_per_period,
-            f"{accuracy.steps_per_period:g} steps in a period of the first elastic mode, "
-            f"{elastic:.3g} s{wall}",
-        ),
-    ]
-    if fall > 0.0:
-        reason = f"the friction falls by up to {fall:.4g} N*m*s/rad: what a light bit follows"
-        allowed = STEEPEST * share_of_longest(string, accuracy)
-        bounds.append(Bound("friction", allowed * bit_inertia(string) / fall, reason))
-    return tuple(bounds)
-
-
-def _decided(bounds: tuple[Bound, ...], asked: float, duration: float, scheme: Scheme) -> str:
-    plain = max(1, math.ceil(duration / asked * (1.0 - 1e-12)))
-    if scheme.sampling and scheme.step < asked * (1.0 - SHORTENED):
+def _decided(bounds: tuple[Bound, ...], duration: float, scheme: Scheme) -> str:
+    least = min(bounds, key=lambda bound: bound.step)
+    if scheme.sampling and scheme.step < least.step * (1.0 - SHORTENED):
         return "sampling"
-    if not scheme.sampling and scheme.steps > plain:
+    if not scheme.sampling and scheme.steps > plain_steps(duration, least.step):
         return "program"
-    return min(bounds, key=lambda bound: bound.step).name
+    return least.name
 
 
-def _modes(string: Drillstring, table: SimulationTable, step: float) -> tuple[int, str]:
+def _modes_by(string: Drillstring, table: SimulationTable, scheme: Scheme) -> str:
     if table.modes is not None:
-        return min(max(table.modes, 2), string.nodes), "given"
-    frequency, _ = string.undamped_modes
-    turning = int((frequency * step <= ACCURACIES[table.accuracy].phase).sum())
-    if turning < 2:
-        return min(2, string.nodes), "fewest"
-    return turning, "all" if turning == string.nodes else "turn"
+        return "given"
+    highest = string.undamped_modes[0][scheme.modes - 1]
+    if highest * scheme.step > ACCURACIES[table.accuracy].phase:
+        return "fewest"
+    return "all" if scheme.modes == string.nodes else "turn"
 
 
 REFINEMENTS = (1, 2, 4)  # parts into which the step of the scheme is divided
