@@ -31,3 +31,9 @@ def aligned(*shape: int) -> Array:
 def finite(value: float | None) -> float | None:
     """A number as strict JSON has it: none where it is not finite."""
     return None if value is None or not np.isfinite(value) else float(value)
+
+
+def runs(where: Mask) -> Index:
+    """First place of each run of true values and the one past its last, shape (runs, 2)."""
+    edges = np.diff(np.concatenate(([0], np.asarray(where, np.int8), [0])))
+    return np.flatnonzero(edges).reshape(-1, 2)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
-from drillctl.arrays import Array
+from drillctl.arrays import Array, runs
 from drillctl.errors import InputError
 from drillctl.logs.fit import Fit, Problem, Window, driven, fit, residual
 from drillctl.logs.laws import LEAST_DECAY, MOST_DECAY, Family
@@ -88,16 +88,12 @@ def runs_of(log: Log, least: float) -> list[slice]:
     good = log.usable & np.isfinite(torque) & np.isfinite(speed)
     # A soft drive is stopped by the bit for a moment; what lasts is no drilling.
     still = np.abs(speed) < STILL
-    moments = np.flatnonzero(np.diff(np.concatenate(([0], still.view(np.int8), [0])))).reshape(
-        -1, 2
-    )
-    for first, last in moments[(moments[:, 1] - moments[:, 0]) * log.spacing > MOMENT]:
+    moments = runs(still)
+    for first, last in moments[np.ptp(moments, axis=1) * log.spacing > MOMENT]:
         good[first:last] = False
     results = []
     for stretch in log.stretches:
-        inside = good[stretch]
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], inside.view(np.int8), [0]))))
-        for a, b in edges.reshape(-1, 2):
+        for a, b in runs(good[stretch]):
             rows = slice(stretch.start + int(a), stretch.start + int(b))
             if (b - a) * log.spacing > least and (
                 np.mean(log.signals["top_speed"][rows]) > LEAST_SPEED

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from drillctl.arrays import Array, Index
+from drillctl.arrays import Array, Index, runs
 from drillctl.errors import InputError
 from drillctl.logs.files import ABSENT, Source, open_source
 from drillctl.logs.quantities import NEEDED, QUANTITIES, Chosen, choose
@@ -298,9 +298,7 @@ def _mend(
 
 def _places(where: Any, time: Array) -> tuple[tuple[float, float], ...]:
     """Begin and end (s) of the first runs of rows."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], where.view(np.int8), [0]))))
-    pairs = edges.reshape(-1, 2)[:MOST_LISTED]
-    return tuple((float(time[a]), float(time[b - 1])) for a, b in pairs)
+    return tuple((float(time[a]), float(time[b - 1])) for a, b in runs(where)[:MOST_LISTED])
 
 
 def _spikes(values: Any) -> Index:
@@ -329,9 +327,9 @@ def _spikes(values: Any) -> Index:
 def _constant(values: Any, time: Array, turning: Any, least: float, spacing: float) -> Any:
     """Rows of runs of one and the same value, longer than `least` (s), while the string turns."""
     same = np.concatenate(([False], (np.diff(values) == 0.0) & turning[1:]))
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], same.view(np.int8), [0])))).reshape(-1, 2)
+    spells = runs(same)
     result = np.zeros(len(values), bool)
-    for a, b in edges[(edges[:, 1] - edges[:, 0]) * spacing > least]:
+    for a, b in spells[np.ptp(spells, axis=1) * spacing > least]:
         result[a:b] = True
     return result
 
@@ -343,8 +341,8 @@ def _clipped(values: Any, turning: Any) -> float | None:
         return None
     top = inside.max()
     at = inside == top
-    runs = at[1:] & at[:-1]
+    again = at[1:] & at[:-1]
     levels = len(np.unique(inside[:: max(1, len(inside) // 20_000)]))
-    if levels < 50 or at.mean() < CLIPPED or runs.sum() < 0.5 * at.sum():
+    if levels < 50 or at.mean() < CLIPPED or again.sum() < 0.5 * at.sum():
         return None
     return float(top)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drillctl.arrays import Array, Mask
+from drillctl.arrays import Array, Mask, runs
 from drillctl.logs.identification import runs_of
 from drillctl.logs.record import Log
 from drillctl.logs.waves import at_the_bit, below, swing, track
@@ -66,9 +66,7 @@ def _by_waves(log: Log, line: Parts) -> Iterator[Spans]:
 
 
 def _spans(where: Mask, time: Array) -> Spans:
-    edges = np.diff(np.concatenate(([0], where.view(np.int8), [0])))
-    begin, end = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1
-    return np.column_stack((time[begin], time[end]))
+    return time[runs(where) - (0, 1)]
 
 
 def share(spans: Spans, begin: float, end: float) -> float:

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 UNBEATEN = "unbeaten in both"  # legend of the cases that no other beats
 NO_DRAWS = "Each case at its own values, without draws."
-LEVEL_COLOUR = "#888888"
-"""Of the levels of J1: in the background, yet legible."""
 OUTLINES = (3.2, 1.7)
 """Outline of the first and the last case (points): under a later one an equal one is seen."""
 TRACES = (2.0, 1.1)  # line of the first and the last case, likewise
@@ -55,19 +53,19 @@ def j1_distributions(result: Comparison, ax: Axes | None = None) -> Figure:
             where="post", label=label, **style.look(number),
         )  # fmt: skip
     for level in result.levels:
-        ax.axvline(level, color=LEVEL_COLOUR, linewidth=0.8, linestyle=":")
+        ax.axvline(level, color=style.GREY, linewidth=0.8, linestyle=":")
         ax.text(
-            level, 1.015, f"{level:g}", color=LEVEL_COLOUR, fontsize=style.SMALL, ha="center",
+            level, 1.015, f"{level:g}", color=style.GREY, fontsize=style.SMALL, ha="center",
             transform=ax.get_xaxis_transform(),
         )  # fmt: skip
     ax.set_ylim(0.0, 1.0)
     ax.set_xlim(left=0.0)
     style.dress(ax, "J1 (s)", "share of draws at or under")
     title = style.heading(result, "Distribution of J1 over the draws")
-    ax.set_title(title, fontsize=style.TITLE, loc="left", pad=18.0)
+    style.title(ax, title, pad=18.0)
     _legend_below(ax, len(result.cases))
     text = _caption(result, _draws(result), "Grey: levels of J1 (s).")
-    figure.supxlabel(text, fontsize=style.SMALL)
+    style.note(figure, text)
     return figure
 
 
@@ -101,7 +99,7 @@ def paired_differences(result: Comparison, ax: Axes | None = None) -> Figure:
     _legend_below(ax, len(others))
     lost = f"Zero or undefined in a case: {', '.join(left_out)}." if left_out else ""
     text = "Mean of the differences draw by draw; bars: 95 % bootstrap intervals of that mean."
-    figure.supxlabel(_caption(result, _draws(result), text, lost), fontsize=style.SMALL)
+    style.note(figure, _caption(result, _draws(result), text, lost))
     return figure
 
 
@@ -151,7 +149,7 @@ def j1_against_weight(
     which = "the draws" if count == result.realizations else f"the {count} draws defined in all"
     text = f"Large: means over {which} with their 95 % intervals; small: the draws."
     best = "Ringed: no other case has less J1 and more weight on the mean." if rings else ""
-    figure.supxlabel(_caption(result, _draws(result), text, best), fontsize=style.SMALL)
+    style.note(figure, _caption(result, _draws(result), text, best))
     return figure
 
 
@@ -190,7 +188,7 @@ def compared_regions(
     title = style.heading(result, f"Region of J1 at or under {level:g} s, by case")
     style.dress(ax, x_label, y_label, title)
     _legend_below(ax, 2)
-    figure.supxlabel(_caption(result, NO_DRAWS), fontsize=style.SMALL)
+    style.note(figure, _caption(result, NO_DRAWS))
     return figure
 
 
@@ -220,9 +218,9 @@ def compared_responses(
         panel.set_xlim(0.0, float(result.baseline.nominal.response.time[-1]))
         style.dress(panel, "time (s)" if panel is panels[-1] else "", f"{words} ({unit})")
     title = style.heading(result, "Speed, weight on bit and top torque, by case")
-    panels[0].set_title(title, fontsize=style.TITLE, loc="left")
+    style.title(panels[0], title)
     style.legend_under(panels[-1], 2, drop=0.22)
-    figure.supxlabel(_caption(result, NO_DRAWS), fontsize=style.SMALL)
+    style.note(figure, _caption(result, NO_DRAWS))
     return figure
 
 

@@ -67,14 +67,14 @@ def weight_delay(
     style.legend_under(left, 2, drop=0.13)
     if ax is None:
         title = style.heading(result, "Weight on bit that follows the bit speed, against its delay")
-        figure.suptitle(title, fontsize=style.TITLE, x=0.01, ha="left")
+        style.headline(figure, title)
         text = (
             f"{result.realizations} draws of {', '.join(result.drawn)}, the same everywhere (seed "
             f"{result.seed}). Bands and bars: 95 % intervals of the mean (bootstrap) and of the "
             "probability (Clopper-Pearson). Crosses: from here on the mean of J1 is not less than "
             "with a constant weight. Black: constant weight."
         )
-        figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
+        style.note(figure, style.caption(result, text))
     return figure
 
 
@@ -165,9 +165,9 @@ def advantage_front(
     title = style.heading(result, f"Robust J1 against mean weight on bit, at {speed:g} {rpm}")
     across = f"mean weight on bit after the start ({unit})"
     style.dress(axes, across, f"{result.objective} (s)", title)
-    axes.legend(fontsize=style.SMALL, frameon=False)
+    style.legend(axes)
     if ax is None:
-        figure.supxlabel(_draws(result), fontsize=style.SMALL)
+        style.note(figure, _draws(result))
     return figure
 
 
@@ -210,9 +210,9 @@ def advantage_map(
         style.colour_bar(figure, mesh, panels, f"advantage in the {result.objective} (s)")
     if ax is None:
         title = style.heading(result, "J1 saved by a weight that follows the bit speed")
-        figure.suptitle(title, fontsize=style.TITLE, x=0.01, ha="left")
+        style.headline(figure, title)
         more = "Positive: the weight that follows is better. ×: the 95 % interval holds zero."
-        figure.supxlabel(_draws(result, more), fontsize=style.SMALL)
+        style.note(figure, _draws(result, more))
     return figure
 
 
@@ -248,7 +248,7 @@ def advantage_delay(result: Advantage, ax: Axes | None = None) -> Figure:
             f"Constant weight: {study.constant:.1f} s. Hoist lag and limits are the same at every "
             "delay. Harm goes on below the picture."
         )
-        figure.supxlabel(_draws(result, more), fontsize=style.SMALL)
+        style.note(figure, _draws(result, more))
     return figure
 
 
@@ -282,7 +282,7 @@ def advantage_cases(result: Advantage, ax: Axes | None = None) -> Figure:
     )
     if ax is None:
         more = f"Bars: 5 to 95 % of the draws; line: median; diamond: {result.objective}."
-        figure.supxlabel(_draws(result, more), fontsize=style.SMALL)
+        style.note(figure, _draws(result, more))
     return figure
 
 

@@ -55,7 +55,7 @@ def log_overview(
     panels[-1].set_xlabel(
         f"time ({unit}){still if len(result.sticking) else ''}", fontsize=style.LABEL
     )
-    panels[0].set_title(", ".join(result.files), fontsize=style.TITLE, loc="left", pad=16.0)
+    style.title(panels[0], ", ".join(result.files), pad=16.0)
     return figure
 
 
@@ -89,7 +89,7 @@ def log_spectrum(result: LogOverview, ax: Axes | None = None) -> Figure:
     axes.set_xlim(0.0, min(last, float(result.spectra[0].frequency[-1])))
     axes.set_ylim(0.0, None)
     style.dress(axes, "frequency (Hz)", "share of variance", "Spectrum of the surface torque")
-    axes.legend(fontsize=style.SMALL, frameon=False)
+    style.legend(axes)
     return figure
 
 
@@ -123,7 +123,7 @@ def identified_curve(
     style.dress(
         axes, "bit speed (rpm)", f"torque ({unit})", f"Friction of the log at {at:.4g} {force}"
     )
-    axes.legend(fontsize=style.SMALL, frameon=False)
+    style.legend(axes)
     return figure
 
 
@@ -145,8 +145,8 @@ def identified_window(
         panels, (f"upward wave ({unit})", f"log - fit ({unit})", "bit speed (rpm)"), strict=True
     ):
         style.dress(panel, "", text)
-    panels[0].set_title("A window of the log beside the fit", fontsize=style.TITLE, loc="left")
-    panels[0].legend(fontsize=style.SMALL, frameon=False)
+    style.title(panels[0], "A window of the log beside the fit")
+    style.legend(panels[0])
     panels[-1].set_xlabel("time (s)", fontsize=style.LABEL)
     return figure
 

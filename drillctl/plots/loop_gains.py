@@ -65,11 +65,7 @@ def drive_impedance(
     below.set_ylim(0.0, 1.05)
     _mark(above, below, marks)
     hertz(below)
-    above.legend(
-        handles=[line for line in above.get_lines() if line.get_label() in names],
-        fontsize=style.SMALL, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
-        handlelength=3.5,
-    )  # fmt: skip
+    style.legend_above(above, [line for line in above.get_lines() if line.get_label() in names])
     return figure
 
 
@@ -132,7 +128,7 @@ def gain_boundary(
     ax.set_ylim(*sides[1][0])
     style.legend_under(ax, 2)
     slope, unit = units.displayed(first.slope, "N*m*s/rad", system)
-    figure.supxlabel(f"falling slope of the rock {slope:.4g} {unit}", fontsize=style.SMALL)
+    style.note(figure, f"falling slope of the rock {slope:.4g} {unit}")
     return figure
 
 
@@ -234,7 +230,7 @@ def root_locus(result: RootLocus, ax: Axes | None = None, system: units.System =
     style.dress(ax, "real part (1/s), unstable to the right", "frequency (Hz)", title)
     _crossings(ax, tracks, values, top)
     style.legend_under(ax, 3, drop=0.1)
-    figure.supxlabel(_left_out(tracks, left, right, top), fontsize=style.SMALL)
+    style.note(figure, _left_out(tracks, left, right, top))
     return figure
 
 

@@ -82,7 +82,7 @@ def loop_map(
     ax.set_ylim(*style.edges(y)[[0, -1]])
     if ax.get_legend_handles_labels()[0]:
         style.legend_under(ax, 2)
-    figure.supxlabel(_caption(result, quantity), fontsize=style.SMALL)
+    style.note(figure, _caption(result, quantity))
     return figure
 
 

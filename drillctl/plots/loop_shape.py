@@ -168,7 +168,7 @@ def sensitivity(
     low, high = min(SHOWN_HZ[0], where / 3.0), max(SHOWN_HZ[1], 3.0 * where)
     ax.set_xlim(max(low, float(frequency[0])), min(high, float(frequency[-1])))
     ax.set_ylim(1e-2, 3.0 * max(peak, float(rest.max())))
-    ax.legend(fontsize=style.SMALL, frameon=False, loc="lower left")
+    style.legend(ax, loc="lower left")
     return figure
 
 
@@ -271,7 +271,7 @@ def _curve(
 
 
 def _legend(ax: Axes) -> None:
-    ax.legend(fontsize=style.SMALL, frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    style.legend(ax, loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
 def _on_chart(loop: ComplexArray) -> tuple[Array, Array]:

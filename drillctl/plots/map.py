@@ -61,7 +61,7 @@ def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = 
         bar.add_lines(lines)
     _mark_cells(result, ax, x, y)
     style.legend_under(ax, 3)
-    figure.supxlabel(_caption(result), fontsize=style.SMALL)
+    style.note(figure, _caption(result))
     return figure
 
 
@@ -110,14 +110,14 @@ def sweep_line(result: Sweep, ax: Axes | None = None, system: units.System = "si
             markeredgecolor=style.VERMILLION, label="reference solver",
         )  # fmt: skip
     for level in result.levels:
-        ax.axhline(level, color="#888888", linewidth=0.8, linestyle="--")
+        ax.axhline(level, color=style.GREY, linewidth=0.8, linestyle="--")
         ax.annotate(
             f"{level:g}", (1.0, level), xycoords=("axes fraction", "data"), fontsize=style.SMALL,
             xytext=(3, -3), textcoords="offset points",
         )  # fmt: skip
     style.dress(ax, label, "J1 (s)", style.heading(result, "J1 with its levels"))
-    ax.legend(fontsize=style.SMALL, frameon=False)
-    figure.supxlabel(_caption(result), fontsize=style.SMALL)
+    style.legend(ax)
+    style.note(figure, _caption(result))
     return figure
 
 
@@ -154,7 +154,7 @@ def error_estimate(result: Doctor, ax: Axes | None = None) -> Figure:
             )
     title = style.heading(result, "Estimated error of the batch engine")
     style.dress(ax, "J1 (s)", "relative error of J1", title)
-    ax.legend(fontsize=style.SMALL, frameon=False)
+    style.legend(ax)
     return figure
 
 
@@ -187,10 +187,10 @@ def regularisation(
     style.dress(left, over, "change of J1 (%)", "Friction smoothed by tanh")
     style.dress(right, over, "cells over those of set-valued friction", "Size of the regions")
     for panel in (left, right):
-        panel.legend(fontsize=style.SMALL, frameon=False)
+        style.legend(panel)
     about = f"{result.j1.size} cells, {result.design.tables.simulation.duration:g} s"
     text = style.caption(result, f"{style.title_of(result)}; {about}")
-    figure.supxlabel(text, fontsize=style.SMALL)
+    style.note(figure, text)
     return figure
 
 
@@ -225,7 +225,7 @@ def three_regions(
     ax.set_xlim(*style.edges(x)[[0, -1]])
     ax.set_ylim(*style.edges(y)[[0, -1]])
     style.legend_under(ax, 2, handles, drop=0.1)
-    figure.supxlabel(_caption_of_regions(result), fontsize=style.SMALL)
+    style.note(figure, _caption_of_regions(result))
     return figure
 
 

@@ -74,12 +74,12 @@ def schedule(
         panel.set_xlabel(f"{result.path} ({unit})" if unit else result.path, fontsize=style.LABEL)
     panels[0].set_title(style.heading(result, f"Gains over depth: {result.law}"),
                         fontsize=style.TITLE, loc="left")  # fmt: skip
-    panels[0].legend(fontsize=style.SMALL, frameon=False)
+    style.legend(panels[0])
     text = (
         f"{rows[0].draws} fresh draws a depth. Vertical lines: where gains must be changed, going "
         "deeper. Dashed: required probability; dotted: as designed."
     )
-    figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
+    style.note(figure, style.caption(result, text))
     return figure
 
 

@@ -46,10 +46,7 @@ def time_response(
         above = panels[number - columns]
         above.set_xlabel("time (s)")
         above.tick_params(labelbottom=True)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=4, fontsize=style.SMALL, frameon=False
-    )
+    style.legend_of_all(figure, panels[0], 4)
     return figure
 
 
@@ -132,7 +129,7 @@ def limit_cycle(result: LimitCycle, ax: Axes | None = None) -> Figure:
     style.dress(
         axes, "time from the rise through the mean (s)", "bit speed (rpm)", _cycle_title(result)
     )
-    axes.legend(fontsize=style.SMALL, frameon=False)
+    style.legend(axes)
     return figure
 
 

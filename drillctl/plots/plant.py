@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -48,11 +48,9 @@ def mode_shapes(
             _draw(left, right, mode, place, number)
         style.dress(left, "angle, largest = 1", label, f"{support}: angle")
         style.dress(right, "torque, largest = 1", "", f"{support}: torque")
-        right.legend(
-            fontsize=style.SMALL, frameon=False, loc="upper left", bbox_to_anchor=(1.02, 1.0)
-        )
+        style.legend(right, loc="upper left", bbox_to_anchor=(1.02, 1.0))
     for panel in panels:
-        panel.axvline(0.0, color="#888888", linewidth=0.8, zorder=1)
+        panel.axvline(0.0, color=style.GREY, linewidth=0.8, zorder=1)
         panel.set_xlim(-1.1, 1.1)
         panel.set_ylim(place[-1], place[0])
         panel.yaxis.set_major_locator(MaxNLocator(integer=True))
@@ -120,10 +118,7 @@ def mobility(
     panels[-1].set_xlabel("frequency (Hz)", fontsize=style.LABEL)
     for panel in panels:
         hertz(panel)
-    panels[0].legend(
-        fontsize=style.SMALL, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
-        handlelength=3.5,
-    )  # fmt: skip
+    style.legend_above(panels[0])
     return figure
 
 
@@ -189,11 +184,8 @@ def bode(
     phase.set_ylim(-190.0, 190.0)
     hertz(phase)
     # Above the curves instead of on them, beside the title if there is one.
-    side = 0.0 if len(results) > 1 else 1.0
-    magnitude.legend(
-        handles=phase.get_lines(), fontsize=style.SMALL, frameon=False,
-        loc="lower right" if side else "lower left", bbox_to_anchor=(side, 1.0), handlelength=3.5,
-    )  # fmt: skip
+    side: Literal["left", "right"] = "left" if len(results) > 1 else "right"
+    style.legend_above(magnitude, phase.get_lines(), side)
     return figure
 
 
@@ -280,9 +272,9 @@ def friction_curves(design: Design, ax: Axes | None = None, system: units.System
         ax, "bit speed (rpm)", f"bit torque ({torque_unit})", "Bit torque against bit speed"
     )
     for line in (ax.axhline, ax.axvline):
-        line(0.0, color="#888888", linewidth=0.8, zorder=1)
+        line(0.0, color=style.GREY, linewidth=0.8, zorder=1)
     ax.set_xlim(BACKWARD, last)
-    ax.legend(fontsize=style.SMALL, frameon=False, loc="lower right")
+    style.legend(ax, loc="lower right")
     return figure
 
 

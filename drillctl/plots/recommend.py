@@ -10,14 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drillctl import units
-from drillctl.plots import style
+from drillctl.arrays import runs
+from drillctl.plots import rows, style
 
 if TYPE_CHECKING:
-    from drillctl.studies.recommend.assess import Assessed
     from drillctl.studies.recommend.compute import Recommendation
     from drillctl.studies.recommend.window import Line
 
-ROW = 0.42  # height of a row (inches)
+SHOWN = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 @style.picture(ax="Five panels.")
@@ -26,30 +26,25 @@ def recommended(
 ) -> Figure:
     """J1, probability, speeds and weights without sticking, slope margin; a row a setting."""
     some = result.candidates
-    figure, panels = style.grid_or_new(ax, 1, 5, 11.0, 2.2 + ROW * len(some), share_y=True)
+    height = 2.2 + rows.HEIGHT * len(some)
+    figure, panels = style.grid_or_new(ax, 1, 5, 11.0, height, share_y=True)
     spread, chance, speed, weight, margin = panels
     for place, one in enumerate(some):
         colour = style.VERMILLION if one is result.recommended else style.BLUE
-        _spread(spread, place, one, colour)
-        low, high = one.interval
-        chance.plot([low, high], [place, place], "-", color=colour, linewidth=2.2)
-        chance.plot(one.probability, place, "o", color=colour, markersize=5.5)
+        values = one.j1[np.isfinite(one.j1)]
+        quantiles = np.quantile(values, SHOWN) if len(values) else np.full(len(SHOWN), np.nan)
+        rows.row(spread, chance, place, quantiles.tolist(), one.probability, one.interval, colour)
         _free(speed, place, one.window.speed, colour, system)
         _free(weight, place, one.window.weight, colour, system)
         if one.loop.slope > 0.0 and np.isfinite(one.loop.slope_margin):
             margin.plot(one.loop.slope_margin / one.loop.slope, place, "o", color=colour)
     table, asked = result.design.tables.tune, result.design.tables.recommend
-    limits = ((spread, table.level), (chance, table.probability), (margin, asked.slope_reserve))
-    for panel, limit in limits:
-        panel.axvline(limit, color=style.BLACK, linewidth=1.0, linestyle="--")
+    rows.finish(spread, chance, [one.name for one in some], table.level, table.probability)
+    rows.limit(margin, asked.slope_reserve)
     for panel, line in ((speed, some[0].window.speed), (weight, some[0].window.weight)):
         own = units.displayed(line.own, line.unit, system)[0]
         panel.axvline(own, color=style.BLACK, linewidth=1.0, linestyle=":")
         panel.set_xlim(left=0.0)
-    spread.set_yticks(range(len(some)), [one.name for one in some])
-    spread.set_ylim(len(some) - 0.5, -0.5)
-    spread.set_xlim(left=0.0)
-    chance.set_xlim(-0.03, 1.03)
     chance.set_xticks([0.0, 0.5, 1.0])  # ends beside those of the other panels
     margin.set_xlim(left=0.0)
     names = (
@@ -67,7 +62,7 @@ def recommended(
         "without sticking in the last 20 s at nominal rock. Dashed: limits; dotted: as designed. "
         f"{_chosen(result)}."
     )
-    figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
+    style.note(figure, style.caption(result, text))
     return figure
 
 
@@ -80,23 +75,9 @@ def _chosen(result: Recommendation) -> str:
     }[result.verdict]
 
 
-def _spread(ax: Axes, place: int, one: Assessed, colour: str) -> None:
-    """Quantiles of J1 on a row."""
-    values = one.j1[np.isfinite(one.j1)]
-    if not len(values):
-        return
-    low, first, middle, third, high = np.quantile(values, [0.05, 0.25, 0.5, 0.75, 0.95])
-    ax.plot([low, high], [place, place], "-", color=colour, linewidth=1.6)
-    ax.plot([first, third], [place, place], "-", color=colour, linewidth=7.0, alpha=0.55,
-            solid_capstyle="butt")  # fmt: skip
-    ax.plot(middle, place, "o", color=colour, markeredgecolor="white", markersize=6.5)
-
-
 def _free(ax: Axes, place: int, line: Line, colour: str, system: units.System) -> None:
     """Every stretch of values without sticking, on a row."""
     shown = np.asarray(units.displayed(line.values, line.unit, system)[0])
-    free = np.concatenate([[False], line.free, [False]]).astype(int)
-    begins, ends = np.flatnonzero(np.diff(free) > 0), np.flatnonzero(np.diff(free) < 0)
-    for begin, end in zip(begins, ends, strict=True):
+    for begin, end in runs(line.free):
         ax.plot([shown[begin], shown[end - 1]], [place, place], "-", color=colour,
                 linewidth=6.0, solid_capstyle="butt")  # fmt: skip

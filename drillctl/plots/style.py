@@ -54,7 +54,8 @@ LABEL = 10.0  # size of axis labels (points)
 SMALL = 9.0  # size of tick labels and legends (points)
 LINE = 1.6  # width of a curve (points)
 GRID = "#DDDDDD"
-"""Colour of grid and zero lines."""
+GREY = "#888888"
+"""Colour of levels and zero lines: in the background, yet legible."""
 
 STAR: dict[str, Any] = {
     "color": VERMILLION, "markeredgecolor": "white", "markersize": 15, "linestyle": "none",
@@ -179,16 +180,31 @@ def grid_or_new(
     return _figure_of(panels[0]), panels
 
 
-def dress(ax: Axes, x: str, y: str, title: str = "") -> None:
+def dress(ax: Axes, x: str, y: str, text: str = "") -> None:
     """Label axes and set them in the shared look."""
     ax.set_xlabel(x, fontsize=LABEL)
     ax.set_ylabel(y, fontsize=LABEL)
-    if title:
-        ax.set_title(title, fontsize=TITLE, loc="left")
+    if text:
+        title(ax, text)
     ax.tick_params(labelsize=SMALL)
     ax.grid(visible=True, color=GRID, linewidth=0.7)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
+
+
+def title(ax: Axes, text: str, **how: Any) -> None:
+    """Title axes."""
+    ax.set_title(text, fontsize=TITLE, loc="left", **how)
+
+
+def headline(figure: Figure, text: str) -> None:
+    """Title a picture of several panels."""
+    figure.suptitle(text, fontsize=TITLE, x=0.01, ha="left")
+
+
+def note(figure: Figure, text: str) -> None:
+    """What stands under a picture."""
+    figure.supxlabel(text, fontsize=SMALL)
 
 
 def _figure_of(ax: Axes) -> Figure:
@@ -255,14 +271,37 @@ def plane(result: Any, ax: Axes | None, height: float, system: units.System, wha
     return Plane(figure, ax, x, y)
 
 
+def legend(ax: Axes, **how: Any) -> None:
+    """Legend in the axes, or where `how` says."""
+    ax.legend(fontsize=SMALL, frameon=False, **how)
+
+
+def legend_above(
+    ax: Axes, handles: Sequence[Artist] | None = None, side: Literal["left", "right"] = "right"
+) -> None:
+    """Legend above the axes, where no curve runs."""
+    corner = (float(side == "right"), 1.0)
+    legend(ax, handles=handles, loc=f"lower {side}", bbox_to_anchor=corner, handlelength=3.5)
+
+
+def legend_of_all(
+    figure: Figure, ax: Axes | None, columns: int, text: str | None = None,
+    handles: Sequence[Artist] = (),
+) -> None:  # fmt: skip
+    """One legend under all panels: of one of them, or of `handles`; with `text` above it."""
+    handles = handles if ax is None else ax.get_legend_handles_labels()[0]
+    figure.legend(
+        handles=list(handles), loc="outside lower center", ncols=columns, fontsize=SMALL,
+        frameon=False, title=text, title_fontsize=SMALL,
+    )  # fmt: skip
+
+
 def legend_under(
     ax: Axes, columns: int, handles: Sequence[Artist] | None = None, drop: float = 0.12
 ) -> None:
     """Legend under the axes; `drop` is how far, in heights of the axes."""
-    ax.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=columns,
-        fontsize=SMALL, frameon=False,
-    )  # fmt: skip
+    corner = (0.5, -drop)
+    legend(ax, handles=handles, loc="upper center", bbox_to_anchor=corner, ncols=columns)
 
 
 def axis_label(axis: Axis, system: units.System) -> tuple[np.ndarray, str]:

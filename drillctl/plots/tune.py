@@ -8,19 +8,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drillctl import units
 from drillctl.arrays import Array
-from drillctl.plots import style
+from drillctl.plots import rows, style
 
 if TYPE_CHECKING:
     from drillctl.studies.tune.certificate import FreshRuns
     from drillctl.studies.tune.compute import Tune
 
-ROW = 0.42  # height of a row (inches)
+SHOWN = ("q05", "q25", "q50", "q75", "q95")
 
 
 @style.picture(ax="Two panels.")
@@ -29,22 +28,16 @@ def tune_baselines(result: Tune, ax: Sequence[Axes] | None = None) -> Figure:
 
     Baselines that do not apply are left out.
     """
-    rows: dict[str, FreshRuns] = {"tuned": result.certificate.runs}
-    rows |= {one.name: one.runs for one in result.baselines if one.runs is not None}
-    figure, (left, right) = style.grid_or_new(ax, 1, 2, 9.5, 2.0 + ROW * len(rows), share_y=True)
-    for place, (name, runs) in enumerate(rows.items()):
+    some: dict[str, FreshRuns] = {"tuned": result.certificate.runs}
+    some |= {one.name: one.runs for one in result.baselines if one.runs is not None}
+    height = 2.0 + rows.HEIGHT * len(some)
+    figure, (left, right) = style.grid_or_new(ax, 1, 2, 9.5, height, share_y=True)
+    for place, (name, runs) in enumerate(some.items()):
         colour = style.VERMILLION if name == "tuned" else style.BLUE
-        _spread(left, place, runs, colour)
-        low, high = runs.interval
-        right.plot([low, high], [place, place], "-", color=colour, linewidth=2.2)
-        right.plot(runs.probability, place, "o", color=colour, markersize=5.5)
-    level, required = result.certificate.runs.level, result.certificate.required
-    left.axvline(level, color=style.BLACK, linewidth=1.0, linestyle="--")
-    right.axvline(required, color=style.BLACK, linewidth=1.0, linestyle="--")
-    left.set_yticks(range(len(rows)), list(rows))
-    left.set_ylim(len(rows) - 0.5, -0.5)
-    left.set_xlim(left=0.0)
-    right.set_xlim(-0.03, 1.03)
+        quantiles = [runs.quantiles[key] for key in SHOWN]
+        rows.row(left, right, place, quantiles, runs.probability, runs.interval, colour)
+    level = result.certificate.runs.level
+    rows.finish(left, right, list(some), level, result.certificate.required)
     style.dress(left, "J1 (s)", "", style.heading(result, "J1 of tuned gains and baselines"))
     style.dress(right, f"probability that J1 is at or under {level:g} s", "")
     right.tick_params(labelleft=False)
@@ -53,21 +46,8 @@ def tune_baselines(result: Tune, ax: Sequence[Axes] | None = None) -> Figure:
         f"{result.certificate.seed}). Left: 5 to 95 % (line), 25 to 75 % (bar), median (dot); "
         "right: 95 % intervals. Dashed: level and required probability."
     )
-    figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
+    style.note(figure, style.caption(result, text))
     return figure
-
-
-def _spread(ax: Axes, place: int, runs: FreshRuns, colour: str) -> None:
-    """Quantiles of J1 on a row, those that are finite."""
-    results = {name: value for name, value in runs.quantiles.items() if np.isfinite(value)}
-    for low, high, width in (("q05", "q95", 1.6), ("q25", "q75", 7.0)):
-        if low in results and high in results:
-            ax.plot(
-                [results[low], results[high]], [place, place], "-", color=colour, linewidth=width,
-                solid_capstyle="butt", alpha=0.55 if width > 2.0 else 1.0,
-            )  # fmt: skip
-    if "q50" in results:
-        ax.plot(results["q50"], place, "o", color=colour, markeredgecolor="white", markersize=6.5)
 
 
 @style.picture(result="Over any number of parameters; the others stay at the optimum.")
@@ -101,7 +81,7 @@ def tune_neighbourhood(result: Tune, ax: Axes | None = None, system: units.Syste
         f"realizations (seed {result.certificate.seed}) in the background, all of them for the "
         f"bars. Dashed: probability {result.certificate.required:g}."
     )
-    figure.supxlabel(style.caption(result, text), fontsize=style.SMALL)
+    style.note(figure, style.caption(result, text))
     return figure
 
 

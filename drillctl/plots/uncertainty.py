@@ -52,9 +52,9 @@ def area_convergence(result: Uncertainty, ax: Axes | None = None) -> Figure:
         ax.minorticks_off()
     title = style.heading(result, "Area of the inner regions against the number of draws")
     style.dress(ax, "draws", "area of the 95 % region (% of the map)", title)
-    ax.legend(fontsize=style.SMALL, frameon=False)
+    style.legend(ax)
     text = "bars: 95 % interval of the sampling error, at each number of draws by itself"
-    figure.supxlabel(text, fontsize=style.SMALL)
+    style.note(figure, text)
     return figure
 
 
@@ -81,14 +81,14 @@ def cell_distributions(
             label=f"{place}{f' ({name})' if name else ''}", **style.look(k),
         )  # fmt: skip
     for level in result.levels:
-        ax.axvline(level, color="#888888", linewidth=0.8, linestyle="--")
+        ax.axvline(level, color=style.GREY, linewidth=0.8, linestyle="--")
     ax.axhline(0.95, color="#BBBBBB", linewidth=0.8)
     ax.set_xlim(0.0, top)
     ax.set_ylim(0.0, 1.02)
     title = style.heading(result, "Distribution of J1 over the draws")
     style.dress(ax, "J1 (s)", "share of the draws at or under it", title)
     style.legend_under(ax, 1)
-    figure.supxlabel(f"{result.realizations} draws; levels dashed", fontsize=style.SMALL)
+    style.note(figure, f"{result.realizations} draws; levels dashed")
     return figure
 
 
@@ -112,9 +112,9 @@ def response_envelope(
         title = style.heading(result, "Responses over the draws") if name == "bit_speed" else ""
         style.dress(panel, "time (s)", f"{name.replace('_', ' ')} ({unit})", title)
         panel.label_outer()
-    panels[0].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
+    style.legend(panels[0], loc="upper right")
     text = f"{band.count} draws, at each moment apart: no curve is a single run"
-    figure.supxlabel(text, fontsize=style.SMALL)
+    style.note(figure, text)
     return figure
 
 
@@ -165,12 +165,8 @@ def sensitivity_bars(
         panel.invert_yaxis()
         panel.set_xlim(-0.25, 1.1)  # what reaches further is error
         style.dress(panel, "Sobol index", "", _short(units.told(one.of, system)))
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2,
-        fontsize=style.SMALL, frameon=False,
-        title=f"{sobol.samples} points of Saltelli's design; bars: 95 % interval of the error",
-        title_fontsize=style.SMALL,
-    )  # fmt: skip
+    text = f"{sobol.samples} points of Saltelli's design; bars: 95 % interval of the error"
+    style.legend_of_all(figure, panels[0], 2, text)
     return figure
 
 
@@ -273,7 +269,7 @@ def region_error(
         )  # fmt: skip
     names = ("not in the 95 % region", "not known", "in the 95 % region")
     handles = [
-        Patch(facecolor=colour, edgecolor="#888888", label=name)
+        Patch(facecolor=colour, edgecolor=style.GREY, label=name)
         for colour, name in zip(colours, names, strict=True)
     ]
     _finish(
@@ -320,14 +316,11 @@ def _outline(
 def _finish(
     figure: Figure, result: Uncertainty, title: str, handles: Sequence[Patch | Line2D], what: str
 ) -> None:
-    figure.suptitle(style.heading(result, title), fontsize=style.TITLE, x=0.01, ha="left")
+    style.headline(figure, style.heading(result, title))
     method = result.design.tables.uncertainty.sampling
     draws = f"{result.realizations} draws ({method}, seed {result.seed}); {what}"
     text = style.caption(result, draws)
-    if not handles:
-        figure.supxlabel(text, fontsize=style.SMALL)
-        return
-    figure.legend(
-        handles=list(handles), loc="outside lower center", ncols=len(handles), fontsize=style.SMALL,
-        frameon=False, title=text, title_fontsize=style.SMALL,
-    )  # fmt: skip
+    if handles:
+        style.legend_of_all(figure, None, len(handles), text, handles)
+    else:
+        style.note(figure, text)

@@ -53,10 +53,7 @@ def torque_drag(
         panel.label_outer()
     panels[0].set_ylim(float(deep[-1]), 0.0)
     panels[0].axvline(0.0, color=style.BLACK, linewidth=0.7)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=4, fontsize=style.SMALL, frameon=False
-    )
+    style.legend_of_all(figure, panels[0], 4)
     return figure
 
 
@@ -78,7 +75,7 @@ def friction_sweep(
     style.dress(right, "friction factor", f"torque off bottom ({unit})")
     for panel in (left, right):
         panel.axvline(result.friction_factor, color=style.BLACK, linewidth=0.8, linestyle=":")
-    left.legend(fontsize=style.SMALL, frameon=False)
+    style.legend(left)
     return figure
 
 
