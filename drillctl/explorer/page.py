@@ -122,10 +122,11 @@ class Page:
 
     def _do(self, asked: dict[str, Any]) -> None:
         action = asked["do"]
-        own = {
-            "ready": self._begin, "undo": self._undo, "redo": self._redo, "save": self._save,
-            "design": self._save_design, "commands": self._commands, "recommend": self._recommend,
-            "report": self._report,
+        own: dict[str, Callable[[], None]] = {
+            "ready": self._begin, "save": self._save, "design": self._save_design,
+            "commands": self._commands, "recommend": self._recommend, "report": self._report,
+            "undo": partial(self._step, self._history, self._undone, 1),
+            "redo": partial(self._step, self._undone, self._history, 0),
         }  # fmt: skip
         if action in own:
             own[action]()
@@ -139,16 +140,11 @@ class Page:
         self._compute(None, self.state)
         self._ready["map"] = self._count
 
-    def _undo(self) -> None:
+    def _step(self, source: list[State], target: list[State], left: int) -> None:
+        """Move a state between what is shown and what was undone, unless all but `left` are."""
         self._settled = True
-        if len(self._history) > 1:
-            self._undone.append(self._history.pop())
-            self._change(self._history[-1])
-
-    def _redo(self) -> None:
-        self._settled = True
-        if self._undone:
-            self._history.append(self._undone.pop())
+        if len(source) > left:
+            target.append(source.pop())
             self._change(self._history[-1])
 
     def _take(self, new: State, settled: bool) -> None:

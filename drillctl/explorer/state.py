@@ -35,19 +35,19 @@ class End(NamedTuple):
     """An axis as a design file has it."""
 
     path: str
-    low: str | float
-    high: str | float
+    min: str | float
+    max: str | float
     points: int
 
     @property
     def table(self) -> AxisTable:
         """The axis as a table of a design."""
-        return AxisTable(path=self.path, min=self.low, max=self.high, points=self.points)
+        return AxisTable(**self._asdict())
 
     @property
     def option(self) -> str:
         """The same on the command line."""
-        low, high = (f"{v:.12g}" if isinstance(v, float) else v for v in (self.low, self.high))
+        low, high = (f"{v:.12g}" if isinstance(v, float) else v for v in (self.min, self.max))
         return f"{self.path}={low}:{high}:{self.points}"
 
 
@@ -74,9 +74,7 @@ class State:
     def design(self, base: Design) -> Design:
         """The design with what is set, and the map."""
         values = dict(self.settings)
-        values["map.axes"] = [
-            {"path": a.path, "min": a.low, "max": a.high, "points": a.points} for a in self.axes
-        ]
+        values["map.axes"] = [one._asdict() for one in self.axes]
         return base.replace(values)
 
     def grid(self, design: Design) -> tuple[Axis, Axis]:
@@ -285,14 +283,9 @@ def _keep(state: State, asked: dict[str, Any], base: Design) -> State:
     return replace(state, kept=Kept(dict(state.settings), point))
 
 
-def _open(state: State, asked: dict[str, Any], base: Design) -> State:
-    """A state that was saved."""
-    return read(str(asked["text"]), base)
-
-
 ACTIONS = {
     "set": _set, "law": _law, "cross": _cross, "axis": _axis, "choose": _choose, "keep": _keep,
-    "open": _open,
+    "open": lambda state, asked, base: read(str(asked["text"]), base),
 }  # fmt: skip
 """What a page may ask for."""
 

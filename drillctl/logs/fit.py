@@ -92,11 +92,10 @@ def driven(problem: Problem, window: Window, factors: Factors) -> Driven:
     spacing = track.spacing
     part = max(1, int(np.ceil(spacing / min(FINEST, swing(problem.parts) / PER_SWING))))
     step = spacing / part
-    spline = _spline(track, down)
     lead = 0 if string.delay else min(window.first, int(np.ceil(string.memory / spacing)))
     first = window.first - lead
     fine = track.time[first] + step * np.arange((window.last - 1 - first) * part + 1)
-    drive = spline(fine - 2.0 * string.delay)
+    drive = CubicSpline(track.time, down)(fine - 2.0 * string.delay)
     z = 2.0 * string.impedance
     at = track.time[window.first]
     # Where there is a delay the waves at both ends of it give the speed of the bit.
@@ -112,10 +111,6 @@ def driven(problem: Problem, window: Window, factors: Factors) -> Driven:
         drive[::part], part, part if track.mean > 1 else 1, lead, begin,
         AT_REST * abs(float(track.speed.mean())), speed,
     )  # fmt: skip
-
-
-def _spline(track: Track, values: Array) -> CubicSpline:
-    return CubicSpline(track.time, values)
 
 
 @dataclass(frozen=True, eq=False)

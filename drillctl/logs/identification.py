@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import ndtri, stdtrit
@@ -70,16 +70,12 @@ def tracks_of(
             rows = part.start + np.searchsorted(time, (begin, end))
             inside = slice(int(rows[0]), int(rows[1]))
             share, _ = tonal_share(
-                log.time[inside], _float(log, "top_torque", inside), (0.25 / period, 2.0 / period)
+                log.time[inside], log.signal("top_torque", inside), (0.25 / period, 2.0 / period)
             )
             found.append((share, begin, end, part))
     chosen = sorted(found, key=lambda one: -one[0])[:most]
     chosen = sorted(chosen, key=lambda one: one[1])
     return [_window(log, begin, end, lag, lags, part, period) for _, begin, end, part in chosen]
-
-
-def _float(log: Log, name: str, rows: slice) -> Array:
-    return np.asarray(log.signals[name][rows], float)
 
 
 def runs_of(log: Log, least: float) -> list[slice]:
@@ -110,7 +106,7 @@ def _cycle(log: Log, places: Sequence[slice], period: float) -> float:
     rows = slice(longest.start, min(longest.stop, longest.start + int(600.0 / log.spacing)))
     time = log.time[rows]
     low = max(0.2 / period, 3.0 / float(time[-1] - time[0]))
-    _, cycle = tonal_share(time, _float(log, "top_torque", rows), (low, 1.5 / period))
+    _, cycle = tonal_share(time, log.signal("top_torque", rows), (low, 1.5 / period))
     return float(cycle) if np.isfinite(cycle) else period
 
 
@@ -123,13 +119,13 @@ def _window(
     rows = slice(max(int(first) - 1, 0), int(last) + 1)
     rows = slice(max(rows.start, part.start), min(rows.stop, part.stop))
     names = ("weight_on_bit", "bit_speed")
-    held = [_float(log, n, rows) if n in log.signals else None for n in names]
+    held = [log.signal(n, rows) if n in log.signals else None for n in names]
     held = [None if one is None or not np.isfinite(one).all() else one for one in held]
     # A signal that is late by a lag was true so much earlier.
     torque, speed = (
-        np.interp(log.time[rows] + late, log.time[rows], _float(log, name, rows))
+        np.interp(log.time[rows] + late, log.time[rows], log.signal(name, rows))
         if late
-        else _float(log, name, rows)
+        else log.signal(name, rows)
         for name, late in zip(("top_torque", "top_speed"), lags, strict=True)
     )
     made = track(log.time[rows], torque, speed, period, *held)
@@ -253,22 +249,15 @@ def normal(level: float) -> float:
     return float(ndtri(0.5 + 0.5 * level))
 
 
-@dataclass(frozen=True, eq=False)
-class Band:
-    """A curve with its band."""
+def band_of(one: Fit, level: float, floor: float) -> tuple[Array, Array, Array]:
+    """Speeds that were seen (rad/s), the torque there and half widths of its band (N m).
 
-    speed: Array  # (rad/s)
-    torque: Array  # (N m)
-    low: Array
-    high: Array
-
-
-def band_of(one: Fit, level: float, floor: float) -> Band:
-    """Torque over the speeds that were seen, from scatter between pieces of windows and a floor."""
+    From scatter between pieces of windows and a floor.
+    """
     low = max(one.slowest, 0.0) if not any(one.sticks) else 0.0
     speed = np.linspace(low, max(one.fastest, low + 0.1), POINTS_OF_CURVE)
     torque, half = half_widths(one, lambda x: one.family.curve(x).torque(speed), level, floor)
-    return Band(speed, torque, torque - half, torque + half)
+    return speed, torque, half
 
 
 def draws_of(one: Fit, count: int, seed: int, level: float, floor: float) -> Array:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from drillctl.arrays import Array, Index, runs
+from drillctl.arrays import Array, Index, Mask, runs
 from drillctl.errors import InputError
 from drillctl.logs.files import ABSENT, Source, open_source
 from drillctl.logs.quantities import NEEDED, QUANTITIES, Chosen, choose
@@ -61,6 +61,10 @@ class Log:
     bounds: Index
     faults: tuple[Fault, ...] = ()
     usable: Any = field(default=None)  # rows where the torque may be believed, shape (rows,)
+
+    def signal(self, name: str, rows: slice | Mask) -> Array:
+        """Some rows of a signal, in double precision."""
+        return np.asarray(self.signals[name][rows], float)
 
     @property
     def rate(self) -> float:

@@ -56,9 +56,7 @@ def _by_waves(log: Log, line: Parts) -> Iterator[Spans]:
             if (rows.stop - rows.start) * log.spacing < 4.0 * lost:
                 break
             time = log.time[rows]
-            torque, speed = (
-                np.asarray(log.signals[k][rows], float) for k in ("top_torque", "top_speed")
-            )
+            torque, speed = (log.signal(k, rows) for k in ("top_torque", "top_speed"))
             seen = at_the_bit(line, string, track(time, torque, speed, period))
             slow = seen.speed < STILL * speed.mean()
             found = _spans(slow, seen.time - string.delay)

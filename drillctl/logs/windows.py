@@ -8,7 +8,7 @@ set speed make, would rank others first.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -52,10 +52,7 @@ class Windows:
         return len(self.begin)
 
 
-COLUMNS = (
-    "log", "begin", "end", "share", "period", "index", "torque", "swing", "speed", "weight",
-    "stuck",
-)  # fmt: skip
+NUMBERS = tuple(one.name for one in fields(Windows))[:-1]
 
 
 class Event(NamedTuple):
@@ -94,8 +91,8 @@ def windows_of(
             if row is not None:
                 rows.append((number, *row))
             progress.advance(1)
-    table = np.array(rows, dtype=float).reshape(-1, len(COLUMNS)).T
-    return Windows(**dict(zip(COLUMNS, table, strict=True)), from_bit=from_bit)
+    table = np.array(rows, dtype=float).reshape(-1, len(NUMBERS)).T
+    return Windows(**dict(zip(NUMBERS, table, strict=True)), from_bit=from_bit)
 
 
 def _places(log: Log, count: int) -> list[int]:
@@ -127,8 +124,8 @@ def _measured(
 ) -> tuple[float, ...] | None:
     """Numbers of a window; None where the string does not rotate and drill."""
     time = log.time[rows]
-    speed = np.asarray(log.signals["top_speed"][rows], float)
-    torque = np.asarray(log.signals["top_torque"][rows], float)
+    speed = log.signal("top_speed", rows)
+    torque = log.signal("top_torque", rows)
     good = np.isfinite(speed) & np.isfinite(torque)
     if good.mean() < ROTATING:
         return None

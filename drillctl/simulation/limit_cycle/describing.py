@@ -39,6 +39,7 @@ from drillctl.linear.ends import Ends, ends_of
 from drillctl.linear.operating_point import equilibria
 from drillctl.linear.slope_margin import crossings
 from drillctl.store.codec import documented, label
+from drillctl.store.json_files import picked
 
 MODES = 3  # lowest crossings that are looked at, unless asked for more
 NODES = 64
@@ -83,15 +84,10 @@ class HarmonicCycle:
 
     def summary(self) -> dict[str, Any]:
         """The numbers by name, SI units."""
-        return {
-            "amplitude": self.amplitude,
-            "period": self.period,
-            "frequency_hz": self.frequency_hz,
-            "mean_speed": self.mean_speed,
-            "peak_speed": self.peak_speed,
-            "slope": self.slope,
-            "stable": self.stable,
-        }
+        return picked(
+            self, "amplitude", "period", "frequency_hz", "mean_speed", "peak_speed", "slope",
+            "stable",
+        )  # fmt: skip
 
 
 def mean_torque_and_slope(

@@ -157,8 +157,12 @@ def take_returns(motion: Motion, period: float, level: float | None = None) -> R
     mean = float(speed.mean())
     level = mean if level is None else level
     half_down = 0.5 * (level + float(speed.min()))
+
+    def excess(time: float) -> float:
+        return float(motion.bit_speed(np.array([time]))[0]) - level
+
     rises = _rises(time, speed, level, half_down)
-    moments = np.array([_crossing(motion, *pair, level) for pair in rises])
+    moments = np.array([brentq(excess, *pair, xtol=1e-12, rtol=1e-14) for pair in rises])
     flow = Flow(motion.design)
     points = [flow.point(state) for state in motion.states(moments).T]
     if len(moments) > 1:  # whole cycles have the mean, any other stretch has it nearly
@@ -239,15 +243,6 @@ def _rises(time: Array, speed: Array, level: float, low: float) -> list[tuple[fl
             results.append((float(time[i]), float(time[i + 1])))
             armed = False
     return results
-
-
-def _crossing(motion: Motion, low: float, high: float, level: float) -> float:
-    """Time between two at which the bit speed is `level`."""
-
-    def excess(time: float) -> float:
-        return float(motion.bit_speed(np.array([time]))[0]) - level
-
-    return float(brentq(excess, low, high, xtol=1e-12, rtol=1e-14))
 
 
 def _peak(motion: Motion, begin: float, end: float) -> float:

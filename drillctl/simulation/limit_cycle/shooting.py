@@ -24,6 +24,7 @@ from drillctl.errors import SimulationError
 from drillctl.simulation.limit_cycle.describing import HarmonicCycle, mean_torque_and_slope
 from drillctl.simulation.limit_cycle.flow import Flow, Leg
 from drillctl.store.codec import documented, label
+from drillctl.store.json_files import picked
 
 CLOSED = 1e-9
 """An orbit is closed when no angle (rad) and no speed (rad/s) is off by more after a period."""
@@ -77,16 +78,10 @@ class Orbit:
     def summary(self) -> dict[str, Any]:
         """The numbers by name, SI units; of the multipliers the largest magnitude."""
         return {
-            "period": self.period,
-            "peak_bit_speed": self.peak_bit_speed,
-            "min_bit_speed": self.min_bit_speed,
-            "mean_bit_speed": self.mean_bit_speed,
-            "amplitude": self.amplitude,
-            "stuck_time": self.stuck_time,
+            **picked(self, "period", "peak_bit_speed", "min_bit_speed", "mean_bit_speed"),
+            **picked(self, "amplitude", "stuck_time"),
             "largest_multiplier": float(abs(self.multipliers[0])),
-            "stable": self.stable,
-            "residual": self.residual,
-            "iterations": self.iterations,
+            **picked(self, "stable", "residual", "iterations"),
         }
 
 
@@ -118,8 +113,7 @@ def find_orbit(
     SimulationError
         Newton's method found none.
     """
-    flow = Flow(design)
-    place = _Place(flow, point, period)
+    place = _Place(Flow(design), point, period)
     for step in range(steps + 1):
         if place.residual <= closed:
             return _orbit(place, step)

@@ -22,6 +22,11 @@ COMPUTED: Mapping[str, Callable[..., float]] = {
 """What a term may be made by, of floats."""
 
 
+def _operator(kind: str) -> tuple[Callable[..., Term], Callable[..., Term]]:
+    """An operator of terms, with a term on its left and on its right."""
+    return lambda a, b: made(kind, a, b), lambda a, b: made(kind, b, a)
+
+
 @dataclass(frozen=True, eq=False)
 class Term:
     """A number, a name, or an operation on terms."""
@@ -31,29 +36,10 @@ class Term:
     value: float | None = None  # None unless it is the same at every sample
     name: str = ""
 
-    def __add__(self, other: Value) -> Term:
-        return made("+", self, other)
-
-    def __radd__(self, other: Value) -> Term:
-        return made("+", other, self)
-
-    def __sub__(self, other: Value) -> Term:
-        return made("-", self, other)
-
-    def __rsub__(self, other: Value) -> Term:
-        return made("-", other, self)
-
-    def __mul__(self, other: Value) -> Term:
-        return made("*", self, other)
-
-    def __rmul__(self, other: Value) -> Term:
-        return made("*", other, self)
-
-    def __truediv__(self, other: Value) -> Term:
-        return made("/", self, other)
-
-    def __rtruediv__(self, other: Value) -> Term:
-        return made("/", other, self)
+    __add__, __radd__ = _operator("+")
+    __sub__, __rsub__ = _operator("-")
+    __mul__, __rmul__ = _operator("*")
+    __truediv__, __rtruediv__ = _operator("/")
 
     def __neg__(self) -> Term:
         return made("negative", self)

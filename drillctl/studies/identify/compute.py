@@ -362,13 +362,13 @@ def _numbers(problem: Problem, main: Fit, checked: Fit | None, level: float) -> 
 
 
 def _described(one: Fit, weight: float, score: float, level: float, floor: float) -> FittedLaw:
-    band = ident.band_of(one, level, floor)
+    speed, torque, wide = ident.band_of(one, level, floor)
     values, half = ident.half_widths(
         one, lambda x: one.family.coefficients(x, weight), level, floor
     )
     return FittedLaw(
         one.family.name, one.family.names, values, half, score, one.explained, one.size,
-        band.speed, band.torque, band.low, band.high, one.curve.static,
+        speed, torque, torque - wide, torque + wide, one.curve.static,
     )  # fmt: skip
 
 

@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING, Any
 from drillctl import units
 from drillctl.design import Design, to_toml
 from drillctl.design.validation import validated
-from drillctl.store.json_files import replaced, write_text
+from drillctl.store.json_files import write_text
 
 if TYPE_CHECKING:
     from drillctl.studies.identify.compute import Identification
 
 DESIGN, DRAWS = "identified.toml", "draws.csv"
-PATHS = {
-    "navarro-lopez-suarez": ("a1", "a2", "beta"),
-    "jansen-van-den-steen": ("a1", "a2"),
-}
 
 
 def paths_of(result: Identification) -> tuple[str, ...]:
@@ -25,7 +21,7 @@ def paths_of(result: Identification) -> tuple[str, ...]:
     if result.law == "tabulated":
         count = len(result.fitted.values) - 1
         return ("bit_rock.static", *(f"bit_rock.points.{k}.a" for k in range(1, count + 1)))
-    return tuple(f"bit_rock.{name}" for name in PATHS[result.law])
+    return tuple(f"bit_rock.{name}" for name in result.fitted.names)
 
 
 def identified(result: Identification) -> Design:
@@ -42,7 +38,7 @@ def identified(result: Identification) -> Design:
             ],
         }
     else:
-        rock |= dict(zip(PATHS[result.law], map(float, one.values), strict=True))
+        rock |= dict(zip(one.names, map(float, one.values), strict=True))
     tree = {**result.design.tree, "bit_rock": rock}
     tree.pop("uncertain", None)
     tree.get("uncertainty", {}).pop("correlations", None)
@@ -93,7 +89,5 @@ def write(result: Identification, folder: Path) -> None:
         "joint = true\n"
         for path in paths
     ]
-    with replaced(folder / DRAWS) as part:
-        write_text(part, "\n".join(lines) + "\n")
-    with replaced(folder / DESIGN) as part:
-        write_text(part, f"{text}\n" + "\n".join(blocks))
+    write_text(folder / DRAWS, "\n".join(lines) + "\n")
+    write_text(folder / DESIGN, f"{text}\n" + "\n".join(blocks))

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 from drillctl import plots, units
 from drillctl.store.tables import Column, Quantity, Table, Told, Unit
-from drillctl.studies.base import Option, Picture, Run, Study
+from drillctl.studies.base import Option, Picture, Study
 
 if TYPE_CHECKING:
-    from drillctl.design import Design
     from drillctl.studies.log.compute import LogOverview
 
 MOST_SHOWN = 10  # oscillations of a table on the terminal
@@ -30,13 +29,6 @@ STICKING = {
 """What tells when the bit stood still."""
 
 
-def computed(design: Design, run: Run) -> LogOverview:
-    """Read the logs."""
-    from drillctl.studies.log.compute import log_overview
-
-    return log_overview(design, run.options["files"], run.options["known"], run.progress)
-
-
 def tables(result: LogOverview) -> Iterator[Table]:
     """Oscillations by rank, columns, faults, every window."""
     w = result.windows
@@ -53,9 +45,9 @@ def tables(result: LogOverview) -> Iterator[Table]:
 
     def cells(k: int, begin: float, end: float) -> list[object]:
         return [
-            int(w.log[k]) + 1, begin, end, float(w.share[k]), float(w.period[k]),
-            float(w.index[k]), float(w.torque[k]), float(w.swing[k]), float(w.speed[k]),
-            float(w.weight[k]), float(w.stuck[k]),
+            int(w.log[k]) + 1, begin, end,
+            *(float(one[k]) for one in (w.share, w.period, w.index, w.torque, w.swing, w.speed,
+                                        w.weight, w.stuck)),
         ]  # fmt: skip
 
     ranked = [[n, *cells(e.best, e.begin, e.end)] for n, e in enumerate(result.events, start=1)]

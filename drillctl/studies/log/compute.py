@@ -232,7 +232,7 @@ def _spectra(logs: tuple[Log, ...], windows: Windows, events: tuple[Event, ...])
     for name, number in (("strongest", events[0].best), ("typical", order[(len(order) - 1) // 2])):
         log = logs[int(windows.log[number])]
         inside = (log.time >= windows.begin[number]) & (log.time <= windows.end[number])
-        torque = np.asarray(log.signals["top_torque"][inside], float)
+        torque = log.signal("top_torque", inside)
         good = np.isfinite(torque)
         frequency, power = spectrum(log.time[inside][good], torque[good])
         total = power[1:].sum() or 1.0  # of a constant torque nothing is to be shared

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,10 +25,6 @@ CASES = {
     "running_in": "run in",
 }
 """How the string is moved, and in words."""
-
-
-def _case(case: str) -> str:
-    return CASES[case]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,13 +118,7 @@ def torque_drag(design: Design, progress: Progress = SILENT) -> TorqueDrag:
         hook_loads={case: np.array([one[case].hook_load for one in swept]) for case in CASES},
         torques={case: np.array([one[case].torque[0] for one in swept]) for case in CASES},
         total_depth=(tvd, north, east),
-        notes=(
-            *_lumped(made),
-            *_vertical(design),
-            *_all_given(design),
-            *_too_light(found["running_in"]),
-            *_buckled(found, limit, placed),
-        ),
+        notes=tuple(_notes(design, made, found, limit, placed)),
     )
 
 
@@ -180,44 +171,27 @@ def _factor(design: Design, placed: Line, made: tuple[Run, ...]) -> float:
     return factor
 
 
-def _lumped(made: tuple[Run, ...]) -> list[str]:
-    """A string without length."""
-    none = made[-1].bottom == 1.0 and made[-1].mass == 0.0
-    return ["the string is of lumped springs: it has no length, and no weight in the well"] * none
-
-
-def _vertical(design: Design) -> list[str]:
-    """A well of which nothing is known."""
-    if design.tables.well.survey:
-        return []
-    return ["the well has no survey and is taken as vertical, where nothing rubs: give well.survey"]
-
-
-def _all_given(design: Design) -> list[str]:
-    """A well in which no hole takes the factor that is swept."""
-    holes = design.tables.well.holes
-    if not holes or any(hole.friction_factor is None for hole in holes):
-        return []
-    return ["every hole has a friction factor of its own: the sweep changes nothing"]
-
-
-def _too_light(run_in: Drag) -> list[str]:
-    """A string that the wall holds up."""
-    if run_in.hook_load >= 0.0:
-        return []
-    return ["run in: the hook load is negative, the string does not go down by its own weight"]
-
-
-def _buckled(found: dict[str, Drag], limit: Array, placed: Line) -> list[str]:
-    """Compression beyond the sinusoidal limit."""
-    notes = []
+def _notes(
+    design: Design, made: tuple[Run, ...], found: dict[str, Drag], limit: Array, placed: Line
+) -> Iterator[str]:
+    """What deserves attention: a well of which little is known, and what was left out."""
+    tables = design.tables.well
+    if made[-1].bottom == 1.0 and made[-1].mass == 0.0:
+        yield "the string is of lumped springs: it has no length, and no weight in the well"
+    if not tables.survey:
+        yield (
+            "the well has no survey and is taken as vertical, where nothing rubs: give well.survey"
+        )
+    if tables.holes and all(hole.friction_factor is not None for hole in tables.holes):
+        yield "every hole has a friction factor of its own: the sweep changes nothing"
+    if found["running_in"].hook_load < 0.0:
+        yield "run in: the hook load is negative, the string does not go down by its own weight"
     for case, one in found.items():
         pressed = -0.5 * (one.tension[:-1] + one.tension[1:])
         over = np.flatnonzero(pressed > limit)
         if over.size:
-            top = placed.depth[over[0]]
-            notes.append(
+            yield (
                 f"{CASES[case]}: compressed beyond the limit of sinusoidal buckling from "
-                f"{top:.0f} m down; a buckled string rubs more than is computed here"
+                f"{placed.depth[over[0]]:.0f} m down; a buckled string rubs more than is computed "
+                "here"
             )
-    return notes
