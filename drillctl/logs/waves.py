@@ -24,6 +24,7 @@ from scipy.signal.windows import tukey
 
 from drillctl.arrays import Array, ComplexArray
 from drillctl.rig.drillstring import Parts
+from drillctl.rig.drillstring.assembly import APART, chain, elements_of
 
 FINEST = 0.025  # step of the bit (s) at most: the falling friction stays on one branch
 PER_SWING = 100  # of them in the period of a quick string at least
@@ -35,6 +36,9 @@ NOISY = 0.05  # of its variance up to
 LONGEST = 0.1  # of a period
 FASTEST = 4.0  # (Hz) up to which a mesh is fine enough, or ten times the string's own
 PER_WAVE = 8  # elements in its wave length there
+HALFWAY = (5.0 / 12.0, 1.0 / 12.0)
+"""Shares of an element's mass, between consistent and lumped: the error of the wave speed is of
+fourth order."""
 LIGHT = 0.01  # time in which the top of a lumped string settles, over its period
 
 
@@ -81,7 +85,7 @@ def is_uniform(parts: Parts) -> bool:
 
 def travel_time(parts: Parts) -> float:
     """Time (s) of a wave from top to bit."""
-    return float(sum((s.inertia / s.stiffness) ** 0.5 for s in parts.sections))
+    return float(sum(s.travel_time for s in parts.sections))
 
 
 def stiffness(parts: Parts) -> float:
@@ -99,7 +103,7 @@ def impedance(parts: Parts) -> float:
     """Impedance of the uppermost pipe (N m s/rad), or one of the size of a lumped string's."""
     first = parts.sections[0]
     lumped = stiffness(parts) * swing(parts) / (2.0 * np.pi)
-    return float((first.inertia * first.stiffness) ** 0.5) or lumped
+    return first.impedance or lumped
 
 
 def below(parts: Parts, factors: Factors = Factors()) -> Below:
@@ -128,35 +132,15 @@ def below(parts: Parts, factors: Factors = Factors()) -> Below:
 
 def _elements(parts: Parts, zeta: float) -> Below:
     """Exponentials of finite elements with a matched damper at the top."""
-    springs: list[float] = []
-    dampers: list[float] = []
-    mass: list[tuple[float, float, float]] = []  # of an element, its drag, and a body below it
-    for one in parts.sections:
-        time = (one.inertia / one.stiffness) ** 0.5
-        fastest = max(FASTEST, 10.0 / swing(parts))
-        count = max(int(np.ceil(time * fastest * PER_WAVE)), 1) if one.inertia else 1
-        for number in range(count):
-            springs.append(one.stiffness * count)
-            dampers.append(
-                one.stiffness_damping * one.stiffness * count + one.coupling_damping * count
-            )
-            drag = (one.mass_damping * one.inertia + one.drag) / count
-            mass.append(
-                (one.inertia / count, drag, one.end_inertia if number == count - 1 else 0.0)
-            )
-    n = len(springs) + 1
-    m, c, k = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
-    # Halfway between consistent and lumped: the error of the wave speed is of fourth order.
-    share = np.array([[5.0, 1.0], [1.0, 5.0]]) / 12.0
-    pull = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    for j, (spring, damper, (inertia, drag, body)) in enumerate(
-        zip(springs, dampers, mass, strict=True)
-    ):
-        part = slice(j, j + 2)
-        m[part, part] += inertia * share
-        c[part, part] += damper * pull + drag * share
-        k[part, part] += spring * pull
-        m[j + 1, j + 1] += body
+    fastest = max(FASTEST, 10.0 / swing(parts))
+    one = elements_of(tuple(
+        replace(x, elements=max(int(np.ceil(x.travel_time * fastest * PER_WAVE)), 1))
+        for x in parts.sections
+    ))  # fmt: skip
+    n = len(one.bodies)
+    m = chain(one.inertia, HALFWAY).toarray() + np.diag(one.bodies)
+    k = chain(one.stiffness, APART).toarray()
+    c = (chain(one.damping, APART) + chain(one.drag, HALFWAY)).toarray() + np.diag(one.dampers)
     m[-1, -1] += parts.bit_inertia
     c[-1, -1] += parts.bit_damping
     if parts.modal_damping:
@@ -171,7 +155,7 @@ def _elements(parts: Parts, zeta: float) -> Below:
     inverse = np.linalg.inv(m)
     matrix = np.zeros((2 * n - 1, 2 * n - 1))
     matrix[: n - 1, n - 1 :] = twist
-    matrix[n - 1 :, : n - 1] = -inverse @ (twist.T * np.array(springs))
+    matrix[n - 1 :, : n - 1] = -inverse @ (twist.T * one.stiffness)
     matrix[n - 1 :, n - 1 :] = -inverse @ c
     rates, shapes = scipy.linalg.eig(matrix)
     into = np.zeros((2 * n - 1, 2))

@@ -11,6 +11,7 @@ import numpy as np
 
 from drillctl.arrays import Array
 from drillctl.rig import table as q
+from drillctl.rig.drillstring.assembly import APART, chain
 from drillctl.rig.table import Table
 
 HELD = 1e12
@@ -73,23 +74,17 @@ class AxialString:
 
 def axial_string(table: AxialTable, stiffness: Array, mass: Array, consistent: bool) -> AxialString:
     """The axial string of elements, shape (elements,): springs (N/m) and masses (kg)."""
-    nodes = len(stiffness) + 1
     top = HELD if table.top == "velocity" else table.top_mass
     if table.model == "lumped" and table.top == "force":
         total = np.array([[float(mass.sum()) + top]])
         return AxialString(total, np.array([[table.damping]]), np.zeros((1, 1)))
-    m, k, c = (np.zeros((nodes, nodes)) for _ in range(3))
-    own, other = (1 / 3, 1 / 6) if consistent else (1 / 2, 0.0)
-    if table.model == "lumped":
-        own, other = 0.0, 0.0
-        m[-1, -1] = mass.sum()
-    for i, (spring, weight) in enumerate(zip(stiffness, mass, strict=True)):
-        at = np.ix_([i, i + 1], [i, i + 1])
-        m[at] += weight * np.array([[own, other], [other, own]])
-        k[at] += spring * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        c[at] += table.stiffness_damping * spring * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    lumped = table.model == "lumped"
+    share = (0.0, 0.0) if lumped else (1 / 3, 1 / 6) if consistent else (1 / 2, 0.0)
+    m = chain(mass, share).toarray()
+    m[-1, -1] += mass.sum() if lumped else 0.0
+    k = chain(stiffness, APART).toarray()
+    c = chain(table.stiffness_damping * stiffness, APART).toarray()
     m[0, 0] += top
     c[-1, -1] += table.damping
-    lumped = table.model == "lumped"
     impedance = 0.0 if lumped else math.sqrt(stiffness[-1] * mass[-1])
     return AxialString(m, c, k, impedance)

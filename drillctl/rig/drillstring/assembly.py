@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,6 +133,35 @@ class Drillstring:
         return np.sqrt(np.maximum(squares, 0.0)), shapes
 
 
+class Elements(NamedTuple):
+    """Elements of a string, from top to bottom, and what stands at its nodes but for the ends."""
+
+    # shape (elements,): N m/rad, N m s/rad, kg m2, N m s/rad
+    stiffness: Array
+    damping: Array
+    inertia: Array
+    drag: Array
+    # shape (nodes,): inertia (kg m2) and dampers to ground (N m s/rad)
+    bodies: Array
+    dampers: Array
+
+
+def elements_of(sections: tuple[Section, ...]) -> Elements:
+    """The elements of some sections."""
+    stiffness = _per_element(sections, lambda s: s.stiffness * s.elements)
+    damping = _per_element(
+        sections,
+        lambda s: s.coupling_damping * s.elements + s.stiffness_damping * s.stiffness * s.elements,
+    )
+    inertia = _per_element(sections, lambda s: s.inertia / s.elements)
+    drag = _per_element(sections, lambda s: (s.mass_damping * s.inertia + s.drag) / s.elements)
+    bodies, dampers = np.zeros((2, len(stiffness) + 1))
+    for section, last in zip(sections, np.cumsum([s.elements for s in sections]), strict=True):
+        bodies[last] += section.end_inertia
+        dampers[last] += section.mass_damping * section.end_inertia + section.end_drag
+    return Elements(stiffness, damping, inertia, drag, bodies, dampers)
+
+
 def assemble(
     sections: tuple[Section, ...],
     top_inertia: float,
@@ -164,29 +193,14 @@ def assemble(
     """
     import scipy.sparse  # a third of a second that reading a design need not wait for
 
-    stiffness = _per_element(sections, lambda s: s.stiffness * s.elements)
-    inertia = _per_element(sections, lambda s: s.inertia / s.elements)
-    damping = _per_element(
-        sections,
-        lambda s: s.coupling_damping * s.elements + s.stiffness_damping * s.stiffness * s.elements,
-    )
-    drag = _per_element(sections, lambda s: (s.mass_damping * s.inertia + s.drag) / s.elements)
-
-    end_inertia = np.zeros(len(stiffness) + 1)
-    end_drag = np.zeros_like(end_inertia)
-    for section, last in zip(sections, np.cumsum([s.elements for s in sections]), strict=True):
-        end_inertia[last] += section.end_inertia
-        end_drag[last] += section.mass_damping * section.end_inertia + section.end_drag
-    end_inertia[0] += top_inertia
-    end_inertia[-1] += bit_inertia
-    end_drag[0] += top_damping
-    end_drag[-1] += bit_damping
-
+    made = elements_of(sections)
+    ends = np.zeros((2, len(made.bodies)))
+    ends[:, 0], ends[:, -1] = (top_inertia, top_damping), (bit_inertia, bit_damping)
     share = (1 / 3, 1 / 6) if mass == "consistent" else (1 / 2, 0.0)
-    m = _spread(inertia, share) + scipy.sparse.diags_array(end_inertia)
-    k = _spread(stiffness, (1.0, -1.0))
-    ground = _spread(drag, share) + scipy.sparse.diags_array(end_drag)
-    c = _spread(damping, (1.0, -1.0)) + ground
+    m = chain(made.inertia, share) + scipy.sparse.diags_array(made.bodies + ends[0])
+    k = chain(made.stiffness, APART)
+    ground = chain(made.drag, share) + scipy.sparse.diags_array(made.dampers + ends[1])
+    c = chain(made.damping, APART) + ground
     string = Drillstring(
         depth=_depths(sections),
         node_section=_names(sections),
@@ -194,8 +208,8 @@ def assemble(
         damping=c.tocsr(),
         stiffness=k.tocsr(),
         ground_damping=np.asarray(ground.sum(axis=1)).ravel(),
-        element_stiffness=stiffness,
-        element_damping=damping,
+        element_stiffness=made.stiffness,
+        element_damping=made.damping,
         classical=_classical(c.tocsr(), m.tocsr(), k.tocsr()),
         yield_torque=sections[0].yield_torque,
         parts=Parts(
@@ -233,7 +247,10 @@ def _per_element(sections: tuple[Section, ...], value: Callable[[Section], float
     return np.concatenate([np.full(s.elements, value(s), dtype=float) for s in sections])
 
 
-def _spread(values: Array, share: tuple[float, float]) -> scipy.sparse.sparray:
+APART = (1.0, -1.0)  # share of what acts on the difference of the ends of an element
+
+
+def chain(values: Array, share: tuple[float, float]) -> scipy.sparse.sparray:
     """Tridiagonal sum of the element matrices `values` x [[a, b], [b, a]]."""
     import scipy.sparse
 
