@@ -184,7 +184,6 @@ def _advance(  # type: ignore[no-untyped-def]
                     part = share * left
                     _weights_of(rates, part * step, e, f, s)
                     um = u0 + share * (u1 - u0)
-                    level = 0.5 * (torque + sign * static)
                     free, gain = 0.0, 0.0
                     for k in range(n):
                         free += (c[k] * (e[k] * x[k] + a[k] * (f[k] * u0 + s[k] * um))).real
