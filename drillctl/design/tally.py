@@ -35,9 +35,15 @@ from drillctl.design.tally_heads import (
 )
 from drillctl.errors import InputError, shown
 from drillctl.rig.drillstring import GRADES, PIPES
-from drillctl.rig.drillstring.catalogue import drill_pipe, find, kind_in, sizes_in, typical_bore
+from drillctl.rig.drillstring.catalogue import (
+    STEEL,
+    drill_pipe,
+    find,
+    kind_in,
+    sizes_in,
+    typical_bore,
+)
 
-STEEL = 7850.0  # density (kg/m3) by which a bore follows from a weight
 ENDS = ("top", "bit")
 LONGEST_PIECE = 50.0  # length (m) that no piece has: a stand of four joints has some 40
 SHORTEST_STAND = 15.0  # length (m) of a stand: two short joints

@@ -8,7 +8,6 @@ request never waits for long.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     from drillctl.ensemble.sweeps import Sweep
     from drillctl.explorer.work import Until
     from drillctl.linear.loop_margins import Margins
-    from drillctl.linear.response import FrequencyResponse
     from drillctl.simulation import Simulation
     from drillctl.studies.recommend.compute import Recommendation
 
@@ -166,12 +164,7 @@ def boundary(design: Design, axes: Axes) -> Iterator[Boundary | None]:
     lines = None
     if [axis.path for axis in axes] == ["controller.kp", "controller.ki"] and design.simple_drive:
         kp, ki = ((float(axis.values[0]), float(axis.values[-1])) for axis in axes)
-        result = gain_boundary(design, window=(kp, ki))
-        lines = tuple(
-            np.asarray(ring.coords)
-            for polygon in result.region.geoms
-            for ring in (polygon.exterior, *polygon.interiors)
-        )
+        lines = tuple(gain_boundary(design, window=(kp, ki)).rings)
     yield Boundary(few, np.concatenate(parts), lines)
 
 
@@ -203,28 +196,26 @@ def loop(design: Design) -> Iterator[Loop]:
     """Curves first, then smooth ones with the margins of `drillctl loop`."""
     from drillctl.linear.ends import bit_side, ends_of
     from drillctl.linear.loop_analysis import tolerated_slope
-    from drillctl.linear.loop_margins import margins, pole_grid
+    from drillctl.linear.loop_margins import margins
     from drillctl.linear.loop_model import loop_poles, model_poles
     from drillctl.linear.operating_point import operating_point
     from drillctl.linear.response import frequency_response, telling_frequencies
-    from drillctl.studies.loop.compute import smooth
+    from drillctl.studies.loop.compute import smooth_loop
 
     point, string = operating_point(design), design.sliding_string
     bit = bit_side(design, point.slope, point.speed)
     path = None if bit.path is None or bit.path.observer is not None else bit.path
     tolerated, _ = tolerated_slope(design, point.speed)
 
-    def opened(hertz: Array) -> FrequencyResponse:
-        return frequency_response(design, hertz, "open_loop", slope=bit.slope, path=path)
-
     frequency = telling_frequencies(string)
-    drive, curve = _drive(design, frequency), opened(frequency)
+    drive = _drive(design, frequency)
+    curve = frequency_response(design, frequency, "open_loop", slope=bit.slope, path=path)
     result = Loop(drive, curve.between("speed_error", "top_speed"), point.slope, tolerated, None)
     yield result
     ends, gains = ends_of(string), design.linear_drive.gains()
     simple = design.simple_loop
     poles = loop_poles(string, *gains, point.slope) if simple else model_poles(design, bit)
-    curve = smooth(opened, pole_grid(ends, poles) / (2.0 * math.pi))
+    curve = smooth_loop(design, poles, bit.slope, path)
     at_top = margins(ends, design.linear_drive, bit, poles) if result.stable else None
     yield replace(result, loop=curve.between("speed_error", "top_speed"), margins=at_top)
 

@@ -251,10 +251,8 @@ def _seen(curve: ComplexArray) -> ComplexArray:
 
 
 def _disk(loop: Loop) -> Iterator[Drawn]:
-    alpha = 2.0 if loop.margins is None else loop.margins.disk
-    if alpha >= 2.0:
+    if loop.margins is None or loop.margins.disk_ends is None:
         return
-    # The circle through (2 + a) / (2 - a) and its inverse, about the real axis.
-    near, far = -(2.0 - alpha) / (2.0 + alpha), -(2.0 + alpha) / (2.0 - alpha)
+    far, near = loop.margins.disk_ends
     middle, radius = 0.5 * (near + far), 0.5 * (near - far)
     yield _line(middle + radius * np.cos(ANGLE), radius * np.sin(ANGLE), "orange", fill=0.35)

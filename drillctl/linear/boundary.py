@@ -78,6 +78,15 @@ class GainBoundary:
 
         return bool(self.region.contains(shapely.Point(kp, ki)))
 
+    @property
+    def rings(self) -> list[Array]:
+        """Outer and inner rings of the region, Kp and Ki by rows."""
+        return [
+            np.asarray(ring.coords)
+            for part in self.region.geoms
+            for ring in (part.exterior, *part.interiors)
+        ]
+
     def summary(self) -> dict[str, Any]:
         """Bounds of the region, its share of the window, frequencies of the curve."""
         (p0, p1), (i0, i1) = self.window

@@ -62,6 +62,14 @@ class Margins:
     )
     delay_hz: float | None = label(unit="Hz", means="frequency of that instability")
 
+    @property
+    def disk_ends(self) -> tuple[float, float] | None:
+        """Ends on the real axis of the disk that L stays out of; of a margin of 2 it is no disk."""
+        if self.disk >= 2.0:
+            return None
+        near = (2.0 - self.disk) / (2.0 + self.disk)
+        return -1.0 / near, -near
+
 
 def margins(
     ends: Ends, drive: TopDriveLaw, bit: BitSide, poles: ComplexArray, below: float = math.inf

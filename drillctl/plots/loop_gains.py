@@ -132,17 +132,8 @@ def gain_boundary(
     return figure
 
 
-def rings_of(boundary: GainBoundary) -> list[Array]:
-    """Outer and inner rings of the region, Kp and Ki by rows."""
-    return [
-        np.asarray(ring.coords)
-        for part in boundary.region.geoms
-        for ring in (part.exterior, *part.interiors)
-    ]
-
-
 def _fill(ax: Axes, boundary: GainBoundary, system: units.System) -> None:
-    rings = rings_of(boundary)
+    rings = boundary.rings
     if not rings:
         ax.fill([], [], facecolor=STABLE, label="no stable gains within the picture")
         return

@@ -17,7 +17,7 @@ from drillctl.design import parameter
 from drillctl.errors import InputError, nearest
 from drillctl.linear.boundary import GainBoundary
 from drillctl.plots import style
-from drillctl.plots.loop_gains import DIAMOND, GAINS, rings_of, shown_gains
+from drillctl.plots.loop_gains import DIAMOND, GAINS, shown_gains
 from drillctl.plots.style import colours
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def _stability(ax: Axes, result: LoopMap, x: Array, y: Array) -> None:
 def _outline(
     ax: Axes, boundary: GainBoundary, paths: tuple[str, ...], system: units.System
 ) -> None:
-    for number, ring in enumerate(rings_of(boundary)):
+    for number, ring in enumerate(boundary.rings):
         kp, ki = shown_gains(ring[:, 0], ring[:, 1], system)
         x, y = (kp, ki) if paths == GAINS else (ki, kp)
         label = "stable gains, closed form" if number == 0 else "_"

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from drillctl.arrays import Array, ComplexArray, Mask
 from drillctl.errors import InputError
 from drillctl.linear.loop_analysis import LoopAnalysis
+from drillctl.linear.loop_margins import Margins
 from drillctl.linear.loop_model import loop_poles
 from drillctl.linear.response import FrequencyResponse, frequency_response
 from drillctl.plots import style
@@ -82,7 +83,7 @@ def nyquist(
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     ax.plot(np.cos(angle), np.sin(angle), color=GREY, linewidth=0.8, linestyle=":", label="|L| = 1")
     if analysis is not None and analysis.margins is not None:
-        _disk(ax, analysis.margins.disk)
+        _disk(ax, analysis.margins)
     _critical(ax, -1.0)
     left, right, high = WINDOW
     ax.set_xlim(left, right)
@@ -194,15 +195,16 @@ def _loop(result: FrequencyResponse, analysis: LoopAnalysis | None) -> ComplexAr
     return loop
 
 
-def _disk(ax: Axes, alpha: float) -> None:
-    """The disk that L stays out of; with a margin of 2 or more it is no disk."""
-    if alpha >= 2.0:
+def _disk(ax: Axes, margins: Margins) -> None:
+    """The disk that L stays out of."""
+    if margins.disk_ends is None:
         return
-    low, high = -(2.0 + alpha) / (2.0 - alpha), -(2.0 - alpha) / (2.0 + alpha)
+    low, high = margins.disk_ends
     ax.add_patch(
         Circle(
             (0.5 * (low + high), 0.0), 0.5 * (high - low), facecolor=SHADE,
-            edgecolor=style.VERMILLION, linewidth=1.0, label=f"disk margin {alpha:.3g}", zorder=1.5,
+            edgecolor=style.VERMILLION, linewidth=1.0, label=f"disk margin {margins.disk:.3g}",
+            zorder=1.5,
         )
     )  # fmt: skip
 

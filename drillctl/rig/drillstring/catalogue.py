@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drillctl.rig.drillstring.section import GRADES, polar_moment, torsional_yield
+from drillctl.rig.drillstring.section import GRADES, PSI, polar_moment, torsional_yield
 
 INCH = 0.0254
 FOOT = 0.3048
 POUND_PER_FOOT = 1.488163943569554  # kg/m
 STEEL = 7850.0  # density (kg/m3)
 
-HWDP_YIELD = 55e3 * 6894.757293168361
+HWDP_YIELD = 55e3 * PSI
 """Minimum yield strength (Pa) of the tube of conventional heavy weight pipe."""
 
 

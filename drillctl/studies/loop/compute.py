@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl import plots, units
-from drillctl.arrays import Array
+from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.ensemble.grid import Axis, axes_of
 from drillctl.errors import InputError
 from drillctl.linear.boundary import WINDOW, Window, gain_boundary, root_locus
-from drillctl.linear.ends import ends_of
+from drillctl.linear.ends import WeightPath, ends_of
 from drillctl.linear.loop_analysis import LoopAnalysis, loop
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.response import FrequencyResponse, frequency_response, telling_frequencies
@@ -138,11 +138,7 @@ def _of_loop(result: LoopAnalysis) -> Iterator[Picture]:
 
     @cache
     def opened() -> FrequencyResponse:
-        grid = pole_grid(ends_of(design.sliding_string), result.poles) / (2.0 * math.pi)
-        return smooth(
-            lambda f: frequency_response(design, f, "open_loop", slope=bit.slope, path=bit.path),
-            grid,
-        )
+        return smooth_loop(design, result.poles, bit.slope, bit.path)
 
     def closed() -> FrequencyResponse:
         grid = telling_frequencies(design.sliding_string)
@@ -175,8 +171,15 @@ TURN = np.radians(4.0)  # largest turn of a Nyquist curve between two frequencie
 REFINEMENTS = 6
 
 
-def smooth(respond: Callable[[Array], FrequencyResponse], grid: Array) -> FrequencyResponse:
-    """A response with more frequencies where its Nyquist curve would show corners."""
+def smooth_loop(
+    design: Design, poles: ComplexArray, slope: float, path: WeightPath | None
+) -> FrequencyResponse:
+    """The open loop, with more frequencies where its Nyquist curve would show corners."""
+
+    def respond(hertz: Array) -> FrequencyResponse:
+        return frequency_response(design, hertz, "open_loop", slope=slope, path=path)
+
+    grid = pole_grid(ends_of(design.sliding_string), poles) / (2.0 * math.pi)
     result = respond(grid)
     for _ in range(REFINEMENTS):
         loop = result.between("speed_error", "top_speed")
