@@ -148,7 +148,7 @@ ROWS = 1  # rows of the overlay that a slice computes
 
 def boundary(design: Design, axes: Axes) -> Iterator[Boundary | None]:
     """Slope margin over the map, and the stability boundary."""
-    from drillctl.linear.boundary import gain_boundary
+    from drillctl.linear.boundary import boundary_over
     from drillctl.studies.loop_mapping.compute import loop_map
 
     if design.tables.bit_rock.law == "printed-three-branch":
@@ -161,10 +161,8 @@ def boundary(design: Design, axes: Axes) -> Iterator[Boundary | None]:
         with np.errstate(divide="ignore", invalid="ignore"):
             parts.append(found["slope_margin"] / np.maximum(found["slope"], 1e-12))
         yield None
-    lines = None
-    if [axis.path for axis in axes] == ["controller.kp", "controller.ki"] and design.simple_drive:
-        kp, ki = ((float(axis.values[0]), float(axis.values[-1])) for axis in axes)
-        lines = tuple(gain_boundary(design, window=(kp, ki)).rings)
+    exact = boundary_over(design, (x.path for x in axes), (x.values for x in axes))
+    lines = None if exact is None else tuple(exact.rings)
     yield Boundary(few, np.concatenate(parts), lines)
 
 

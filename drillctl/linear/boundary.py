@@ -17,6 +17,7 @@ Poles of the loop against any one parameter of the design.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from drillctl import units
-from drillctl.arrays import Array, ComplexArray, Mask
+from drillctl.arrays import Array, ComplexArray, Mask, runs
 from drillctl.design import Design, parameter
 from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, Route, bit_side, ends_of, telling_grid
@@ -148,6 +149,16 @@ def gain_boundary(
     )
 
 
+def boundary_over(
+    design: Design, paths: Iterable[str], spans: Iterable[Array]
+) -> GainBoundary | None:
+    """The boundary within a map, if that runs over both gains of a drive that has no others."""
+    if [*paths] != ["controller.kp", "controller.ki"] or not design.simple_drive:
+        return None
+    kp, ki = ((float(values[0]), float(values[-1])) for values in spans)
+    return gain_boundary(design, (kp, ki))
+
+
 def _gains(ends: Ends, slope: float, omega: Array) -> tuple[Array, Array]:
     with np.errstate(all="ignore"):  # the curve runs to infinity between modes
         seen = ends.top_impedance(1j * omega, -slope)
@@ -173,20 +184,14 @@ def _branches(ends: Ends, slope: float, window: Window) -> tuple[Branch, ...]:
         kp, ki = np.insert(kp, place + 1, more[0]), np.insert(ki, place + 1, more[1])
     x, y = (kp - p0) / (p1 - p0), (ki - i0) / (i1 - i0)
     short = _touches(x) & _touches(y) & (np.hypot(np.diff(x), np.diff(y)) <= 2.0 * FINEST)
-    return tuple(Branch(omega[run], kp[run], ki[run]) for run in _runs(short))
+    pieces = (slice(first, end + 1) for first, end in runs(short))  # of points linked to their next
+    return tuple(Branch(omega[piece], kp[piece], ki[piece]) for piece in pieces)
 
 
 def _touches(x: Array) -> Mask:
     """Whether the span of neighbouring values meets 0 to 1; never where one is not finite."""
     low, high = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
     return np.asarray((low <= 1.0) & (high >= 0.0))
-
-
-def _runs(linked: Mask) -> list[slice]:
-    """Slices of the points that are linked to their next one after another."""
-    edges = np.diff(np.concatenate([[False], linked, [False]]).astype(int))
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return [slice(begin, end + 1) for begin, end in zip(begins, ends, strict=True)]
 
 
 def _to_the_edge(branch: Branch, window: Window) -> tuple[Array, Array]:

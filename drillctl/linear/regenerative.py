@@ -26,12 +26,13 @@ import numpy as np
 from drillctl.arrays import Array, ComplexArray, own_errstate
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.ends import ends_of
+from drillctl.linear.ends import WeightPath, ends_of
 from drillctl.linear.loop_model import loop_poles
 from drillctl.rig.axial import AxialString
 from drillctl.rig.bit_rock.richard_detournay import RichardDetournay
 from drillctl.rig.weight_on_bit import ConstantWeight, FollowingSpeed, RealWeight
 from drillctl.store.codec import label
+from drillctl.store.json_files import picked
 
 FAR = 0.5  # |chi - 1| beyond which there may be roots
 AXIS = 1e-9  # real part of the contour beside the axis, over the cutting frequency
@@ -60,10 +61,7 @@ class CuttingLoop:
             "unstable_roots": self.unstable_roots,
             "roots": [[float(s.real), float(s.imag)] for s in self.roots],
             "frequency_limit_hz": self.limit_hz,
-            "whole": self.whole,
-            "boundary_speed": self.boundary_speed,
-            "depth_of_cut": self.depth_of_cut,
-            "rate_of_penetration": self.rate_of_penetration,
+            **picked(self, "whole", "boundary_speed", "depth_of_cut", "rate_of_penetration"),
         }
 
 
@@ -131,9 +129,8 @@ def weight_transfer(design: Design) -> Any:
     gain = float(law.gain) if law.least < free < law.most else 0.0
     if isinstance(law, FollowingSpeed):
         return lambda s: gain
-    return lambda s: (
-        gain * np.exp(-s * law.delay) / ((1.0 + s * law.sensor) * (1.0 + s * law.hoist))
-    )
+    path = WeightPath(gain, law.delay, law.sensor, law.hoist, None)
+    return lambda s: path.feedback(s).bit
 
 
 def axial_mobility(string: AxialString, s: ComplexArray) -> ComplexArray:

@@ -58,15 +58,8 @@ class EnergyAudit:
 
     def summary(self) -> dict[str, float]:
         """The terms (J) and the relative residual, by name."""
-        return {
-            "drive": self.drive,
-            "bit": self.bit,
-            "damping": self.damping,
-            "stored": self.stored,
-            "hook": self.hook,
-            "wall": self.wall,
-            "relative_residual": self.relative_residual,
-        }
+        names = ("drive", "bit", "damping", "stored", "hook", "wall", "relative_residual")
+        return {name: getattr(self, name) for name in names}
 
 
 def status_counts(status: Any) -> dict[str, int]:

@@ -22,6 +22,7 @@ from drillctl.simulation import measures as m
 from drillctl.simulation.reference import EnergyAudit, Event, Motion, stuck_between
 from drillctl.simulation.strain import section_peaks
 from drillctl.store.codec import label
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 
 FINE = 0.01  # interval (s) on which what is not located is measured, whatever the signals' own
@@ -110,11 +111,7 @@ class Simulation(Result, kind="simulate"):
         """Measures, status, engine, step, modes, energy; SI units, None where undefined."""
         return {
             "measures": self.measures.as_dict(),
-            "status": self.status,
-            "engine": self.engine,
-            "method": self.method,
-            "step": self.step,
-            "modes": self.modes,
+            **picked(self, "status", "engine", "method", "step", "modes"),
             "energy": None if self.energy is None else self.energy.summary(),
             "yield": self.yields,
             "events": {

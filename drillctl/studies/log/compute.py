@@ -21,6 +21,7 @@ from drillctl.logs.sticking import share, sticking
 from drillctl.logs.windows import Event, Windows, band_of, events_of, spectrum, windows_of
 from drillctl.progress import SILENT, Progress
 from drillctl.store.codec import label
+from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 
 BINS = 1500  # of the outline of a signal over time
@@ -90,9 +91,7 @@ class LogOverview(Result, kind="log"):
         w = self.windows
         return {
             "files": list(self.files),
-            "rows": self.rows,
-            "rate": self.rate,
-            "duration": self.duration,
+            **picked(self, "rows", "rate", "duration"),
             "gaps": [list(gap) for gap in self.gaps],
             "columns": {
                 one.quantity: {"column": one.column, "unit": one.unit} for one in self.columns

@@ -67,12 +67,10 @@ def pictures(result: LoopMap) -> Iterator[Picture]:
 
 def slope_margin(result: LoopMap, system: units.System) -> Figure:
     """The slope margin, with the boundary of stable gains on a map over both gains."""
-    from drillctl.linear.boundary import gain_boundary
+    from drillctl.linear.boundary import boundary_over
 
-    design, axes, boundary = result.design, result.axes, None
-    if [axis.path for axis in axes] == ["controller.kp", "controller.ki"] and design.simple_drive:
-        kp, ki = ((float(axis.values[0]), float(axis.values[-1])) for axis in axes)
-        boundary = gain_boundary(design, window=(kp, ki))
+    axes = result.axes
+    boundary = boundary_over(result.design, (x.path for x in axes), (x.values for x in axes))
     return plots.loop_map(result, boundary=boundary, system=system)
 
 
