@@ -72,8 +72,7 @@ def schedule(
             panel.axvline(place, color=style.ORANGE, linewidth=0.9)
     for panel in panels[3:]:
         panel.set_xlabel(f"{result.path} ({unit})" if unit else result.path, fontsize=style.LABEL)
-    panels[0].set_title(style.heading(result, f"Gains over depth: {result.law}"),
-                        fontsize=style.TITLE, loc="left")  # fmt: skip
+    style.title(panels[0], style.heading(result, f"Gains over depth: {result.law}"))
     style.legend(panels[0])
     text = (
         f"{rows[0].draws} fresh draws a depth. Vertical lines: where gains must be changed, going "
