@@ -25,33 +25,34 @@ class Field(NamedTuple):
 
 
 _WORDS = {
-    "outer": "ytre utvendig extérieur exterieur exterior uitwendige",
-    "inner": "indre innvendig intérieur interieur interior inwendige",
+    "outer": "ext utv außen aussen ytre utvendig extérieur exterieur exterior uitwendige",
+    "inner": "int innv innen indre innvendig intérieur interieur interior inwendige",
     "od": "außendurchmesser aussendurchmesser buitendiameter ad",
     "id": "innendurchmesser binnendiameter",
-    "diameter": "durchmesser diamètre diametre diámetro diametro ø",
-    "length": "länge laenge lengde lengte longueur longitud",
+    "diameter": "dia diam durchmesser diamètre diametre diámetro diametro ø",
+    "length": "long längd længde länge laenge lengde lengte longueur longitud",
     "each length": "einzellänge",
     "total length": "gesamtlänge",
     "each": "unitaire unitaria",
-    "per": "pr",
+    "per": "pr je",
     "total": "totale gesamt",
-    "count": "anzahl antall aantal nombre cantidad stück stk",
-    "component": "bezeichnung benennung komponente komponent komponenten désignation designation "
-    "omschrijving onderdeel descripción descripcion élément elemento",
+    "count": "qté antal jnts anzahl antall aantal nombre cantidad stück stk",
+    "component": "comp bezeichnung benennung komponente komponent komponenten désignation "
+    "designation omschrijving onderdeel descripción descripcion élément elemento",
     "weight": "gewicht vekt poids peso masse masa",
     "cumulative": "akkumuliert akkumulert kumuliert kumulativ cumulée cumulé acumulada acumulado",
     "grade": "stahlgüte stålkvalitet kvalitet güte nuance grado",
     "inertia": "trägheitsmoment treghetsmoment inertie inercia",
 }
 _ENGLISH = {word: english for english, words in _WORDS.items() for word in words.split()}
-_JOINT = r"(?=.*\b(tj|tool ?joints?|joint|connection|conn)\b).*"
+_JOINT = r"(?=.*\b(tj|tool ?(joint|jt)s?|joint|connection|conn|box|pin)\b).*"
 _OUTER = r"\b(od|o d|do|d o|outer|outside|external|diameter (out|ext))\b"
 _INNER = r"\b(id|i d|di|d i|inner|inside|internal|bore|diameter in[tn]?)\b"
 _UNUSED = (
     r"\b(a?cum\w*|acc|accum\w*|running|depth|serial|sn|asset|part|fn|fish\w*|from|to|max|blade|"
     r"gauge|neck|drift|remarks?)\b|\b(stand|joint|jt) ?(#|no|nr|number)$|\bpos$|"
-    r"\b(joints|jts|pieces) per stand\b"
+    r"\b(joints|jts|pieces) per stand\b|\b(total|cum) (weight|wt|mass)\b|"
+    r"\b(conn|connection|thread) type$"
 )
 _EACH = (
     r"(length|len) (per|of (a|each)) |(length|len) each|each (length|len)|"
@@ -61,7 +62,7 @@ _COUNT = r"\b(count|qty|quantity|number|no|nos|nr|joints|jts|pieces|pcs)\b|^#$"
 _PIECES = r"\b(count|qty|quantity|joints|jts|pieces|pcs)\b"  # what no number of a line is called
 _PIPE_JOINT = r"\b(average|avg|mean|range) (joint|jt)s? (length|len)\b"
 _NAME = r"\b(name|component|item|description|tool|element|section|type|bha)\b"
-_LENGTH = r"\b(length|len|footage)\b|^l$"
+_LENGTH = r"(?:\b(length|len|footage)\b|^l$)"
 _TOTAL = r"\b(total|sum|section) (length|len)\b|\blength total\b"
 FIELDS = {
     "not used": Field("", None, _UNUSED),
@@ -366,6 +367,8 @@ def _head(text: str) -> Head:
 def _unit_of(text: str) -> tuple[str, str]:
     """Words of a head, and the unit in brackets, behind a comma or as its last word."""
     words, unit = text.strip(), ""
+    if per := re.fullmatch(r"(?i)(weight|wt\.?|lbs?|#|kg)\s*(?:/|per)\s*(ft|m)", words):
+        return "weight", "lb/ft" if per[2].lower() == "ft" else "kg/m"
     bracket = re.search(r"[\[(]([^\])]*)[\])]\s*$", words)
     if bracket:
         words, unit = words[: bracket.start()], bracket[1].strip()

@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 import drillctl
+from drillctl.design import tally_heads
 from drillctl.design.tally import read
 from drillctl.errors import InputError
 
@@ -482,3 +483,28 @@ def test_lengths_of_a_part_are_no_component(tmp_path):
     assert [one["name"] for one in made.sections] == ["DP", "DC", "Bit"]
     assert any("BHA length" in note and "a sum" in note for note in made.notes)
     assert any("195 ppf is 11 times what steel of its diameters weighs" in n for n in made.notes)
+
+
+@pytest.mark.parametrize(
+    ("head", "field", "unit"),
+    [
+        ("L (ft)", "length", "ft"),
+        ("Länge je Stück [m]", "length", "m"),
+        ("Section Length (ft)", "total length", "ft"),
+        ("Weight/ft", "weight", "lb/ft"),
+        ("lb/ft", "weight", "lb/ft"),
+        ("kg / m", "weight", "kg/m"),
+        ("Total Wt", "", ""),
+        ("Tool Jt OD", "joint od", ""),
+        ("Box OD (in)", "joint od", "in"),
+        ("Conn. Type", "", ""),
+        ("Ext. dia (mm)", "od", "mm"),
+        ("Innen-Ø [mm]", "id", "mm"),
+        ("Jnts", "count", ""),
+        ("Stand #", "", ""),
+        ("No. of Stands", "stands", ""),
+        ("Comp.", "name", ""),
+    ],
+)
+def test_heads_in_use(head, field, unit):
+    assert tally_heads._head(head)[1:] == (field, unit)
