@@ -118,7 +118,7 @@ OVERRIDES = st.fixed_dictionaries(
             positive(1e-3, 1e3).map(units.SI), positive(1, 500).map("{!r} rpm".format)
         ),
         "operating_point.weight_on_bit": positive(80.1, 159.9).map("{!r} kN".format),
-        "drillstring.sections.pipe.length": positive(1, 1e4).map("{!r} ft".format),
+        "drillstring.sections.pipe.length": positive(2, 1e4).map("{!r} ft".format),
         "drillstring.sections.pipe.outer_diameter": st.integers(40, 160).map("{} 1/16 in".format),
         "drillstring.sections.pipe.inner_diameter": positive(0, 100).map("{!r} mm".format),
         "drillstring.sections.pipe.shear_modulus": positive(1, 200).map("{!r} GPa".format),

@@ -26,6 +26,7 @@ elements has thirty; the slow stick-slip of a rig is the lowest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -97,7 +98,7 @@ def mean_torque_and_slope(
     mean, amplitude = np.broadcast_arrays(
         np.asarray(mean, dtype=float), np.asarray(amplitude, dtype=float)
     )
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = _gauss()
     # The bit turns forward up to the angle `turn` and backwards from there to half a period.
     law: Any = design.weight_on_bit
     turn = np.arccos(-np.clip(mean / amplitude, -1.0, 1.0))[..., None]
@@ -112,6 +113,12 @@ def mean_torque_and_slope(
         total += part.sum(axis=-1)
         harmonic += (part * cosine).sum(axis=-1)
     return total / np.pi, -2.0 * harmonic / (np.pi * amplitude)
+
+
+@cache
+def _gauss() -> tuple[Array, Array]:
+    """Nodes and weights: an eigenproblem that costs as much as the rest of a balance, once."""
+    return np.polynomial.legendre.leggauss(NODES)
 
 
 def harmonic_cycles(design: Design, modes: int = MODES) -> tuple[HarmonicCycle, ...]:
