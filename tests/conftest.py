@@ -9,12 +9,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from threadpoolctl import threadpool_limits
 
 # Tests start some sixty processes: what these import is compiled once, whatever the environment.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 if "PYTEST_XDIST_WORKER" in os.environ:  # a core each: more threads would only wait in turns
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    threadpool_limits(1, "blas")  # of a NumPy that plugins of pytest have loaded before
 
 NOTED = pytest.StashKey[list]()
 
