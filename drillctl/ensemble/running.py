@@ -350,7 +350,18 @@ def connect(address: str) -> Client:
         raise InputError(
             'needs dask.distributed: pip install "drillctl[distributed]"', "--scheduler"
         ) from None
+
+    class Connected(Client):
+        def __init__(self) -> None:
+            try:
+                super().__init__(address, timeout=ANSWER, set_as_default=False)
+            except BaseException:
+                self.status = "closed"  # or its end would wait for an answer, and complain
+                raise
+
     try:
-        return Client(address, timeout=ANSWER, set_as_default=False)
+        return Connected()
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"{address} does not answer: {error}", "--scheduler") from None
+    except Exception as error:  # what the words of another server are taken for, such as a length
+        raise InputError(f"{address} is no scheduler: {error}", "--scheduler") from error

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
+from socketserver import BaseRequestHandler, ThreadingTCPServer
 from typing import NamedTuple
 
 import pytest
@@ -97,6 +99,18 @@ def test_a_scheduler_is_found_by_its_address(client):
 
 
 @pytest.mark.slow
+def test_a_server_of_something_else_is_refused(tmp_path):
+    class Web(BaseRequestHandler):
+        def handle(self):
+            self.request.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+
+    with ThreadingTCPServer(("127.0.0.1", 0), Web) as web:
+        threading.Thread(target=web.serve_forever, daemon=True).start()
+        with pytest.raises(InputError, match="is no scheduler"):
+            connect(f"tcp://127.0.0.1:{web.server_address[1]}")
+        web.shutdown()
+
+
 def test_the_command_takes_a_scheduler(client, tmp_path, monkeypatch, capsys):
     from drillctl.cli import run
 
