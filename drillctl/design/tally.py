@@ -51,18 +51,20 @@ SAME_BORE = 1e-3  # by how much (m) a bore may differ from that of the catalogue
 
 
 _SUM = re.compile(r"\b(sub-?)?(total|sum|summe|somme|suma|totaal|totalt)s?\b")
+_INCHES = re.compile(r"""(\d[\d /.-]*)(?:"|\u2033|\u201d|''|in\b|inch)""")
 _WHOLE = re.compile(r"\b(length|footage|bha|assembly|string|drillstring)\b")
 _WIDE = re.compile(r"stab|reamer|opener|hole|casing|liner|centrali")
 _REMARK = re.compile(
     r":|\b(bha|assembly|string|drillstring|remarks?|notes?|date|page|end of|\w+ed by)\b"
 )
 _PIPE = re.compile(
-    r"\bd\.?p\b|pipe|\bhw|hwdp|heavy|hevi|gestänge|borerør|tungvekt|(?<!masse)(?<!masse[ -])tige"
+    r"\bd\.?p\b|pipe|\bhw|hwdp|heavy|hevi|gestänge|borerør|tungvekt|tuber|boorbuis|"
+    r"(?<!masse)(?<!masse[ -])tige"
 )
-_TYPES = {"hybrid": "hybrid|kymera", "roller-cone": r"cone|\btci\b|mill|rolle", "pdc": "pdc"}
+_TYPES = {"hybrid": "hybrid|kymera", "roller-cone": r"conic|cone|\btci\b|mill|rolle", "pdc": "pdc"}
 _BIT = re.compile(
     r"\bbits?$|^bits?\b(?!.*\bsub\b)|\bbit\b *\(|\bpdc\b|tri-?con|"
-    r"mei(ß|ss)el|borekrone|^outil\b|tr[ée]pan"
+    r"mei(ß|ss)el|krone$|^outil\b|tr[ée]pan|beitel|^barrena|^broca"
 )
 
 
@@ -85,8 +87,11 @@ class Tally:
         if not bits:
             return None, None
         size, name = bits[-1].get("outer_diameter"), bits[-1]["name"].lower()
+        across = 0.0 if size is None else units.parse(size, units.DIAMETER)
+        called = _INCHES.search(name)  # its diameter may be that of its shank
+        named = [one * 0.0254 for one in sizes_in(called[1]) if 2.0 < one < 40.0] if called else []
         types = (kind for kind, words in _TYPES.items() if re.search(words, name))
-        return None if size is None else units.parse(size, units.DIAMETER), next(types, None)
+        return max([across, *named[:1]]) or None, next(types, None)
 
 
 class _Cell(NamedTuple):
@@ -147,6 +152,8 @@ def _read(place: str, text: str, rows: list[tuple[int, list[str]]], begins: str)
     columns, rest = with_units_row(columns, rest)
     lines = [_Line(place, number, columns, row) for number, row in rest]
     notes: list[str] = []
+    if "name" not in {column.field for column in columns}:
+        notes.append("no column is the name of a component, which says what it is: call one 'Name'")
     if "total length" not in {column.field for column in columns} and any(
         line.longer_than_a_piece for line in lines
     ):

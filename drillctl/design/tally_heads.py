@@ -37,8 +37,8 @@ _WORDS = {
     "per": "pr je",
     "total": "totale gesamt",
     "count": "qté antal jnts anzahl antall aantal nombre cantidad stück stk",
-    "component": "comp bezeichnung benennung komponente komponent komponenten désignation "
-    "designation omschrijving onderdeel descripción descripcion élément elemento",
+    "component": "comp beschreibung beskrivelse beskrivning bezeichnung benennung "
+    "komponente komponent komponenten désignation designation omschrijving onderdeel descripción descripcion élément elemento",
     "weight": "gewicht vekt poids peso masse masa",
     "cumulative": "akkumuliert akkumulert kumuliert kumulativ cumulée cumulé acumulada acumulado",
     "grade": "stahlgüte stålkvalitet kvalitet güte nuance grado",
@@ -49,7 +49,7 @@ _JOINT = r"(?=.*\b(tj|tool ?(joint|jt)s?|joint|connection|conn|box|pin)\b).*"
 _OUTER = r"\b(od|o d|do|d o|outer|outside|external|diameter (out|ext))\b"
 _INNER = r"\b(id|i d|di|d i|inner|inside|internal|bore|diameter in[tn]?)\b"
 _UNUSED = (
-    r"\b(a?cum\w*|acc|accum\w*|running|depth|serial|sn|asset|part|fn|fish\w*|from|to|max|blade|"
+    r"\b(a?cum\w*|acc|akk|kum|accum\w*|running|depth|serial|sn|asset|part|fn|fish\w*|from|to|max|blade|"
     r"gauge|neck|drift|remarks?)\b|\b(stand|joint|jt) ?(#|no|nr|number)$|\bpos$|"
     r"\b(joints|jts|pieces) per stand\b|\b(total|cum) (weight|wt|mass)\b|"
     r"\b(conn|connection|thread) type$"
@@ -110,6 +110,8 @@ def text_of(path: Path, where: str) -> tuple[str, str]:
         stream = io.StringIO()
         csv.writer(stream, lineterminator="\n").writerows(sheets[name])
         return f"{path}, sheet {name!r}" if len(sheets) > 1 else str(path), stream.getvalue()
+    if path.suffix.lower() in (".xls", ".ods") or content[:4] == b"%PDF":
+        raise InputError(f"{path}: save the sheet as .xlsx or CSV, which are read")
     return str(path), _decoded(content).rstrip("\n") + "\n"
 
 

@@ -508,3 +508,33 @@ def test_lengths_of_a_part_are_no_component(tmp_path):
 )
 def test_heads_in_use(head, field, unit):
     assert tally_heads._head(head)[1:] == (field, unit)
+
+
+@pytest.mark.parametrize(("name", "content"), [("t.xls", b"a,b"), ("t.csv", b"%PDF-1.7")])
+def test_other_files_are_to_be_saved_as_one_that_is_read(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=f"{name}: save the sheet as .xlsx or CSV"):
+        read(name, "top", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "od", "across", "kind"),
+    [
+        ('8 1/2" PDC', "6.0", 8.5, "pdc"),  # its shank
+        ("PDC bit, 16 mm cutters", "8.5", 8.5, "pdc"),
+        ("Barrena triconica 12-1/4 in", "12.25", 12.25, "roller-cone"),
+        ('Beitel 8 1/2"', "8.5", 8.5, None),
+    ],
+)
+def test_the_bit_is_as_wide_as_its_name_says(tmp_path, name, od, across, kind):
+    quoted = name.replace('"', '""')
+    text = f'name,length [m],OD [in],ID [in]\nTubería,900,5,4.276\n"{quoted}",1,{od},\n'
+    made = read(text, "top", tmp_path)
+    assert made.bit[0] == pytest.approx(across * INCH)
+    assert made.bit[1] == kind
+    assert made.sections[0]["tool_joints"]
+
+
+def test_a_tally_without_names_is_told_so(tmp_path):
+    made = read("What;length [m];OD [in];ID [in]\nDP;9;5;4.276\nDC;9;6.5;2.25\n", "top", tmp_path)
+    assert "call one 'Name'" in made.notes[0]

@@ -162,7 +162,8 @@ PIPES: dict[str, Pipe] = dict(_read())
 
 _KINDS = {
     "HWDP": r"\bhw|hwdp|heavy|hevi|tungvekt|lourde|schwergest",
-    "collar": r"collar|\bn?m?dcs?\b|monel|schwerstange|vektrør|masse-?tige|zwaarstang",
+    "collar": r"collar|\bn?m?dcs?\b|monel|schwerstange|vektrør|masse-?tige|zwaarstang|"
+    r"portamecha|lastbarrena",
     "jar": r"\bjar|schlagschere|coulisse", "stabiliser": r"stab",
     "MWD": r"\b[ml]wd\b", "motor": r"moto|moteur|\bpdm\b",
 }  # fmt: skip
