@@ -38,7 +38,8 @@ _WORDS = {
     "total": "totale gesamt",
     "count": "qté antal jnts anzahl antall aantal nombre cantidad stück stk",
     "component": "comp beschreibung beskrivelse beskrivning bezeichnung benennung "
-    "komponente komponent komponenten désignation designation omschrijving onderdeel descripción descripcion élément elemento",
+    "komponente komponent komponenten désignation designation omschrijving onderdeel "
+    "descripción descripcion élément elemento",
     "weight": "gewicht vekt poids peso masse masa",
     "cumulative": "akkumuliert akkumulert kumuliert kumulativ cumulée cumulé acumulada acumulado",
     "grade": "stahlgüte stålkvalitet kvalitet güte nuance grado",
