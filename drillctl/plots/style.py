@@ -31,6 +31,7 @@ from drillctl.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
+    from matplotlib.axis import Axis as Scale
 
     from drillctl.studies import Axis
 
@@ -232,6 +233,13 @@ def beyond(values: Array, norm: Normalize) -> Literal["neither", "both", "min", 
     return "min" if below else "max" if above else "neither"
 
 
+def written_out(axis: Scale, digits: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
+    """Ticks of a logarithmic axis at some digits of each decade, written out."""
+    axis.set_major_locator(LogLocator(subs=digits))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def colour_bar(
     figure: Figure,
     drawn: ScalarMappable,
@@ -242,9 +250,7 @@ def colour_bar(
     """A labelled colour bar; on a log scale with ticks at 1, 2, 5 of each decade, written out."""
     bar = figure.colorbar(drawn, ax=ax, extend=extend, pad=0.02)
     if isinstance(drawn.norm, LogNorm):
-        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        bar.ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+        written_out(bar.ax.yaxis)
     bar.set_label(label, fontsize=LABEL)
     bar.ax.tick_params(labelsize=SMALL)
     return bar

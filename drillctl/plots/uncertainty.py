@@ -5,6 +5,7 @@ Regions of a map under uncertainty: bands of probability, and what is not known 
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -78,7 +79,7 @@ def cell_distributions(
         place = ", ".join(_shown(result, cell, axis, system) for axis in result.axes)
         ax.step(
             [0.0, *column, top], [0.0, *share, share[-1]], where="post",
-            label=f"{place}{f' ({name})' if name else ''}", **style.look(k),
+            label=f"{place}\n{name}".strip(), **style.look(k),
         )  # fmt: skip
     for level in result.levels:
         ax.axvline(level, color=style.GREY, linewidth=0.8, linestyle="--")
@@ -128,7 +129,7 @@ def _named(result: Uncertainty) -> dict[int, str]:
             results.setdefault(result.best(name).cell, []).append(called(name))
         except InputError:  # not known without --full
             continue
-    return {cell: ", ".join(names) for cell, names in results.items()}
+    return {cell: textwrap.fill(", ".join(names), 64) for cell, names in results.items()}
 
 
 def _shown(result: Uncertainty, cell: int, axis: Axis, system: units.System) -> str:

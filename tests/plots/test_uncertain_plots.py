@@ -127,6 +127,15 @@ def test_distributions_of_chosen_cells(result):
     assert "Kp 500 N m s" in line.get_label()
 
 
+def test_names_of_the_best_cells_stand_whole_under_the_curves(result):
+    figure = plots.cell_distributions(result)
+    figure.draw_without_rendering()
+    (ax,) = figure.axes
+    names, whole = ax.get_legend().get_window_extent(), figure.bbox
+    assert names.y1 < ax.get_window_extent().y0
+    assert whole.x0 < names.x0 < names.x1 < whole.x1
+
+
 def test_bars_are_the_indices(result):
     figure = plots.sensitivity_bars(result)
     one = result.sensitivity.indices[0]

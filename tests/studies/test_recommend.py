@@ -376,6 +376,14 @@ def test_a_loop_that_is_unstable_is_told_once(result):
     assert "the least bad" in plots.recommended(told).get_supxlabel()
 
 
+def test_a_long_title_leaves_the_panels_beside_each_other(result):
+    design = result.design.replace({"title": "Six drives " * 8})
+    figure = plots.recommended(replace(result, design=design))
+    figure.draw_without_rendering()
+    first, second = (ax.get_window_extent() for ax in figure.axes[:2])
+    assert second.x0 - first.x1 < 0.3 * first.width
+
+
 @pytest.mark.parametrize(
     ("counts", "told"),
     [

@@ -21,6 +21,7 @@ from drillctl.plots import style
 from drillctl.reporting.blocks import Block, Code, Figure, Table, Text, Words
 from drillctl.reporting.gather import Gathered
 from drillctl.store.tables import NOTHING, number
+from drillctl.studies.recommend.candidates import NAMES
 
 LUMPED = 0.12  # height of a lumped spring as a share of the drawing
 WIDEST = 0.16  # half the width of the widest section, as a share of the drawing's width
@@ -95,8 +96,8 @@ def _section(ax: Axes, part: _Part, order: int, words: Words) -> None:
         if table.pipe is not None:
             text += f", {table.pipe}"
         elif table.outer_diameter is not None:
-            text += f", {words.diameter(table.outer_diameter)} x "
-            text += words.diameter(table.inner_diameter)
+            text += f", {words.diameter(table.outer_diameter)}"
+            text += f" x {words.diameter(table.inner_diameter)}" if table.inner_diameter else ""
     middle = 0.5 * (part.top + part.bottom)
     ax.text(WIDEST + 0.06, middle, text, va="center", fontsize=style.SMALL)
 
@@ -111,9 +112,8 @@ def _spring(ax: Axes, part: _Part) -> None:
 def _ends(ax: Axes, design: Design, words: Words) -> None:
     tables = design.tables
     ax.add_patch(Rectangle((-0.24, -0.09), 0.48, 0.085, facecolor=style.SKY, edgecolor="black"))
-    text = (
-        f"top drive: {words.quantity(tables.top_drive.at_pipe, 'kg*m^2')}\n{tables.controller.law}"
-    )
+    law = NAMES.get(tables.controller.law, tables.controller.law)
+    text = f"top drive: {words.quantity(tables.top_drive.at_pipe, 'kg*m^2')}\n{law}"
     ax.text(0.28, -0.05, text, va="center", fontsize=style.SMALL)
     ax.add_patch(Rectangle((-0.1, 1.0), 0.2, 0.035, facecolor="#888888", edgecolor="black"))
     bit = [(-0.1, 1.035), (0.1, 1.035), (0.05, 1.075), (-0.05, 1.075)]
