@@ -313,6 +313,14 @@ class TopDriveTable(Table):
     torque_speed: tuple[tuple[q.SpeedOrZero, q.TorqueOrZero], ...] = ()
     damping: q.Damping = 0.0
 
+    @field_validator("gear_ratio", mode="before")
+    @classmethod
+    def _to_one(cls, value: Any) -> Any:
+        """A ratio as it stands on a plate, `7.2:1`."""
+        first, _, second = value.partition(":") if isinstance(value, str) else ("", "", "")
+        whole = second.strip() == "1" and units.bare(first)
+        return units.parse(f"{first} 1/s", units.RATE) if whole else value
+
     @property
     def at_pipe(self) -> float:
         """Inertia at the pipe (kg m2)."""

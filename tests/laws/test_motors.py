@@ -33,6 +33,8 @@ def of_limits(**keys):
 
 def test_a_motor_counts_with_the_ratio_squared():
     assert rig(**GEAR).string.top_inertia == pytest.approx(2122.32, abs=1e-9)
+    plate = rig(**GEAR | {"top_drive.gear_ratio": "7.2 : 1"})  # as it stands on a plate
+    assert plate.string.top_inertia == pytest.approx(2122.32, abs=1e-9)
     two = rig(**GEAR, **{"top_drive.motors": 2})
     assert two.string.top_inertia == pytest.approx(2 * 23 * 7.2**2 + 930)
 
