@@ -158,8 +158,9 @@ def remarks(result: LoopAnalysis, system: units.System) -> Iterator[str]:
     if result.mesh_limited:
         yield (
             "Figures marked mesh-limited are decided by the last modes of the mesh: with other "
-            "elements they change. Use the value of the exact string beside them, where it has one, "
-            "or give the string its damping (drillstring.sections.NAME.stiffness_damping, usually 1e-3 s)."
+            "elements they change. Use the value of the exact string beside them, where it has "
+            "one, or give the string its damping (drillstring.sections.NAME.stiffness_damping, "
+            "usually 1e-3 s)."
         )
     drive = result.design.tables.controller.drive
     if drive.motor_lag > drive.lag:
