@@ -25,7 +25,8 @@ NOTED = pytest.StashKey[list]()
 # end together.
 LONG = (
     "tests/reporting", "tests/cli/test_studies.py", "tests/cli/test_cli.py",
-    "tests/laws/test_friction_laws.py", "tests/studies/test_advantage.py",
+    "tests/simulation/test_reference.py", "tests/simulation/test_wall.py",
+    "tests/studies/test_advantage.py",
 )  # fmt: skip
 
 

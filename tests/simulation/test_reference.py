@@ -1,6 +1,5 @@
 """The reference solver against event-accurate values, balances and known behaviour."""
 
-import numba
 import numpy as np
 import pytest
 from scipy.integrate import DOP853
@@ -8,11 +7,10 @@ from scipy.integrate import DOP853
 import drillctl
 from benchmarks.peers.reference import solver as peer
 from drillctl.design import Design
+from drillctl.simulation import reference
 from drillctl.simulation import reference_run as run
 from drillctl.simulation.reference import numbers_of, solve, solve_whole
-from drillctl.simulation.reference_rates import rates_of, slip_torque
 from drillctl.simulation.reference_steps import explicit_dense_output, tableau
-from drillctl.simulation.reference_stiff import change_with_time, linearise, stiff_step
 from drillctl.simulation.run import sample
 
 HOLDS = (
@@ -170,34 +168,30 @@ def test_order_of_stiff_steps(figure):
     drive = {"controller.drive.lag": "0.2 s", "simulation.duration": "0.32 s"}
     design = paper(400, 100, 140, **STIFF | drive)
     due = solve_whole(design, 1e-13).states(np.array([0.32]))[:, 0]
-    errors = []
-    for step in (0.02, 0.01, 0.005):
-        numbers = numbers_of(design)
-        states = len(numbers.state)
-        work = run.work_for(states)
-        method, solver = run.method_for(True, design.string.nodes, states)
-        end = fixed_steps(numbers, method, solver, work, step, round(0.32 / step))
-        errors.append(np.abs(end[: len(due)] - due).max())
+    ends = [in_steps_of_one_length(design, count) for count in (16, 32, 64)]
+    errors = [np.abs(end[: len(due)] - due).max() for end in ends]
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     figure("order of the stiff steps", orders[-1])
     assert orders[-1] > 4.8  # of a string that is nearly linear it is 6
 
 
-def fixed_steps(numbers, method, solver, work, step, count):
-    state = numbers.state.copy()
-    _steps(numbers.rig, method, solver, work, state, step, count)
+def in_steps_of_one_length(design, count):
+    """The last state of a run in so many stiff steps, behind a first one that is short."""
+    numbers = numbers_of(design)
+    rig, state = numbers.rig, numbers.state
+    work, clock = run.work_for(len(state)), reference._clock(design, numbers, 1e-13)
+    method, solver = run.method_for(True, design.string.nodes, len(state))
+    run.begin(rig, clock, work, state)
+    for k in range(count + 1):
+        clock = reference._with_room(numbers, clock)
+        run.advance(rig, method, solver, clock, work, numbers.sums, state, 1)
+        if k == 0:
+            assert 0.0 < clock.now[run.TIME] < 1e-3
+            clock = clock._replace(tolerance=1e9)  # from here on every step is taken as it is
+            length = (1.0 + 1e-12) * (clock.duration - clock.now[run.TIME]) / count
+        clock.now[run.STEP] = length
+    assert clock.now[run.TIME] == clock.duration
     return state
-
-
-@numba.njit
-def _steps(rigs, method, solver, work, state, step, count):
-    for k in range(count):
-        rates_of(rigs[0], k * step, 1, state, work.stages[0])
-        torque = linearise(rigs[0], solver, k * step, 1, state, work.stages[0])
-        change_with_time(rigs[0], solver, k * step, step, 1, state, work.stages[0])
-        rock = slip_torque(rigs[0], k * step, state, 1)
-        stiff_step(rigs[0], method.implicit, work, solver, k * step, step, 1, state, (torque, rock))
-        state[:] = work.after[: len(state)]
 
 
 def test_method_by_what_the_string_asks():
