@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -37,12 +38,13 @@ def room_of(module: str) -> str:
 
 def running(node: ast.AST) -> Iterator[ast.AST]:
     """Every node that is run: inside functions as well, but not for the type checker only."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
-            for other in child.orelse:
-                yield from (other, *running(other))
-        else:
-            yield from (child, *running(child))
+    left = [node]
+    while left:
+        for child in ast.iter_child_nodes(left.pop()):
+            typed = isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)
+            run = child.orelse if typed else [child]
+            yield from run
+            left += run
 
 
 def imported(tree: ast.AST, package: str) -> set[str]:
@@ -65,23 +67,24 @@ def module_of(name: str) -> str | None:
     return name or None
 
 
-def edges() -> dict[str, set[str]]:
+def tree_of(module: str) -> ast.AST:
+    return ast.parse(MODULES[module].read_text(encoding="utf-8"))
+
+
+@cache  # not as this file is read: every worker of the tests reads all files
+def graph() -> dict[str, set[str]]:
     """The modules of this package that each of them imports."""
-    graph = {}
+    edges = {}
     for module, path in MODULES.items():
         package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-        names = imported(ast.parse(path.read_text(encoding="utf-8")), package)
-        found = {module_of(name) for name in names}
-        graph[module] = {other for other in found if other not in (None, module)}
-    return graph
-
-
-GRAPH = edges()
+        found = {module_of(name) for name in imported(tree_of(module), package)}
+        edges[module] = {other for other in found if other not in (None, module)}
+    return edges
 
 
 def circle(modules: set[str]) -> list[str]:
     """A circle among these modules; empty if there is none."""
-    inside = {module: GRAPH[module] & modules for module in modules}
+    inside = {module: graph()[module] & modules for module in modules}
     try:
         TopologicalSorter(inside).prepare()
     except CycleError as error:
@@ -100,7 +103,7 @@ def test_every_module_is_in_a_room():
 def test_imports_go_down_only():
     rank = {room: place for place, room in enumerate(ROOMS)}
     up: dict[tuple[str, str], list[str]] = {}
-    for module, others in GRAPH.items():
+    for module, others in graph().items():
         for other in others:
             pair = room_of(module), room_of(other)
             if rank[pair[0]] < rank[pair[1]]:
@@ -115,12 +118,12 @@ def test_no_room_holds_a_circle():
 
 def test_of_the_package_itself_nothing_above_is_taken():
     """Its names are looked up as they are asked for: an import up that no list of imports shows."""
-    for module, path in MODULES.items():
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+    for module in MODULES:
+        tree = tree_of(module)
         taken = {name for name in imported(tree, module) if module_of(name) == "drillctl"}
         for node in ast.walk(tree):
-            if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "drillctl":
-                taken |= {n for n in [ast.unparse(node)] if module_of(n) == "drillctl"}
+            if isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "drillctl":
+                taken |= {n for n in [f"drillctl.{node.attr}"] if module_of(n) == "drillctl"}
         if room_of(module) not in ("drillctl", "reporting", "cli", "__main__"):
             assert taken <= {"drillctl", "drillctl.__version__"}, module
 
