@@ -423,6 +423,8 @@ def with_units_row(
     measured = [(c, cell) for c, cell in pairs if c.field and FIELDS[c.field].kind is not None]
     given = [(c, cell) for c, cell in measured if cell.lower() not in NOTHING]
     units_of = dict(given)
+    if any(unit[0].isdigit() for _, unit in given):  # seen at once, without pint
+        return columns, rows
     if not given or not all(_fits(unit, FIELDS[c.field].kind) for c, unit in given):
         return columns, rows
     return [c._replace(unit=units_of.get(c, c.unit)) for c in columns], rows[1:]

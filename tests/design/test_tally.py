@@ -538,3 +538,8 @@ def test_the_bit_is_as_wide_as_its_name_says(tmp_path, name, od, across, kind):
 def test_a_tally_without_names_is_told_so(tmp_path):
     made = read("What;length [m];OD [in];ID [in]\nDP;9;5;4.276\nDC;9;6.5;2.25\n", "top", tmp_path)
     assert "call one 'Name'" in made.notes[0]
+
+
+def test_a_tally_with_its_own_units_waits_for_no_library_of_units(new, folder):
+    script = "import sys, drillctl\ndrillctl.load('my-rig.toml')\nassert 'pint' not in sys.modules"
+    subprocess.run([sys.executable, "-c", script], cwd=folder, check=True)
