@@ -9,15 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-import zarr
-import zarr.codecs
 
 import drillctl
 from drillctl.ensemble.audit import Audit
 from drillctl.ensemble.storing import Folder
 from drillctl.errors import InputError, StoreError
 from drillctl.store import claim, identity
-from drillctl.store.zarr_files import read_array, write_array, write_group
 from drillctl.studies import Axis, sweep
 
 GAINS = [
@@ -172,51 +169,6 @@ def test_zarr_holds_units_and_provenance(result, bistable, tmp_path):
             "processor",
         }
         assert all(isinstance(value, str) and value for value in about.values())
-
-
-LONG = np.random.default_rng(0).random((150_001, 3))
-ARRAYS = {
-    "numbers": np.arange(6.0).reshape(2, 3), "small": np.arange(3, dtype=np.int8),
-    "flags": np.array([True, False]), "words": np.array([["a"], ["vůz"]], dtype=object),
-    "one": np.array(3.0), "none": np.zeros((0, 2)), "chunks": LONG,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", ARRAYS)
-def test_files_of_arrays_are_those_that_zarr_writes(tmp_path, name):
-    values, dims = ARRAYS[name], ["x", "y"][: ARRAYS[name].ndim]
-    about = write_array(tmp_path / "ours/it", values, dims, {"units": "s"})
-    write_group(tmp_path / "ours", {"it": about}, {"drillctl": "0"})
-    theirs = zarr.create_group(tmp_path / "theirs").create_array(
-        "it", shape=values.shape, dtype=str if name == "words" else values.dtype,
-        chunks=tuple(about["chunk_grid"]["configuration"]["chunk_shape"]),
-        fill_value=np.nan if values.dtype.kind == "f" else None,
-        compressors=(zarr.codecs.ZstdCodec(), zarr.codecs.Crc32cCodec()),
-        attributes={"units": "s"}, dimension_names=dims or None,
-    )  # fmt: skip
-    theirs[...] = values
-    held = {
-        folder: {
-            file.relative_to(tmp_path / folder / "it").as_posix(): file.read_bytes()
-            for file in (tmp_path / folder / "it").rglob("*") if file.is_file()
-        }
-        for folder in ("ours", "theirs")
-    }  # fmt: skip
-    said = [json.loads(files.pop("zarr.json")) for files in held.values()]
-    assert said[0] == said[1]
-    assert held["ours"] == held["theirs"]
-    back, back_dims = read_array(tmp_path / "theirs/it")
-    np.testing.assert_array_equal(back, values)
-    assert back_dims == dims
-    np.testing.assert_array_equal(zarr.open_group(tmp_path / "ours", mode="r")["it"][...], values)
-
-
-def test_a_changed_byte_of_an_array_is_seen_by_its_checksum(tmp_path):
-    write_array(tmp_path / "it", LONG, ["x", "y"], {})
-    file = tmp_path / "it/c/1/0"
-    file.write_bytes(bytes([file.read_bytes()[0] ^ 1]) + file.read_bytes()[1:])
-    with pytest.raises(ValueError, match="checksum"):
-        read_array(tmp_path / "it")
 
 
 def test_nothing_is_pickled_and_nothing_is_left_half_written(result, tmp_path):

@@ -10,8 +10,7 @@
 
 `folder.py`: whose folder it is, how a run begins and ends; `lock.py`, `journal.py`: one process at
 a time, and whether a file is what was written; `codec.py`: a result as arrays and JSON;
-`zarr_files.py`: files of the arrays; `result.py`: their base class; `tables.py`: tables for
-terminal, CSV and reports.
+`result.py`: their base class; `tables.py`: tables for terminal, CSV and reports.
 
 No pickle anywhere; a folder with any other content is never written to.
 """

@@ -20,6 +20,7 @@ import math
 import re
 import shutil
 import tomllib
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -34,7 +35,6 @@ from drillctl.design.validation import validated
 from drillctl.provenance import provenance
 from drillctl.store.journal import reading, writing
 from drillctl.store.json_files import replaced, write_json
-from drillctl.store.zarr_files import read_array, write_array, write_group
 
 if TYPE_CHECKING:
     import xarray
@@ -344,33 +344,64 @@ def write(result: Any, folder: Path) -> None:
 
 
 def _put_all(folder: Path, variables: dict[str, _Variable], origin: dict[str, Any]) -> None:
-    folder.mkdir(parents=True)
-    arrays = {}
-    for name, one in sorted(variables.items()):
-        stored, dims = stored_name(name), [stored_name(dim) for dim in one.dims]
-        arrays[stored] = write_array(folder / stored, one.values, dims, one.attributes)
-    write_group(folder, arrays, origin)
+    import zarr
+
+    group = zarr.create_group(folder, zarr_format=3, attributes=origin)
+    for name, one in variables.items():
+        _put(group, stored_name(name), one)
+    with warnings.catch_warnings():  # zarr and xarray read it, and warn without it
+        warnings.simplefilter("ignore")
+        zarr.consolidate_metadata(group.store)
+
+
+def _put(group: Any, name: str, one: _Variable) -> None:
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    kind, shape = one.values.dtype.kind, one.values.shape
+    array = group.create_array(
+        name,
+        shape=shape,
+        dtype=str if kind in "OU" else one.values.dtype,
+        chunks="auto" if one.values.size else tuple(max(1, n) for n in shape),
+        fill_value=np.nan if kind == "f" else None,
+        compressors=(ZstdCodec(), Crc32cCodec()),
+        attributes=one.attributes,
+        dimension_names=[stored_name(dim) for dim in one.dims],
+        config={"write_empty_chunks": True},  # a chunk that is not there is damage
+    )
+    if one.values.size:
+        array[...] = one.values
 
 
 def read(folder: Path) -> Any:
     """Read the result of a folder, whose files were compared with their journal."""
+    import zarr
+
+    with reading(folder / DATA):
+        arrays = _Arrays(folder / DATA, zarr.open_group(folder / DATA, mode="r"))
     with reading(folder / TREE):
-        return decoded(json.loads((folder / TREE).read_bytes()), _Arrays(folder / DATA))
+        return decoded(json.loads((folder / TREE).read_bytes()), arrays)
 
 
 class _Arrays(dict[str, NDArray[Any]]):
     """Arrays of a store, each read once."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, group: Any) -> None:
         super().__init__()
-        self._path = path
+        self._path, self._group = path, group
 
     def __missing__(self, name: str) -> NDArray[Any]:
         with reading(self._path / name):
-            values, dims = read_array(self._path / name)
-        if dims[-1:] == ["complex"]:
+            self[name] = self._read(name)
+        return self[name]
+
+    def _read(self, name: str) -> NDArray[Any]:
+        held = self._group[name]
+        values = np.asarray(held[...])
+        if values.dtype.kind not in "biufc":
+            values = values.astype(object)
+        if (held.metadata.dimension_names or ("",))[-1:] == ("complex",):
             values = np.asarray(values[..., 0] + 1j * values[..., 1])
-        self[name] = values
         return values
 
 
