@@ -176,7 +176,8 @@ def rows_of(text: str) -> list[list[str]]:
     if not any(re.search(r"\d,\d{3}\.\d", cell) for cell in cells) and (
         delimiter == ";" or _with_comma(cells)
     ):
-        rows = [[_with_point(cell) for cell in row] for row in rows]
+        commas = any(re.fullmatch(r"\d+,\d+", cell) for cell in cells)
+        rows = [[_with_point(cell, commas) for cell in row] for row in rows]
     elif any(re.match(r"\d*\.\d", cell) for cell in cells):  # then a comma parts thousands
         rows = [[_THOUSANDS.sub("", cell) for cell in row] for row in rows]
     return rows
@@ -191,8 +192,10 @@ def _with_comma(cells: list[str]) -> bool:
     return some and not any(re.search(r"\d\.\d", cell) for cell in cells)
 
 
-def _with_point(cell: str) -> str:
+def _with_point(cell: str, commas: bool) -> str:
     """A number with a decimal comma, and points between thousands, as it is written here."""
+    if commas and re.fullmatch(r"\d{1,3}\.\d{3}", cell):
+        return cell.replace(".", ",")  # beside decimal commas it may be either, and is refused so
     cell = re.sub(r"(?<![\d.])(\d{1,3}(?:\.\d{3})+)(?=,\d)", lambda m: m[1].replace(".", ""), cell)
     return re.sub(r"(?<=\d),(?=\d)", ".", cell)
 

@@ -165,6 +165,7 @@ def test_ways_of_writing_the_same(tmp_path, lines, same):
         ("name,length [m],OD [in],ID [in]\np,9,5,4\nJar,,5,3\n", r"line 3, column 'length \[m\]'"),
         ("name,length [m],OD [in],ID [in]\np,x,5,4\n", r"line 2, column 'length \[m\]'"),
         ('name,length [ft],OD [in],ID [in]\np,"13,360",5,4\n', "13360 or 13.360"),
+        ("name;length [m];OD [mm];ID [mm]\np;4.992;127,0;108,6\n", "4992 or 4.992"),
         ("name,length [m],OD [in],ID [in],count\np,9,5,4,some\n", "not a number of pieces"),
         (
             "name,length [m],bore [in]\np,9,4\n",
