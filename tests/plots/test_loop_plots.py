@@ -546,6 +546,9 @@ def test_no_pyplot_and_no_settings(design, analysed, gains_map, boundary):
         "plots.nichols(linear.frequency_response(d, [0.1, 0.2], 'open_loop'));"
         "plots.gain_boundary(linear.gain_boundary(d));"
         "plots.root_locus(linear.root_locus(d, 'controller.ki', [50.0, 60.0]));"
+        "plots.friction_curves(d);"
+        "short = {'simulation.duration': '1 s', 'simulation.j1_from': '0 s'};"
+        "plots.time_response(drillctl.simulate(d.replace(short), engine='batch'));"
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import subprocess
-import sys
 import warnings
 
 import matplotlib as mpl
@@ -295,22 +293,10 @@ def test_responses_of_a_map_at_rest(design):
     assert responses(made(design, np.full((6, 5), np.nan))) == []
 
 
-# --- pyplot ----------------------------------------------------------------------------------
+# --- settings ----------------------------------------------------------------------------------
 
 
-def test_no_pyplot_and_no_settings(design, field):
+def test_settings_are_left_alone(design, field):
     before = dict(mpl.rcParams)
     drawn(stability_map(made(design, field)))
     assert dict(mpl.rcParams) == before
-    script = (
-        "import sys, drillctl\n"
-        "from drillctl.plots import stability_map, sweep_line, time_response\n"
-        "run = drillctl.simulate(drillctl.load('navarro-lopez-2dof-bistable',"
-        " **{'simulation.duration': '1 s'}), engine='batch')\n"
-        "time_response(run)\n"
-        "print('matplotlib.pyplot' in sys.modules)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert done.stdout == "False\n"
