@@ -30,7 +30,7 @@ _WORDS = {
     "od": "außendurchmesser aussendurchmesser buitendiameter ad",
     "id": "innendurchmesser binnendiameter",
     "diameter": "dia diam durchmesser diamètre diametre diámetro diametro ø",
-    "length": "long längd længde länge laenge lengde lengte longueur longitud",
+    "length": "längd længde länge laenge lengde lengte longueur longitud",
     "each length": "einzellänge",
     "total length": "gesamtlänge",
     "each": "unitaire unitaria",
@@ -63,7 +63,7 @@ _COUNT = r"\b(count|qty|quantity|number|no|nos|nr|joints|jts|pieces|pcs)\b|^#$"
 _PIECES = r"\b(count|qty|quantity|joints|jts|pieces|pcs)\b"  # what no number of a line is called
 _PIPE_JOINT = r"\b(average|avg|mean|range) (joint|jt)s? (length|len)\b"
 _NAME = r"\b(name|component|item|description|tool|element|section|type|bha)\b"
-_LENGTH = r"(?:\b(length|len|footage)\b|^l$)"
+_LENGTH = r"(?:\b(length|len|footage)\b|^l(ong)?$)"
 _TOTAL = r"\b(total|sum|section) (length|len)\b|\blength total\b"
 FIELDS = {
     "not used": Field("", None, _UNUSED),

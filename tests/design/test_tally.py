@@ -490,6 +490,8 @@ def test_lengths_of_a_part_are_no_component(tmp_path):
     ("head", "field", "unit"),
     [
         ("L (ft)", "length", "ft"),
+        ("Long. (m)", "length", "m"),
+        ("Long description", "name", ""),
         ("Länge je Stück [m]", "length", "m"),
         ("Section Length (ft)", "total length", "ft"),
         ("Weight/ft", "weight", "lb/ft"),
