@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -257,7 +258,9 @@ class RootLocus:
         )
 
 
-def root_locus(design: Design, path: str, values: ArrayLike, count: int = 12) -> RootLocus:
+def root_locus(
+    design: Design, path: str, values: ArrayLike, count: int = 12, threads: int = 1
+) -> RootLocus:
     """Closed-loop poles, slope of the rock included, over values of a parameter.
 
     Parameters
@@ -270,6 +273,8 @@ def root_locus(design: Design, path: str, values: ArrayLike, count: int = 12) ->
         SI values; close enough for poles to be followed.
     count : int
         How many poles, the lowest first.
+    threads : int
+        How many values are worked on at a time.
 
     Raises
     ------
@@ -280,7 +285,10 @@ def root_locus(design: Design, path: str, values: ArrayLike, count: int = 12) ->
     points = np.atleast_1d(np.asarray(values, dtype=float))
     if points.ndim != 1 or points.size == 0:
         raise InputError("needs a list of one value or more", path)
-    rows = [_lowest(design.replace({path: units.SI(float(v))}), 2 * count) for v in points]
+    with ThreadPoolExecutor(threads) as pool:
+        rows = list(pool.map(
+            lambda v: _lowest(design.replace({path: units.SI(float(v))}), 2 * count), points
+        ))  # fmt: skip
     width = max(len(row) for row in rows)
     table = np.full((len(rows), width), np.nan, dtype=complex)
     table[0, : len(rows[0])] = rows[0]

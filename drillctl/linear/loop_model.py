@@ -287,7 +287,8 @@ def many_loop_poles(
         return np.take_along_axis(poles, order, axis=1).astype(complex)
 
     states = len(base)
-    length = max(1, STACK // states**2)
+    shares = -(-len(kp) // (4 * threads))  # so many that all threads end at about the same time
+    length = max(1, min(shares, STACK // states**2))
     parts = [np.arange(len(kp))[i : i + length] for i in range(0, len(kp), length)]
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
         poles = np.concatenate(list(pool.map(solve, parts)))

@@ -15,7 +15,7 @@ from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
 from drillctl.ensemble.grid import Axis, axes_of
 from drillctl.errors import InputError
-from drillctl.linear.boundary import WINDOW, Window, gain_boundary, root_locus
+from drillctl.linear.boundary import WINDOW, RootLocus, Window, gain_boundary, root_locus
 from drillctl.linear.ends import WeightPath, ends_of
 from drillctl.linear.loop_analysis import LoopAnalysis, loop
 from drillctl.linear.loop_margins import pole_grid
@@ -213,10 +213,15 @@ def _over_gains(design: Design, slope: float) -> Iterator[Picture]:
         yield Picture(
             "root-locus", "Poles of the loop as the proportional gain grows.",
             "Tracks of the poles in the complex plane over the proportional gain.",
-            lambda system: plots.root_locus(root_locus(design, "controller.kp", values),
-                                            system=system),
+            lambda system: plots.root_locus(_locus(design, values), system=system),
             paper=True,
         )  # fmt: skip
+
+
+def _locus(design: Design, values: Array) -> RootLocus:
+    import numba
+
+    return root_locus(design, "controller.kp", values, threads=numba.get_num_threads())
 
 
 def _window(design: Design) -> Window:

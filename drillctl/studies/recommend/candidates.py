@@ -18,7 +18,7 @@ from drillctl.linear.slope_margin import slope_margins
 from drillctl.progress import Progress
 from drillctl.rig.top_drive.law import drive_laws
 from drillctl.studies.recommend.criteria import loop_criteria, loop_figures, slope_margin_of
-from drillctl.studies.tune.linear_design import linear_design
+from drillctl.studies.tune.linear_design import linear_or_why
 from drillctl.studies.tune.problem import GainProblem
 from drillctl.studies.tune.search import Tuning, search, search_problem
 from drillctl.studies.tune.tuned import Tuned, put, string_numbers
@@ -139,13 +139,13 @@ def by_rules(design: Design) -> list[Candidate]:
 def searched(design: Design, progress: Progress) -> tuple[list[Candidate], Tuning | None]:
     """PI of the largest slope margin, and the one of the search that `drillctl tune` makes."""
     pi = pi_problem(design)
-    results = []
+    linear = linear_or_why(pi)
+    if isinstance(linear, InputError):
+        results = [Candidate(LINEAR, None, "pi", linear.problem)]
+    else:
+        results = [Candidate(LINEAR, linear.design)]
     try:
-        results.append(Candidate(LINEAR, linear_design(pi).design))
-    except InputError as error:
-        results.append(Candidate(LINEAR, None, "pi", error.problem))
-    try:
-        found = search(pi, progress)
+        found = search(pi, progress, linear=linear)
         return [*results, Candidate(ROBUST, found.design)], found
     except InputError as error:
         return [*results, Candidate(ROBUST, None, "pi", error.problem)], None

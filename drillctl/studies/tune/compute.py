@@ -25,7 +25,7 @@ from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 from drillctl.studies.tune.certificate import Certificate, FreshDraws, FreshRuns, certified
-from drillctl.studies.tune.linear_design import linear_design
+from drillctl.studies.tune.linear_design import LinearDesign, linear_or_why
 from drillctl.studies.tune.problem import PRICE, GainProblem
 from drillctl.studies.tune.search import Tuning, search, search_problem
 from drillctl.studies.tune.tuned import Tuned, by_path, spelled, tuned_parameters
@@ -170,13 +170,14 @@ def tune(
     begin = time.perf_counter()
     tuned = tuned_parameters(design)
     fresh = FreshDraws(design, tuned)  # an impossible certificate is refused before the search
-    result = search(design, progress, verbose)
+    linear = linear_or_why(design, verbose)
+    result = search(design, progress, verbose, linear)
     grid = search_problem(design, tuned) if exhaustive else None
     return Tune(
         design=design,
         tuning=result,
         certificate=certified(result.design, fresh, result.values, progress),
-        baselines=baselines(design, fresh, grid, progress),
+        baselines=baselines(design, fresh, linear, grid, progress),
         total_seconds=time.perf_counter() - begin,
     )
 
@@ -214,13 +215,14 @@ class Baseline:
 
 
 def baselines(
-    design: Design, fresh: FreshDraws, exhaustive: GainProblem | None, progress: Progress = SILENT
-) -> tuple[Baseline, ...]:
+    design: Design, fresh: FreshDraws, linear: LinearDesign | InputError,
+    exhaustive: GainProblem | None, progress: Progress = SILENT,
+) -> tuple[Baseline, ...]:  # fmt: skip
     """What the tuned gains are compared with."""
     made = [
         ("as designed", lambda: _own(design, fresh)),
         ("paper's gains", lambda: _paper(design, fresh)),
-        ("largest slope margin", lambda: _linear(design, fresh)),
+        ("largest slope margin", lambda: _linear(linear, fresh)),
         ("least nominal J1", lambda: _nominal(design, fresh)),
         *((name, lambda law=law: _law(design, law, fresh)) for name, law in OTHER_LAWS.items()),
     ]
@@ -270,8 +272,9 @@ def _law(design: Design, law: str, fresh: FreshDraws) -> Made:
     return {"law": law, **gains}, fresh.of_design(other), {}
 
 
-def _linear(design: Design, fresh: FreshDraws) -> Made:
-    result = linear_design(design)
+def _linear(result: LinearDesign | InputError, fresh: FreshDraws) -> Made:
+    if isinstance(result, InputError):
+        raise result
     return result.gains, fresh.of_gains(result.values)[1], {"slope_margin": result.slope_margin}
 
 

@@ -479,6 +479,14 @@ def linear_design(
     )
 
 
+def linear_or_why(design: Design, verbose: bool = False) -> LinearDesign | InputError:
+    """The linear design, or why there is none; once for a search and what stands beside it."""
+    try:
+        return linear_design(design, verbose=verbose)
+    except InputError as error:
+        return error
+
+
 def _message(best: LoopsState, missed: dict[str, float]) -> str:
     at = spelled(best.problem.tuned, best.values)
     if missed:

@@ -34,7 +34,7 @@ from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.store.codec import documented, label
 from drillctl.store.json_files import picked
-from drillctl.studies.tune.linear_design import linear_design
+from drillctl.studies.tune.linear_design import LinearDesign, linear_or_why
 from drillctl.studies.tune.problem import ALIKE, GainProblem, Point, alike
 from drillctl.studies.tune.tuned import (
     Tuned,
@@ -179,8 +179,11 @@ class Tuning(TunedGains):
         return {"objective": table.objective_name, "level": table.level, **figures}
 
 
-def search(design: Design, progress: Progress = SILENT, verbose: bool = False) -> Tuning:
-    """Search the gains of the least objective."""
+def search(
+    design: Design, progress: Progress = SILENT, verbose: bool = False,
+    linear: LinearDesign | InputError | None = None,
+) -> Tuning:  # fmt: skip
+    """Search the gains of the least objective; `linear`: the linear design, where it is known."""
     begin, processor = time.perf_counter(), time.process_time()
     problem = search_problem(design, tuned_parameters(design))
     stages: list[dict[str, Any]] = []
@@ -201,7 +204,9 @@ def search(design: Design, progress: Progress = SILENT, verbose: bool = False) -
         })  # fmt: skip
 
     progress.begin("tuning", len(RACE) + 2)
-    known = [one for one in (problem.own(design), _linear(design, verbose)) if one is not None]
+    linear = linear or linear_or_why(design, verbose)
+    asked = (problem.own(design), getattr(linear, "values", None))
+    known = [one for one in asked if one is not None]
     best = optimum(problem, known, NEAR, problem.table.starts, note)
     missed = problem.violations(best)
     return Tuning(
@@ -225,14 +230,6 @@ def search_problem(design: Design, tuned: tuple[Tuned, ...]) -> GainProblem:
     if design.tables.simulation.step is None:
         design = design.replace({"simulation.accuracy": "fast"})
     return GainProblem(design, tuned)
-
-
-def _linear(design: Design, verbose: bool) -> Array | None:
-    """Gains of the linear design, where it knows what is tuned."""
-    try:
-        return linear_design(design, verbose=verbose).values
-    except InputError:
-        return None
 
 
 def _message(problem: GainProblem, best: Point, missed: dict[str, float]) -> str:
