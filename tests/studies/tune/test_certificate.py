@@ -288,9 +288,9 @@ def test_its_section_of_a_report_holds_its_message_tables_and_pictures(found, tm
                 SECTIONS["tuning"].build(gathered)
             continue
         blocks = SECTIONS["tuning"].build(gathered)
-    assert units.told(found.message, "si") in {
-        block.text for block in blocks if isinstance(block, Text)
-    }
+    message = units.told(found.message, "si")
+    sentences = {block.text for block in blocks if isinstance(block, Text)}
+    assert message[0].upper() + message[1:] in sentences
     tables = {block.name: block for block in blocks if isinstance(block, Table)}
     assert set(tables) - {"verge"} == {"tolerance", "baselines"}
     assert tables["tolerance"].rows[0][:2] == (
