@@ -198,6 +198,13 @@ def test_what_is_kept_is_told_with_its_numbers(result):
         assert all(detail(one, criterion) for criterion in one.criteria)
 
 
+def test_a_rock_that_does_not_fall_is_no_number_of_times(result):
+    one = result.recommended
+    reserve = next(c for c in one.criteria if c.name == "slope_reserve")
+    assert detail(one, replace(reserve, value=math.inf)) == "the rock does not fall"
+    assert "times" in detail(one, reserve)
+
+
 def test_a_report_asks_for_the_margins_too():
     design = drillctl.load("monteiro-trindade-140kn")
 

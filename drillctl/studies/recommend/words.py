@@ -196,7 +196,7 @@ def detail(one: Assessed, criterion: Criterion) -> str:
     if criterion.name == "probability":
         return f"it is {chance(one.probability, one.interval)} of {len(one.j1)} draws"
     return {
-        "slope_reserve": f"{value:.3g} times",
+        "slope_reserve": f"{value:.3g} times" if math.isfinite(value) else "the rock does not fall",
         "peak_sensitivity": f"{value:.3g}",
         "delay": f"it bears {1e3 * value:.3g} ms, {1e3 * limit:.3g} ms asked",
         "j1": f"J1 {units.full(value, 's', 3)}",
