@@ -319,7 +319,7 @@ class TopDriveTable(Table):
         """A ratio as it stands on a plate, `7.2:1`."""
         first, _, second = value.partition(":") if isinstance(value, str) else ("", "", "")
         whole = second.strip() == "1" and units.bare(first)
-        return units.parse(f"{first} 1/s", units.RATE) if whole else value
+        return float(units.pointed(first)) if whole else value
 
     @property
     def at_pipe(self) -> float:
