@@ -191,6 +191,9 @@ _FEET_AND_INCHES = re.compile(
 _SPACED = re.compile(r"^\s*[-+]?\d{1,3}(?:[ \u00a0\u202f'\u2019]\d{3})+(?![\d/])")
 _POINTS = re.compile(r"^\s*[-+]?\d{1,3}(?:\.\d{3})+,\d+")
 _COMMAS = re.compile(r"^\s*[-+]?\d{1,3}((?:,\d{3})+)(\.\d+)?(?![\d,])")
+_SUPERSCRIPTS = re.compile("[\u207b\u00b9\u00b2\u00b3\u2070\u2074-\u2079]+")
+_EXPONENT = re.compile(r"(?:\^|\*\*)\s*[-+]?\d(?![\d.])")
+_NUMBER_BUT_ONE = re.compile(r"(?!1\b)\b\d")
 _POWER = re.compile(r"\b((?:[kcmd]?m)|in|ft|s)([234])\b")
 
 
@@ -249,12 +252,24 @@ def _joined(unit: str, kind: Kind) -> str:
     return re.sub(r"\bt\b", "tf", re.sub(r"\b(k?)lbs?\b", r"\1lbf", unit))
 
 
+def _computable(name: str) -> str:
+    """A unit with its powers as `^`; refused (`ValueError`) if a number or a power is raised.
+
+    pint computes in whole numbers as long as they may become: `9^9^9` would take hours.
+    """
+    text = _SUPERSCRIPTS.sub(lambda m: "^" + normalize("NFKC", m[0]).replace("\u2212", "-"), name)
+    plain, powers = _EXPONENT.subn("", text)
+    if "^" in plain or "**" in plain or (powers and _NUMBER_BUT_ONE.search(plain)):
+        raise ValueError(name)
+    return text
+
+
 def _by_pint(unit: str, name: str, kind: Kind) -> float:
     import pint
 
     units = registry()
     try:
-        measure = units.Quantity(1.0, _POWER.sub(r"\1^\2", name))
+        measure = units.Quantity(1.0, _POWER.sub(r"\1^\2", _computable(name)))
         return float(measure.to(kind.si).magnitude)
     except pint.DimensionalityError as error:
         raise InputError(

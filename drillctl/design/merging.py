@@ -79,13 +79,19 @@ DEFAULT = {"law": "pi"}  # of a design that names no controller
 def _without_gains(base: Tree) -> Tree:
     """Without axes and bounds of search over gains, which another drive law does not have."""
     result = dict(base)
-    if any(_is_gain(axis.get("path")) for axis in base.get("map", {}).get("axes", ())):
-        result["map"] = {key: value for key, value in base["map"].items() if key != "axes"}
-    bounds = base.get("tune", {}).get("parameters", {})
+    chart, search = _table(base.get("map")), _table(base.get("tune"))
+    axes, bounds = chart.get("axes"), _table(search.get("parameters"))
+    if isinstance(axes, list) and any(_is_gain(_table(axis).get("path")) for axis in axes):
+        result["map"] = {key: value for key, value in chart.items() if key != "axes"}
     if any(map(_is_gain, bounds)):
         left = {path: value for path, value in bounds.items() if not _is_gain(path)}
-        result["tune"] = {**base["tune"], "parameters": left}
+        result["tune"] = {**search, "parameters": left}
     return result
+
+
+def _table(value: object) -> Mapping[str, Any]:
+    """A table; of anything else, which validation reports, an empty one."""
+    return value if isinstance(value, Mapping) else {}
 
 
 def _is_gain(path: object) -> bool:

@@ -24,6 +24,7 @@ from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.top_drive.real_drive import MEMORY, SAMPLED_MEMORY
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight, FollowingSpeed
 from drillctl.simulation.lanes import Start, single_lane
+from drillctl.simulation.room import longer
 
 if TYPE_CHECKING:
     from drillctl.design import Design
@@ -288,19 +289,11 @@ def _run(e: Any, task: Any, state: Array, phases: tuple[int, int], rock: Array) 
             raise SimulationError(f"{what} at {memory.now[0]:g} s")
         if not np.isfinite(memory.state).all():
             raise SimulationError(f"the motion is no longer finite at {memory.now[0]:g} s")
+        time = float(memory.now[0])
         memory = memory._replace(
-            tape=_longer(memory.tape, int(memory.count[2])),
-            events=_longer(memory.events, int(memory.count[3])),
+            tape=longer(memory.tape, int(memory.count[2]), time),
+            events=longer(memory.events, int(memory.count[3]), time),
         )
-
-
-def _longer(table: Array, used: int) -> Array:
-    """A table twice as long where it is nearly full."""
-    if used + 8 < len(table) - 2000 or (used + 8 < len(table) and len(table) < 8000):
-        return table
-    more = np.zeros((2 * len(table), table.shape[1]))
-    more[: len(table)] = table
-    return more
 
 
 # The batch engine.

@@ -27,6 +27,7 @@ from drillctl.rig.top_drive import RealDrive, SampledDrive
 from drillctl.rig.weight_on_bit import PATHS, AlarmWeight, ObservedWeight
 from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.measures import EnergyAudit, Event
+from drillctl.simulation.room import longer
 
 STEPS = 1_000  # steps from one look at an interruption to the next: some milliseconds
 ROOM = 1 << 13  # steps that a tape has room for at first
@@ -231,22 +232,15 @@ def _with_room(numbers: Numbers, clock: Any) -> Any:
     """Tables twice as long where they are nearly full."""
     from drillctl.simulation import reference_run as r
 
-    def longer(table: Array, used: int) -> Array:
-        if used + 2 < len(table):
-            return table
-        more = np.empty((2 * len(table), table.shape[1]))
-        more[: len(table)] = table
-        return more
-
-    count, arrays = clock.count, numbers.arrays
-    arrays["tape"] = longer(arrays["tape"], int(numbers.rig["steps"][0]))
+    count, arrays, time = clock.count, numbers.arrays, float(clock.now[r.TIME])
+    arrays["tape"] = longer(arrays["tape"], int(numbers.rig["steps"][0]), time)
     numbers.rig["tape"] = arrays["tape"].ctypes.data
     return clock._replace(
         room=len(arrays["tape"]),
-        pieces=longer(clock.pieces, count[r.PIECES]),
-        changes=longer(clock.changes, count[r.CHANGES]),
-        crossings=longer(clock.crossings, count[r.CROSSINGS]),
-        extremes=longer(clock.extremes, count[r.EXTREMES]),
+        pieces=longer(clock.pieces, int(count[r.PIECES]), time),
+        changes=longer(clock.changes, int(count[r.CHANGES]), time),
+        crossings=longer(clock.crossings, int(count[r.CROSSINGS]), time),
+        extremes=longer(clock.extremes, int(count[r.EXTREMES]), time),
     )
 
 

@@ -797,6 +797,20 @@ def test_damage_over_a_damaged_model(name, data, scratch):
     assert_design_or_one_line(lambda: drillctl.load(scratch / "over.toml"))
 
 
+@pytest.mark.parametrize(
+    "below",
+    [{"map": []}, {"map": {"axes": 1}}, {"map": {"axes": [1]}}, {"tune": 1},
+     {"tune": {"parameters": [1]}}],
+)  # fmt: skip
+def test_another_law_over_a_model_whose_tables_are_none(tmp_path, below):
+    model = SHIPPED_TREES["navarro-lopez-2dof"] | below
+    (tmp_path / "model.toml").write_text(tomli_w.dumps(model), encoding="utf-8")
+    over = 'model = "model.toml"\n[controller]\nlaw = "pi"\nkp = 1.0\nki = 1.0\n'
+    (tmp_path / "over.toml").write_text(over, encoding="utf-8")
+    with pytest.raises(InputError, match=next(iter(below))):
+        drillctl.load(tmp_path / "over.toml")
+
+
 PATHS = sorted({p.path for name in SHIPPED_TREES for p in parameters(drillctl.load(name))})
 
 

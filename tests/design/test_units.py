@@ -304,6 +304,24 @@ def test_any_text_is_a_number_or_an_input_error(value, kind):
 
 
 @pytest.mark.parametrize(
+    "unit",
+    ["2^9", "9^9^9", "9**9 m", "(9)^9 m", "m^9^99", "9\u2079\u2079\u2079 m", "9^(9^9)", "1e9^9 m"],
+)
+def test_no_number_is_raised_to_a_power(unit):
+    """Some would be computed for hours, in gigabytes."""
+    with pytest.raises(InputError, match="not a known unit"):
+        units.parse(f"5 {unit}", units.LENGTH)
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind"), [("s^-1", units.RATE), ("s\u207b\u00b9", units.RATE), ("1/s**1", units.RATE),
+                       ("kg*(m/s)^2*s\u00b2", units.INERTIA), ("kg m\u00b2", units.INERTIA)],
+)  # fmt: skip
+def test_units_are_raised_to_powers_however_they_are_written(unit, kind):
+    assert units.parse(f"5 {unit}", kind) == pytest.approx(5.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(
     ("si_unit", "system", "per_unit", "name"),
     [
         ("rad/s", "si", RPM, "rpm"),

@@ -7,6 +7,7 @@ from scipy.integrate import DOP853
 import drillctl
 from benchmarks.peers.reference import solver as peer
 from drillctl.design import Design
+from drillctl.errors import SimulationError
 from drillctl.simulation import reference
 from drillctl.simulation import reference_run as run
 from drillctl.simulation.reference import numbers_of, solve, solve_whole
@@ -316,6 +317,13 @@ def test_periodic_orbit_with_a_little_damping():
     assert (releases[-1] - releases[-5]) / 4 == pytest.approx(22.3036, abs=1e-3)
     run = sample(motion)
     assert run.signals["bit_speed"][run.time > 350].max() == pytest.approx(26.119, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["monteiro-trindade-140kn", "richard-detournay-2dof"])
+def test_a_run_that_keeps_more_than_there_is_room_for_is_refused(monkeypatch, name):
+    monkeypatch.setattr("drillctl.simulation.room.LARGEST", 1 << 20)
+    with pytest.raises(SimulationError, match=r"^\d{4,} steps by \d.* s of the run, more than"):
+        drillctl.simulate(drillctl.load(name, **{"simulation.duration": "1000 s"}), "reference")
 
 
 def test_a_bit_that_cannot_be_freed_is_stalled():
