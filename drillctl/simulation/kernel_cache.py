@@ -98,9 +98,15 @@ class _Cache(FunctionCache):
     _impl_class = _Entries
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What is kept for a signature; None if it is damaged, and it is dropped."""
+        """What is kept for a signature; None if it is damaged, and it is dropped.
+
+        Two processes that keep different signatures at the same moment may write the same file.
+        """
         try:
-            return super().load_overload(sig, target_context)
+            kept = super().load_overload(sig, target_context)
+            if kept is None or kept.signature.args == normalize_signature(sig)[0]:
+                return kept
+            _notes.info("%s is kept for other types and is compiled again", self._name)
         except Exception as error:  # whatever unpickling damaged bytes may raise
             _notes.info("%s is damaged and is compiled again (%r)", self._name, error)
             self._dropped()

@@ -113,6 +113,19 @@ def test_a_damaged_entry_is_compiled_again(tmp_path, monkeypatch, caplog, kind, 
     assert kept_in(tmp_path, monkeypatch) == (0, 1)
 
 
+def test_what_is_kept_for_other_types_is_compiled_again(tmp_path, monkeypatch):
+    """As two processes leave it that keep their first functions at the same moment."""
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path))
+    kept = kernel_cache.njit(twice)
+    assert (kept(2), kept(2.5)) == (4.0, 5.0)
+    whole, broken = sorted(tmp_path.rglob("*.nbc"))
+    for over, other in ((broken, whole), (whole, broken)):
+        over.write_bytes(other.read_bytes())
+        again = kernel_cache.njit(twice)
+        assert (again(2), again(2.5)) == (4.0, 5.0)
+        assert sum(again.stats.cache_misses.values()) == 1
+
+
 def test_without_a_writable_folder_functions_are_kept_among_temporary_files(tmp_path, monkeypatch):
     nowhere = kernel_cache._Entries._locator_classes[-1:]
     monkeypatch.setattr(kernel_cache._Entries, "_locator_classes", nowhere)
