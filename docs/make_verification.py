@@ -23,7 +23,7 @@ def held(root: Path = ROOT) -> dict[tuple[str, str], list[str]]:
     for path in sorted((root / "tests").rglob("test_*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "HOLDS":
-                for row in ast.literal_eval(node.value):
+                for row in ast.literal_eval(node.value).items():
                     found.setdefault(row, []).append(path.relative_to(root).as_posix())
     return found
 

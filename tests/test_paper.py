@@ -7,12 +7,9 @@ import drillctl
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies import Sweep
 
-HOLDS = (
-    (
-        "the paper's map",
-        "cells and bounds per level, minimum, statements 1-3",
-    ),
-)
+HOLDS = {
+    "the paper's map": "cells and bounds per level, minimum, statements 1-3",
+}
 
 CELLS = {20: 10, 30: 49, 33: 59, 40: 78, 50: 94}
 BOUNDS = {

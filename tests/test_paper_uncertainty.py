@@ -12,12 +12,9 @@ import drillctl
 from drillctl.design import axis_tables
 from drillctl.studies.uncertainty.compute import uncertainty
 
-HOLDS = (
-    (
-        "the paper's Fig. 6",
-        "statements 4 and 5; independently computed areas and best gains",
-    ),
-)
+HOLDS = {
+    "the paper's Fig. 6": "statements 4 and 5; independently computed areas and best gains",
+}
 
 KP, KI = "controller.kp", "controller.ki"
 

@@ -18,12 +18,9 @@ import drillctl
 from drillctl import catalog
 from drillctl.errors import SimulationError
 
-HOLDS = (
-    (
-        "resumed runs",
-        "the same bits after an interruption and a kill",
-    ),
-)
+HOLDS = {
+    "resumed runs": "the same bits after an interruption and a kill",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 BISTABLE = "navarro-lopez-2dof-bistable"

@@ -15,13 +15,10 @@ from drillctl.cli import run
 from drillctl.errors import InputError
 from drillctl.studies.tune import compute
 
-HOLDS = (
-    (
-        "the command `tune`",
-        "messages and exit codes; the tuned design in `simulate` and `map`; IPOPT in a "
-        "process of its own",
-    ),
-)
+HOLDS = {
+    "the command `tune`": "messages and exit codes; the tuned design in `simulate` and `map`; "
+    "IPOPT in a process of its own",
+}
 
 SHIPPED = "robust-gains-140kn"
 SMALL = [

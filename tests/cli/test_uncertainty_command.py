@@ -25,12 +25,9 @@ from drillctl.ensemble import running as cluster_module
 from drillctl.errors import InputError
 from drillctl.studies.uncertainty import indices
 
-HOLDS = (
-    (
-        "runs under uncertainty",
-        "killed, interrupted, extended, disk full: the same bits",
-    ),
-)
+HOLDS = {
+    "runs under uncertainty": "killed, interrupted, extended, disk full: the same bits",
+}
 
 PAPER = "monteiro-trindade-140kn"
 AXES = ["--axis", "controller.kp=500:700:3", "--axis", "controller.ki=100:150:2"]

@@ -22,12 +22,9 @@ from drillctl.design.reading import parse_axis, to_tree
 from drillctl.errors import InputError
 from drillctl.text import one_line
 
-HOLDS = (
-    (
-        "design files",
-        "round trip, every kind of mistake, fuzzing",
-    ),
-)
+HOLDS = {
+    "design files": "round trip, every kind of mistake, fuzzing",
+}
 
 PAPER = "monteiro-trindade-140kn"
 

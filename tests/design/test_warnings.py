@@ -11,12 +11,10 @@ from drillctl.cli import run
 from drillctl.linear import loop
 from drillctl.rig.drillstring.frequencies import followed
 
-HOLDS = (
-    (
-        "warnings of a design",
-        "sticks of the reference solver on a light bit; the key of each clears it",
-    ),
-)
+HOLDS = {
+    "warnings of a design": "sticks of the reference solver on a light bit; the key of each "
+    "clears it",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

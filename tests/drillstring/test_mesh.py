@@ -8,13 +8,10 @@ from drillctl import catalog
 from drillctl.design import parts
 from drillctl.rig.drillstring.frequencies import natural_frequencies
 
-HOLDS = (
-    (
-        "elements where a design names none",
-        "the first five frequencies of the exact line to 0.3 %, top free and held; inertia, "
-        "compliance and damping of lumped pieces kept",
-    ),
-)
+HOLDS = {
+    "elements where a design names none": "the first five frequencies of the exact line to 0.3 %, "
+    "top free and held; inertia, compliance and damping of lumped pieces kept",
+}
 
 ENDS = """
 [operating_point]

@@ -13,12 +13,9 @@ from hypothesis import strategies as st
 import drillctl
 from drillctl.rig.bit_rock import NavarroLopezSuarez, WeightTable
 
-HOLDS = (
-    (
-        "friction",
-        "Table 1, slopes against differences, CasADi",
-    ),
-)
+HOLDS = {
+    "friction": "Table 1, slopes against differences, CasADi",
+}
 
 RPM = 2 * math.pi / 60
 

@@ -24,13 +24,10 @@ from drillctl.simulation.reference_rates import (
 )
 from drillctl.simulation.run import sample
 
-HOLDS = (
-    (
-        "printed three-branch friction",
-        "the set it stands in for: J1 within 1e-5, difference proportional to the tolerance; "
-        "energy; an integrator that knows no edges; Radau",
-    ),
-)
+HOLDS = {
+    "printed three-branch friction": "the set it stands in for: J1 within 1e-5, difference "
+    "proportional to the tolerance; energy; an integrator that knows no edges; Radau",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 LAW = "printed-three-branch"

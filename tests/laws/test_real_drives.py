@@ -16,13 +16,10 @@ from drillctl.linear.loop_model import loop_poles, model_poles, pade
 from drillctl.linear.tuning import active_damping, pipe_impedance, stick_slip_frequency
 from drillctl.rig.top_drive import PI, RealDrive, SampledDrive
 
-HOLDS = (
-    (
-        "real drives",
-        "impedances against states; limits kept; sampling to zero with order 1; the ideal law "
-        "at infinite limits",
-    ),
-)
+HOLDS = {
+    "real drives": "impedances against states; limits kept; sampling to zero with order 1; the "
+    "ideal law at infinite limits",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 SLOPE = 290.0746971030263

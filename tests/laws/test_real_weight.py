@@ -14,12 +14,10 @@ from drillctl.linear.loop_model import model_poles
 from drillctl.linear.observer import observer
 from drillctl.rig.weight_on_bit import AlarmWeight, FollowingSpeed, ObservedWeight, RealWeight
 
-HOLDS = (
-    (
-        "weight on its way",
-        "order 2; a pure delay sample by sample; delay margin against poles that cross",
-    ),
-)
+HOLDS = {
+    "weight on its way": "order 2; a pure delay sample by sample; delay margin against poles that "
+    "cross",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 SLOPE = 290.0746971030263

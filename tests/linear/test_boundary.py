@@ -11,12 +11,10 @@ from drillctl.errors import InputError
 from drillctl.linear import ends_of, gain_boundary, slope_margin, slope_margins
 from drillctl.linear.loop_model import loop_poles, many_loop_poles
 
-HOLDS = (
-    (
-        "boundary of the stable gains",
-        "eigenvalue mask of 200 x 200 gains; D* on the curve to 1e-8; Routh",
-    ),
-)
+HOLDS = {
+    "boundary of the stable gains": "eigenvalue mask of 200 x 200 gains; D* on the curve to 1e-8; "
+    "Routh",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 

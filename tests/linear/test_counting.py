@@ -15,12 +15,10 @@ from drillctl import catalog
 from drillctl.rig.drillstring import Section, assemble
 from drillctl.rig.drillstring.frequencies import natural_frequencies
 
-HOLDS = (
-    (
-        "natural frequencies by counting",
-        "dense eigenvalues, closed forms to 1e-10, pairs 1e-9 apart, 2,000 elements",
-    ),
-)
+HOLDS = {
+    "natural frequencies by counting": "dense eigenvalues, closed forms to 1e-10, pairs 1e-9 "
+    "apart, 2,000 elements",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

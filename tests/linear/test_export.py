@@ -11,12 +11,9 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.linear.export import nonlinear_system, write_matrices
 
-HOLDS = (
-    (
-        "exported models",
-        "the models themselves; linearisation and motion of the regularised loop",
-    ),
-)
+HOLDS = {
+    "exported models": "the models themselves; linearisation and motion of the regularised loop",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 

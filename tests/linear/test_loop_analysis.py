@@ -27,18 +27,13 @@ from drillctl.studies.loop import STUDY
 from drillctl.studies.loop import _margins as margin_rows
 from drillctl.studies.loop.compute import loop_pictures
 
-HOLDS = (
-    (
-        "disk margins, delay margin",
-        "`control.disk_margins`; poles of a delayed loop; 30 against 400 elements",
-    ),
-    (
-        "mesh-limited figures",
-        "2 damped elements beside the exact string, that beside 300 elements to 1e-4; poles of the "
-        "exact string beside those of 400 elements",
-    ),
-    ("the loop of a limited drive", "that of the ideal one, every figure"),
-)
+HOLDS = {
+    "disk margins, delay margin": "`control.disk_margins`; poles of a delayed loop; 30 against "
+    "400 elements",
+    "mesh-limited figures": "2 damped elements beside the exact string, that beside 300 elements "
+    "to 1e-4; poles of the exact string beside those of 400 elements",
+    "the loop of a limited drive": "that of the ideal one, every figure",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

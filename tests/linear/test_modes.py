@@ -15,24 +15,13 @@ from drillctl.linear import modes
 from drillctl.rig.drillstring import Section, assemble
 from drillctl.studies.modes import pictures
 
-HOLDS = (
-    (
-        "frequencies, top held and both ends free",
-        "exact transcendental roots; order 2 in the element length",
-    ),
-    (
-        "first mode",
-        "openTorsion, 1e-6",
-    ),
-    (
-        "two-section string",
-        "Aarsnes & Shor (2018) Well A",
-    ),
-    (
-        "overdamped and non-classical strings",
-        "eigenvalues of the companion matrix",
-    ),
-)
+HOLDS = {
+    "frequencies, top held and both ends free": "exact transcendental roots; order 2 in the "
+    "element length",
+    "first mode": "openTorsion, 1e-6",
+    "two-section string": "Aarsnes & Shor (2018) Well A",
+    "overdamped and non-classical strings": "eigenvalues of the companion matrix",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

@@ -15,12 +15,9 @@ import drillctl
 from drillctl.linear import closed_loop, open_loop, plant
 from drillctl.linear.state_space import closed_loop_matrices, plant_matrices
 
-HOLDS = (
-    (
-        "plant",
-        "banded frequency response, 1e-10; signs",
-    ),
-)
+HOLDS = {
+    "plant": "banded frequency response, 1e-10; signs",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

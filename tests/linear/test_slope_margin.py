@@ -19,13 +19,10 @@ from drillctl.linear.state_space import closed_loop_matrices
 from drillctl.rig.drillstring import Section, assemble
 from drillctl.rig.drillstring.frequencies import natural_frequencies
 
-HOLDS = (
-    (
-        "slope margin D*",
-        "eigenvalue crossing by bisection: 1e-8 for low modes (30, 100, 400 elements), 1e-4 "
-        "for high ones; Hurwitz",
-    ),
-)
+HOLDS = {
+    "slope margin D*": "eigenvalue crossing by bisection: 1e-8 for low modes (30, 100, 400 "
+    "elements), 1e-4 for high ones; Hurwitz",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

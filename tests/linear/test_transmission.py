@@ -17,12 +17,10 @@ from drillctl.linear.state_space import closed_loop_matrices, plant_matrices
 from drillctl.linear.transmission import Lines
 from drillctl.rig.drillstring import Section, assemble
 
-HOLDS = (
-    (
-        "string as transmission lines",
-        "dense M, C, K on nine strings, 1e-10; hand-written cot and csc; order 2 to the continuum",
-    ),
-)
+HOLDS = {
+    "string as transmission lines": "dense M, C, K on nine strings, 1e-10; hand-written cot and "
+    "csc; order 2 to the continuum",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"

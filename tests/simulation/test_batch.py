@@ -21,24 +21,12 @@ from drillctl.simulation.batch import measures_of, prepare, run_batch
 from drillctl.simulation.lanes import lane_numbers, lanes_of, single_lane
 from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
 
-HOLDS = (
-    (
-        "batch engine",
-        "the same six runs: 3e-4 at 20 ms, 2e-5 at 5 ms; order 2",
-    ),
-    (
-        "lanes given up",
-        "the whole lanes until then; any company",
-    ),
-    (
-        "both engines",
-        "lumped, distributed, unequal dampers, dampers to ground, every start",
-    ),
-    (
-        "bits",
-        "any order, company, block width and number of threads",
-    ),
-)
+HOLDS = {
+    "batch engine": "the same six runs: 3e-4 at 20 ms, 2e-5 at 5 ms; order 2",
+    "lanes given up": "the whole lanes until then; any company",
+    "both engines": "lumped, distributed, unequal dampers, dampers to ground, every start",
+    "bits": "any order, company, block width and number of threads",
+}
 
 SETTLED = [row for row in EVENT_ACCURATE if row[0] >= 600]
 

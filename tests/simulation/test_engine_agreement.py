@@ -19,12 +19,9 @@ import pytest
 
 import drillctl
 
-HOLDS = (
-    (
-        "laws with a memory",
-        "both engines over random rigs and 24 combinations of laws",
-    ),
-)
+HOLDS = {
+    "laws with a memory": "both engines over random rigs and 24 combinations of laws",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 ROCKS = {

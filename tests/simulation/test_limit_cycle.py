@@ -27,12 +27,10 @@ from drillctl.simulation.limit_cycle.returns import take_returns
 from drillctl.simulation.reference import solve_whole
 from drillctl.simulation.reference_rates import BIT_SPEED
 
-HOLDS = (
-    (
-        "exact cycles",
-        "event-accurate flow followed until it repeats to 1e-8; monodromy against differences",
-    ),
-)
+HOLDS = {
+    "exact cycles": "event-accurate flow followed until it repeats to 1e-8; monodromy against "
+    "differences",
+}
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 LITTLE_DAMPING = {"drillstring.sections.pipe.stiffness_damping": "1 ms"}

@@ -9,12 +9,9 @@ from drillctl.design.tables import AxisTable
 from drillctl.ensemble.grid import axes_of, groups
 from drillctl.simulation.batch import prepare, run_batch
 
-HOLDS = (
-    (
-        "kernels",
-        "the same scheme in plain NumPy, J1 to 1e-12",
-    ),
-)
+HOLDS = {
+    "kernels": "the same scheme in plain NumPy, J1 to 1e-12",
+}
 
 KP, KI = np.linspace(150.0, 900.0, 6), np.linspace(20.0, 400.0, 5)
 

@@ -25,12 +25,9 @@ from drillctl.simulation.kernels.vectors import emitted, put
 from drillctl.simulation.lanes import Start
 from drillctl.simulation.propagator import string_step
 
-HOLDS = (
-    (
-        "steps of the string",
-        "matrix exponential, any viscous damping",
-    ),
-)
+HOLDS = {
+    "steps of the string": "matrix exponential, any viscous damping",
+}
 
 numba = pytest.importorskip("numba")
 STEP = 0.02

@@ -14,16 +14,11 @@ from drillctl.simulation.reference import numbers_of, solve, solve_whole
 from drillctl.simulation.reference_steps import explicit_dense_output, tableau
 from drillctl.simulation.run import sample
 
-HOLDS = (
-    (
-        "reference solver",
-        "event-accurate values of six runs, J1 to 1e-5; energy to 1e-8; another integrator",
-    ),
-    (
-        "lumped string",
-        "two published equilibria, bistability, period 5.092533 s",
-    ),
-)
+HOLDS = {
+    "reference solver": "event-accurate values of six runs, J1 to 1e-5; energy to 1e-8; another "
+    "integrator",
+    "lumped string": "two published equilibria, bistability, period 5.092533 s",
+}
 
 # Kp, Ki, WOB (kN), J1 (s), time stuck (s), peak bit speed (rad/s): computed once with another
 # program (LSODA at 1e-9 with located events), to the digits given.

@@ -11,12 +11,9 @@ from drillctl import units
 from drillctl.errors import InputError
 from drillctl.rig.program import NONE, Ramp
 
-HOLDS = (
-    (
-        "programs",
-        "both engines; jumps cost no order",
-    ),
-)
+HOLDS = {
+    "programs": "both engines; jumps cost no order",
+}
 
 DESIGN = "monteiro-trindade-140kn"
 FIXED = {"bit_rock": {"law": "navarro-lopez-suarez", "a1": 0.026, "a2": 0.085, "beta": 0.098}}

@@ -45,13 +45,11 @@ from drillctl.studies.advantage.compute import advantage, chart, delay_curve
 from drillctl.studies.compare.compute import compare
 from drillctl.studies.tune.search import search
 
-HOLDS = (
-    (
-        "constant against dynamic weight, each tuned",
-        "a weight that may not follow is the constant one to the bit; equal means by runs of "
-        "`compare`; the search itself; crossing delays by hand; the shipped case (slow)",
-    ),
-)
+HOLDS = {
+    "constant against dynamic weight, each tuned": "a weight that may not follow is the constant "
+    "one to the bit; equal means by runs of `compare`; the search itself; crossing delays by "
+    "hand; the shipped case (slow)",
+}
 
 SHIPPED = "pi-vs-pi-dynamic-wob"
 SMALL = {

@@ -17,13 +17,11 @@ from drillctl.errors import InputError
 from drillctl.simulation.batch import prepare, trace
 from drillctl.studies.compare.compute import ALONE, COMPARED, case_designs, compare
 
-HOLDS = (
-    (
-        "comparison of cases",
-        "J1 of the weight-on-bit law; a case against itself; `scipy.stats.bootstrap`, "
-        "binomial tails; weight from traces; maps and responses those of `map` and `simulate`",
-    ),
-)
+HOLDS = {
+    "comparison of cases": "J1 of the weight-on-bit law; a case against itself; "
+    "`scipy.stats.bootstrap`, binomial tails; weight from traces; maps and responses those of "
+    "`map` and `simulate`",
+}
 
 SHIPPED = "pi-vs-dynamic-wob-140kn"
 PAPER = "monteiro-trindade-140kn"

@@ -27,12 +27,10 @@ DEFAULT_PATHS = {
 }
 
 
-HOLDS = (
-    (
-        "draws of uncertain parameters",
-        "moments and quantiles in closed form and by SciPy; the same draw for any number of them",
-    ),
-)
+HOLDS = {
+    "draws of uncertain parameters": "moments and quantiles in closed form and by SciPy; the same "
+    "draw for any number of them",
+}
 
 PAPER = "monteiro-trindade-140kn"
 A1 = "bit_rock.a1_factor"

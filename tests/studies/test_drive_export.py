@@ -28,13 +28,10 @@ from drillctl.simulation.reference import solve
 from drillctl.simulation.run import sample
 from drillctl.studies.export.compute import export
 
-HOLDS = (
-    (
-        "exported drive law",
-        "C compiled and structured text run from its tree, 60 s in the loop: torque to 1e-9 up to "
-        "the first stick, J1 to 1e-6",
-    ),
-)
+HOLDS = {
+    "exported drive law": "C compiled and structured text run from its tree, 60 s in the loop: "
+    "torque to 1e-9 up to the first stick, J1 to 1e-6",
+}
 
 PERIOD = 0.02
 EVERYTHING = {

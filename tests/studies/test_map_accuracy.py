@@ -17,12 +17,9 @@ from drillctl.ensemble.grid import axes_of, groups
 from drillctl.simulation.batch import prepare, run_batch
 from drillctl.simulation.scheme import PROMISES
 
-HOLDS = (
-    (
-        "accuracies",
-        "event-accurate cells of the paper's map; the whole map at 0.5 ms",
-    ),
-)
+HOLDS = {
+    "accuracies": "event-accurate cells of the paper's map; the whole map at 0.5 ms",
+}
 
 PATH = Path(__file__).parents[1] / "data" / "paper_map_sample.json"
 KNOWN = json.loads(PATH.read_text(encoding="utf-8"))

@@ -14,13 +14,11 @@ from drillctl.progress import Within
 from drillctl.simulation.run import SIGNALS
 from drillctl.studies.compare.compute import NO_MAPS, case_designs, compare
 
-HOLDS = (
-    (
-        "comparison of cases",
-        "J1 of the weight-on-bit law; a case against itself; `scipy.stats.bootstrap`, "
-        "binomial tails; weight from traces; maps and responses those of `map` and `simulate`",
-    ),
-)
+HOLDS = {
+    "comparison of cases": "J1 of the weight-on-bit law; a case against itself; "
+    "`scipy.stats.bootstrap`, binomial tails; weight from traces; maps and responses those of "
+    "`map` and `simulate`",
+}
 
 SHIPPED = "pi-vs-dynamic-wob-140kn"
 PAPER = "monteiro-trindade-140kn"

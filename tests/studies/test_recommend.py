@@ -47,13 +47,10 @@ from drillctl.studies.recommend.words import (
 from drillctl.studies.tune.certificate import FreshDraws
 from drillctl.studies.tune.search import search
 
-HOLDS = (
-    (
-        "recommended settings",
-        "the search of `tune`, and probabilities by its certificate, to the last bit; windows by "
-        "single runs at both sides of their ends; criteria and ranks by hand",
-    ),
-)
+HOLDS = {
+    "recommended settings": "the search of `tune`, and probabilities by its certificate, to the "
+    "last bit; windows by single runs at both sides of their ends; criteria and ranks by hand",
+}
 SMALL = {
     "tune": {
         "realizations": 24, "starts": 1, "probability": 0.7, "certificate": {"realizations": 120},

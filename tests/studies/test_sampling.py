@@ -13,13 +13,10 @@ from drillctl.errors import InputError
 from drillctl.studies import weight_delay
 from drillctl.studies.compare.compute import compare
 
-HOLDS = (
-    (
-        "samplings and correlations",
-        "pieces of one sequence, strata of every replicate, correlation of 40,000 draws, "
-        "truncated and beta laws by SciPy",
-    ),
-)
+HOLDS = {
+    "samplings and correlations": "pieces of one sequence, strata of every replicate, correlation "
+    "of 40,000 draws, truncated and beta laws by SciPy",
+}
 
 PAPER = "monteiro-trindade-140kn"
 A1, A2, WEIGHT = "bit_rock.a1_factor", "bit_rock.a2_factor", "operating_point.weight_on_bit"

@@ -16,13 +16,10 @@ from drillctl.studies.schedule.strings import Along
 from drillctl.studies.tune.search import search_problem
 from drillctl.studies.tune.tuned import tuned_parameters
 
-HOLDS = (
-    (
-        "gains over depth",
-        "periods, integral gain and reflection of gains from 0.8 of each depth against the "
-        "characteristic equation of a uniform pipe, to 0.1 %",
-    ),
-)
+HOLDS = {
+    "gains over depth": "periods, integral gain and reflection of gains from 0.8 of each depth "
+    "against the characteristic equation of a uniform pipe, to 0.1 %",
+}
 LINE = {
     "operating_point.weight_on_bit": "140 kN",
     "schedule.law": "soft-torque",

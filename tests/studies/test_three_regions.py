@@ -22,12 +22,9 @@ from drillctl.studies import sweep
 from drillctl.studies.three_regions import compute as attraction
 from drillctl.studies.three_regions.compute import FIELDS, MASKS, three_regions
 
-HOLDS = (
-    (
-        "three regions",
-        "eigenvalues, reference solver, published bistability",
-    ),
-)
+HOLDS = {
+    "three regions": "eigenvalues, reference solver, published bistability",
+}
 
 LONG = {"simulation.duration": "200 s"}
 

@@ -30,13 +30,10 @@ from drillctl.studies.uncertainty.best import (
 from drillctl.studies.uncertainty.best import values_of as values_of_all
 from drillctl.studies.uncertainty.result import convergence, level_of, look, schedule
 
-HOLDS = (
-    (
-        "intervals under uncertainty",
-        "the binomial law, exactly, n 10 to 10,000; coverage of areas, quantiles and best "
-        "cells on made-up draws",
-    ),
-)
+HOLDS = {
+    "intervals under uncertainty": "the binomial law, exactly, n 10 to 10,000; coverage of areas, "
+    "quantiles and best cells on made-up draws",
+}
 
 ALONE = Scatter(1)
 NONE = np.zeros((1, 1), dtype=bool)

@@ -21,13 +21,10 @@ from drillctl.simulation.lanes import single_lane
 from drillctl.simulation.measures import STATUSES
 from drillctl.studies.uncertainty.compute import uncertainty
 
-HOLDS = (
-    (
-        "realizations over a map",
-        "each lane the design it stands for, to the bit; blocks, threads, draws that fail; "
-        "Ishigami's indices",
-    ),
-)
+HOLDS = {
+    "realizations over a map": "each lane the design it stands for, to the bit; blocks, threads, "
+    "draws that fail; Ishigami's indices",
+}
 
 A1, A2, WEIGHT = "bit_rock.a1_factor", "bit_rock.a2_factor", "operating_point.weight_on_bit"
 LENGTH, INERTIA = "drillstring.sections.pipe.length", "bha.inertia"

@@ -20,12 +20,9 @@ from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError, SimulationError
 from drillctl.studies.uncertainty.compute import uncertainty
 
-HOLDS = (
-    (
-        "clusters",
-        "two worker processes, one killed half-way: the same bits",
-    ),
-)
+HOLDS = {
+    "clusters": "two worker processes, one killed half-way: the same bits",
+}
 
 distributed = pytest.importorskip("distributed")
 

@@ -20,13 +20,10 @@ from drillctl.studies import weight_delay
 from drillctl.studies.compare.compute import compare
 from drillctl.studies.delay.compute import following_design, lasting
 
-HOLDS = (
-    (
-        "weight on bit against its delay",
-        "runs of `simulate`, in both engines; differences and intervals of `compare`; limits "
-        "by hand",
-    ),
-)
+HOLDS = {
+    "weight on bit against its delay": "runs of `simulate`, in both engines; differences and "
+    "intervals of `compare`; limits by hand",
+}
 
 SHIPPED = "dynamic-wob-delay-140kn"
 SMOOTH = {"controller.kp": 625.0, "controller.ki": 125.0}

@@ -31,13 +31,10 @@ from drillctl.studies.tune.linear_design import linear_design
 from drillctl.studies.tune.search import search
 from drillctl.studies.tune.tuned import put, tuned_parameters
 
-HOLDS = (
-    (
-        "certificate of gains",
-        "runs of `compare` at the same draws, to the last bit; tolerances by their ends; 40 "
-        "tunes against 20,000 further draws each (slow)",
-    ),
-)
+HOLDS = {
+    "certificate of gains": "runs of `compare` at the same draws, to the last bit; tolerances by "
+    "their ends; 40 tunes against 20,000 further draws each (slow)",
+}
 
 PAPER = "monteiro-trindade-140kn"
 WINDOW = {"controller.kp": {"min": 400, "max": 800}, "controller.ki": {"min": 0, "max": 200}}

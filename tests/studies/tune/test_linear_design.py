@@ -12,13 +12,10 @@ from drillctl.studies.tune.loops import least_seen, loops_of
 from drillctl.studies.tune.settings import TuneConstraintsTable
 from drillctl.studies.tune.tuned import by_path, tuned_parameters
 
-HOLDS = (
-    (
-        "linear design",
-        "maps and grids of the slope margin, figures of `drillctl.loop`; derivatives of D* "
-        "against differences",
-    ),
-)
+HOLDS = {
+    "linear design": "maps and grids of the slope margin, figures of `drillctl.loop`; derivatives "
+    "of D* against differences",
+}
 
 PAPER = "monteiro-trindade-140kn"
 DAMPED = {"drillstring.sections.pipe.stiffness_damping": "1 ms"}

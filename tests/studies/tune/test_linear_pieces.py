@@ -30,13 +30,10 @@ from drillctl.studies.tune.tuned import (
     tuned_parameters,
 )
 
-HOLDS = (
-    (
-        "linear design",
-        "maps and grids of the slope margin, figures of `drillctl.loop`; derivatives of D* "
-        "against differences",
-    ),
-)
+HOLDS = {
+    "linear design": "maps and grids of the slope margin, figures of `drillctl.loop`; derivatives "
+    "of D* against differences",
+}
 
 PAPER = "monteiro-trindade-140kn"
 DAMPED = {"drillstring.sections.pipe.stiffness_damping": "1 ms"}

@@ -13,13 +13,10 @@ from drillctl.studies.tune.problem import GainProblem, GainRuns
 from drillctl.studies.tune.search import optimum, polished, search, search_problem
 from drillctl.studies.tune.tuned import put, tuned_parameters
 
-HOLDS = (
-    (
-        "search of gains",
-        "runs of `compare`, to the last bit; an exhaustive grid, within 1 % from a tenth of "
-        "its trajectories (slow)",
-    ),
-)
+HOLDS = {
+    "search of gains": "runs of `compare`, to the last bit; an exhaustive grid, within 1 % from a "
+    "tenth of its trajectories (slow)",
+}
 
 PAPER = "monteiro-trindade-140kn"
 WINDOW = {"controller.kp": {"min": 400, "max": 800}, "controller.ki": {"min": 0, "max": 200}}
