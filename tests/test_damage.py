@@ -421,7 +421,7 @@ def test_a_failure_leaves_no_folder(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("drillctl.ensemble.running.run_batch", fail)
     assert run(["map", *KINDS["map"], "--out", str(tmp_path / "new/run")]) == 1
     assert "overflow" in capsys.readouterr().err
-    assert not list((tmp_path / "new").iterdir())
+    assert not list(tmp_path.iterdir())
 
 
 @contextlib.contextmanager
@@ -494,7 +494,8 @@ def test_two_processes_and_twenty_kills_on_one_folder(tmp_path):
         told = [process.communicate()[1] for process in both]
         for process, text in zip(both, told, strict=True):
             assert process.returncode in (0, 2, -signal.SIGKILL), text
-            assert process.returncode != 2 or "is in use by process" in text
+            # by process N; by another process as long as that one has not signed yet
+            assert process.returncode != 2 or "is in use by" in text
         blocks = len(list((tmp_path / "run/blocks/map").glob("[0-9]*.npz")))
         assert blocks >= done or (tmp_path / "run/summary.json").exists()
         done = blocks

@@ -299,11 +299,19 @@ def test_default_folders_are_never_shared(design, tmp_path, monkeypatch):
     assert [path.name[-5:] for path in paths] == ["map-1", "map-2", "map-3"]
 
 
-def test_discard_takes_back_only_its_own(design, tmp_path):
+def test_discard_takes_back_only_its_own(design, tmp_path, monkeypatch):
     folder = claim("map", design, tmp_path / "new")
     folder.discard()
     assert not (tmp_path / "new").exists()
     (tmp_path / "old").mkdir()
+    monkeypatch.chdir(tmp_path / "old")
+    claim("map", design, None).discard()
+    for place in ("old/a/b/c", "old/a"):
+        claim("map", design, tmp_path / place).discard()
+    with pytest.raises(InputError, match="too long"):
+        claim("map", dataclasses.replace(design, name="x" * 300), None)
+    assert [path.name for path in tmp_path.iterdir()] == ["old"]
+    assert not list((tmp_path / "old").iterdir())
     folder = claim("map", design, tmp_path / "old")
     (tmp_path / "old/notes.txt").write_text("")
     folder.discard()

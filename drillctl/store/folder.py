@@ -264,8 +264,8 @@ class RunFolder:
         None for a finished run where nothing can be written.
     shown : Path
         The folder as it was named.
-    made : bool
-        Whether this run created the folder.
+    made : tuple of Path
+        Folders that this run created: its own, then those above it; empty if it was there.
     """
 
     path: Path
@@ -274,7 +274,7 @@ class RunFolder:
     about: dict[str, Any]
     lock: FolderLock | None
     shown: Path
-    made: bool = False
+    made: tuple[Path, ...] = ()
 
     def __enter__(self) -> Self:
         """Nothing: it is held already."""
@@ -375,10 +375,27 @@ class RunFolder:
                 shutil.rmtree(self.path / name, ignore_errors=True)
             for name in (DESIGN, RUN, SUMMARY, TREE, NAME):
                 (self.path / name).unlink(missing_ok=True)
-            if self.made:
-                with suppress(OSError):  # something else was added meanwhile
-                    self.path.rmdir()
+            _take_back(self.made[:1])  # while it is held
         self.release()
+        _take_back(self.made[1:])
+
+
+@contextmanager
+def _made(path: Path) -> Iterator[tuple[Path, ...]]:
+    """Create a folder and those above it; yields which, and takes them back if nothing is begun."""
+    new = tuple(one for one in (path, *path.parents) if not one.exists())
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        yield new
+    except BaseException:
+        _take_back(new)
+        raise
+
+
+def _take_back(folders: tuple[Path, ...]) -> None:
+    for path in folders:
+        with suppress(OSError):  # something else was added meanwhile
+            path.rmdir()
 
 
 def _is_old(name: str, names: set[str]) -> bool:
@@ -435,20 +452,19 @@ def claim(
     }  # fmt: skip
     if growing is not None:
         about["count"] = growing.count
-    path = given = Path(RUNS) / f"{design.name}-{verb}-*" if folder is None else Path(folder)
+    given = Path(RUNS) / f"{design.name}-{verb}-*" if folder is None else Path(folder)
     try:
         if folder is None:
-            path, given, own = _fresh(verb, design)
-            return _begun(RunFolder(path, verb, False, about, own, given, made=True), design)
+            return _fresh(design, about)
         path = resolved(folder)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lock = _locked(path, given)
-        try:
-            return _claimed(path, given, lock, about, design, same, allow_other_machine)
-        except BaseException:
-            if lock is not None:
-                lock.release()
-            raise
+        with _made(path.parent) as above:
+            lock = _locked(path, given)
+            try:
+                return _claimed(path, given, lock, about, design, same, allow_other_machine, above)
+            except BaseException:
+                if lock is not None:
+                    lock.release()
+                raise
     except StoreError:
         raise
     except OSError as error:
@@ -467,11 +483,11 @@ def _locked(path: Path, given: Path) -> FolderLock | None:
 
 def _claimed(
     path: Path, given: Path, lock: FolderLock | None, about: dict[str, Any], design: Design,
-    same: Design, allow_other_machine: bool,
+    same: Design, allow_other_machine: bool, above: tuple[Path, ...],
 ) -> RunFolder:  # fmt: skip
     if path.exists() and not path.is_dir():
         raise InputError("is a file, not a folder", f"--out {given}")
-    made = not path.exists()
+    made = () if path.exists() else (path, *above)
     if not made and not _empty(path):
         run = _same_run(path, given, lock, about, same, allow_other_machine)
         return run if run.finished else _begun(run, design)
@@ -494,17 +510,18 @@ def _begun(run: RunFolder, design: Design) -> RunFolder:
     return run
 
 
-def _fresh(verb: str, design: Design) -> tuple[Path, Path, FolderLock]:
-    """Create a new folder; at once, so that no other process takes the same name."""
-    name = re.sub("/|::+", "-", design.name)
-    for number in itertools.count(1):
-        given = Path(RUNS) / f"{name}-{verb}-{number}"
-        path = resolved(given, f"the name {design.name!r}")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with suppress(FileExistsError):
-            path.mkdir()
-            break
-    return path, given, FolderLock(path, str(given))
+def _fresh(design: Design, about: dict[str, Any]) -> RunFolder:
+    """A new folder; created at once, so that no other process takes the same name."""
+    name, verb = re.sub("/|::+", "-", design.name), about["verb"]
+    with _made(resolved(RUNS)) as above:
+        for number in itertools.count(1):
+            given = Path(RUNS) / f"{name}-{verb}-{number}"
+            path = resolved(given, f"the name {design.name!r}")
+            with suppress(FileExistsError):
+                path.mkdir()
+                break
+        own = FolderLock(path, str(given))
+        return _begun(RunFolder(path, verb, False, about, own, given, (path, *above)), design)
 
 
 def _empty(path: Path) -> bool:
