@@ -21,7 +21,7 @@ from drillctl import units
 from drillctl.arrays import Array, Index
 from drillctl.design import Design
 from drillctl.ensemble.cases import Runs, resampled_draws
-from drillctl.ensemble.grid import SHARED
+from drillctl.ensemble.grid import SHARED, refuse_more_bytes
 from drillctl.ensemble.parameters import Draws, draw
 from drillctl.ensemble.running import measured
 from drillctl.errors import InputError
@@ -60,6 +60,16 @@ class DrawnLanes:
     # the possible ones; a single group unless a draw changes the string or a law's type
     groups: tuple[DrawnGroup, ...]
     failures: tuple[Failures, ...]  # the impossible ones
+
+
+BYTES_PER_DRAW = 2_500
+"""Memory that the lane of a draw takes while it is made, beside all others."""
+
+
+def draw_all(design: Design, count: int, seed: int) -> Draws:
+    """Draws to run side by side; refused (`InputError`) if memory falls short."""
+    refuse_more_bytes(BYTES_PER_DRAW * count, f"{count:,} draws", "uncertain")
+    return draw(design, count, seed)
 
 
 def drawn_lanes(design: Design, draws: Draws) -> DrawnLanes:
@@ -268,11 +278,11 @@ class CommonDraws:
 
     def values(self, design: Design) -> dict[str, Array]:
         """Values of the uncertain parameters of a design by path (SI)."""
-        return draw(design, self.count, self.seed).values
+        return draw_all(design, self.count, self.seed).values
 
     def lanes(self, design: Design) -> DrawnLanes:
         """Lanes of a design at these draws."""
-        return drawn_lanes(design, draw(design, self.count, self.seed))
+        return drawn_lanes(design, draw_all(design, self.count, self.seed))
 
     def run(self, design: Design, shift: float = 0.0) -> Runs:
         """A design at these draws, its nominal weight shifted (N)."""

@@ -29,9 +29,16 @@ from drillctl.ensemble.cases import (
     scheme_of,
     share_of,
 )
-from drillctl.ensemble.draws import DrawnGroup, DrawnLanes, Failures, drawn_lanes, run_draws
+from drillctl.ensemble.draws import (
+    DrawnGroup,
+    DrawnLanes,
+    Failures,
+    draw_all,
+    drawn_lanes,
+    run_draws,
+)
 from drillctl.ensemble.grid import refuse_too_large
-from drillctl.ensemble.parameters import Draws, draw, refuse_dependent, uncertain_parameters
+from drillctl.ensemble.parameters import Draws, refuse_dependent, uncertain_parameters
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.lanes import Lanes
@@ -284,7 +291,7 @@ def weight_delay(
     table, count = design.tables.weight_delay, design.tables.uncertainty.realizations
     refuse_too_large([len(table.gains), len(table.delays), count], "weight_delay")
     following = following_design(design)
-    draws = draw(following, count, design.tables.uncertainty.seed)
+    draws = draw_all(following, count, design.tables.uncertainty.seed)
     lanes = delayed_lanes(following, draws, np.array(table.delays))
     alone = delayed_lanes(following, draws, np.array(table.delays[:1]))
     progress.begin("simulating delays", count * len(table.delays) * len(table.gains))

@@ -28,8 +28,7 @@ import numpy as np
 
 from drillctl.arrays import Array, Index
 from drillctl.design import Design, parameter
-from drillctl.ensemble.draws import DrawnGroup, Failures, drawn_lanes
-from drillctl.ensemble.parameters import draw
+from drillctl.ensemble.draws import DrawnGroup, Failures, draw_all, drawn_lanes
 from drillctl.ensemble.running import measured
 from drillctl.errors import InputError
 from drillctl.linear.operating_point import at_speed
@@ -75,7 +74,7 @@ class GainRuns:
         self, design: Design, tuned: tuple[Tuned, ...], realizations: int, seed: int
     ) -> None:
         self.design, self.tuned = middle(design, tuned), tuned
-        self.draws = draw(self.design, realizations, seed)
+        self.draws = draw_all(self.design, realizations, seed)
         self.trajectories = 0
         self._at_once = _at_once(self.design, tuned)
         drawn = drawn_lanes(self.design, self.draws)
