@@ -91,6 +91,7 @@ def test_a_worker_may_be_killed_half_way(client):
 
 @pytest.mark.slow
 def test_a_scheduler_is_found_by_its_address(client):
+    client.wait_for_workers(2, timeout=60)  # one that was killed takes a second to come back
     with connect(client.scheduler.address) as other:
         assert len(other.nthreads()) == 2
 
