@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Iterator
@@ -72,9 +74,32 @@ def _terminated_as_interrupted() -> Iterator[list[int]]:
         return
     before = signal.signal(signal.SIGTERM, stop)
     try:
-        yield came
+        with _dropped_ones_again(came):
+            yield came
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _dropped_ones_again(terminations: list[int]) -> Iterator[None]:
+    """Let an interruption come again that Python drops, as it does those within a finaliser."""
+    before, due = sys.unraisablehook, []
+
+    def hook(dropped: Any) -> None:
+        if not issubclass(dropped.exc_type, KeyboardInterrupt):
+            before(dropped)
+            return
+        number = signal.SIGTERM if terminations else signal.SIGINT
+        due.append(threading.Timer(0.01, _thread.interrupt_main, [number]))  # not within this hook
+        due[-1].start()
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        for timer in due:
+            timer.cancel()
+        sys.unraisablehook = before
 
 
 def _outcome(arguments: list[str]) -> tuple[int, str]:

@@ -853,6 +853,27 @@ def test_interrupted_by_a_signal():
     assert "Traceback" not in err
 
 
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interruption_within_a_finaliser_is_not_lost(number, code, call, monkeypatch):
+    class Last:
+        def __del__(self):
+            signal.raise_signal(number)
+
+    def endless(*given, **named):
+        Last()
+        began = time.monotonic()
+        while time.monotonic() < began + 20.0:
+            time.sleep(0.001)
+
+    monkeypatch.setattr("drillctl.simulation.run.simulate", endless)
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert call("simulate", BISTABLE, "--out", "cut")[:2] == (code, "")
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert not Path("cut").exists()
+
+
 # --- what surrounds a command -----------------------------------------------------------------
 
 
