@@ -64,7 +64,8 @@ def _drilling(design: Design) -> Iterator[Range]:
     yield Range(WEIGHT, "weight on bit", "N", low if low > 0.0 else 0.0, most, weight,
                 "Force on the bit. More of it means more friction and stick-slip.")  # fmt: skip
     speed = design.speed
-    yield Range(SPEED, "set speed", "rad/s", _round(0.3 * speed), _round(2.5 * speed), speed,
+    slowest = min(speed, _round(0.3 * speed))
+    yield Range(SPEED, "set speed", "rad/s", slowest, _round(2.5 * speed), speed,
                 "Speed that the top drive is set to. A faster bit sticks less.")  # fmt: skip
     try:
         depth, least = depth_of(design), under_top(design)

@@ -117,10 +117,10 @@ def readouts(
 
 
 def _text(value: Any, unit: str, system: units.System) -> str:
-    if value is None:
-        return "none"
     if isinstance(value, str):
         return value.replace("_", " ")
+    if value is None or math.isnan(value):
+        return "none"
     if math.isinf(value):
         return "any"
     return f"{units.displayed(value, unit, system)[0] + 0.0:.5g}"  # no -0

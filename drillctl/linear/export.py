@@ -23,6 +23,7 @@ from drillctl.linear.state_space import (
     plant_matrices,
     state_names,
 )
+from drillctl.rig.bit_rock import contact
 from drillctl.rig.weight_on_bit import PATHS
 
 if TYPE_CHECKING:
@@ -38,27 +39,32 @@ def nonlinear_system(design: Design, width: float = WIDTH) -> control.NonlinearI
     python-control integrates smooth systems, and set-valued friction is not one: here the
     torque of the law is multiplied by tanh(bit speed / width). A bit that should stand still
     creeps instead, and J1 shifts by several per cent (by up to half of it for wide ones). For
-    results use `drillctl.simulate`, which regularises nothing.
+    results use `drillctl.simulate`, which regularises nothing. The input `weight_on_bit` is the
+    weight at the set speed of the design, about which one that follows the bit speed moves.
     """
     import control
 
     # A limited drive would be integrated without its limits.
     ideal = design.top_drive is design.linear_drive and design.simple_drive
-    if not ideal or isinstance(design.weight_on_bit, PATHS):
+    if not ideal or isinstance(design.weight_on_bit, PATHS) or design.wall or design.axial:
         raise InputError(
-            "takes an ideal drive and a weight that acts at once; use drillctl.simulate", "law"
+            "takes an ideal drive, a weight that acts at once, a rock without memory and a well "
+            "without friction; use drillctl.simulate",
+            "law",
         )
     if not (0.0 < width < np.inf):
         raise InputError(f"must be more than 0 rad/s, got {width:g}", "width")
     matrices = plant_matrices(design.sliding_string)
     drive, friction = design.linear_drive, design.bit_rock
+    moved: Any = design.weight_on_bit
     strings = len(matrices.a)
     top, bit = matrices.c[0], matrices.c[1]
     _, ki = drive.gains()
 
     def torques(state: Array, inputs: Array) -> tuple[float, float]:
-        speed, weight = float(bit @ state[:strings]), float(inputs[1])
-        torque, _ = friction.torque_and_slope(weight, abs(speed), np.exp)
+        speed = float(bit @ state[:strings])
+        weight = type(moved)(float(inputs[1]), *moved[1:])  # first of both laws: that at set speed
+        torque, _ = contact(friction, weight, abs(speed), np.exp)
         angle = -float(state[-1]) if ki != 0.0 else 0.0
         error = float(top @ state[:strings]) - float(inputs[0])
         return float(drive.torque(angle, error)), float(torque) * float(np.tanh(speed / width))

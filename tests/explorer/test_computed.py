@@ -108,6 +108,13 @@ def test_the_table_has_each_number_under_its_name(design):
     assert told == {"ends as": ["", run.status, None], "settles in": ["", "none", None]}
 
 
+def test_a_loop_that_is_unstable_without_any_slope_tolerates_none():
+    *_, last = computed.loop(drillctl.load("torque-limited-140kn"))
+    assert np.isnan(last.slope_margin)
+    rows = form.readouts([None], [last], "si")
+    assert ["slope tolerated", "", "none"] in rows
+
+
 def test_the_share_of_rocks_is_that_of_uncertainty(design):
     small = design.replace({"map.axes": [one | {"points": 4} for one in AXES]})
     parts = list(computed.probability(small, axes_of(small), 30.0, 9))

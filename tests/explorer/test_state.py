@@ -95,6 +95,11 @@ def test_another_axis_keeps_what_stood_at_the_cross(base, first):
     assert ends.axes[1][1:3] == ("100 kN", "150 kN")
 
 
+def test_the_range_of_a_slow_speed_holds_it(base):
+    slow = controls.ranges(base.replace({controls.SPEED: "3 rpm"}))[controls.SPEED]
+    assert slow.low <= slow.value < slow.high
+
+
 def test_impossible_requests_are_refused(base, first):
     for request in (
         {"do": "set", "path": WEIGHT, "value": -5},

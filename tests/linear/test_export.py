@@ -32,16 +32,20 @@ def test_nonlinear_system_settles_as_the_simulation_does():
     np.testing.assert_allclose(bit, exact.signals["bit_speed"], atol=1e-5)
 
 
-def test_nonlinear_system_linearises_to_the_loop():
-    design = drillctl.load(DESIGN)
+@pytest.mark.parametrize(
+    "law", [{"law": "constant"}, {"law": "navarro-lopez-suarez", "gain": "4 kN*s/rad"}]
+)
+def test_nonlinear_system_linearises_to_the_loop(law):
+    weight = 130e3  # between rows of the friction table, where its slope over the weight breaks
+    design = drillctl.load(DESIGN, weight_on_bit=law, operating_point={"weight_on_bit": "130 kN"})
     system = nonlinear_system(design)
     steady = np.zeros(system.nstates)
-    torque = float(design.bit_rock.torque_and_slope(140e3, design.speed, np.exp)[0])
+    torque = float(design.bit_rock.torque_and_slope(weight, design.speed, np.exp)[0])
     string = design.string
     steady[: string.nodes - 1] = torque / string.element_stiffness
     steady[string.nodes - 1 : -1] = design.speed
     steady[-1] = torque / design.top_drive.ki
-    at = [design.speed, 140e3]
+    at = [design.speed, weight]
     assert np.abs(system.dynamics(0.0, steady, at)).max() < 1e-9
     linear = system.linearize(steady, at)
     expected = drillctl.loop(design).poles
@@ -51,6 +55,12 @@ def test_nonlinear_system_linearises_to_the_loop():
     assert far.max() < 1e-3
     assert {"set_speed", "weight_on_bit"} == set(system.input_labels)
     assert system.state_labels[-1] == "integral"
+
+
+@pytest.mark.parametrize("name", ["well-a-off-bottom", "richard-detournay-2dof"])
+def test_what_the_nonlinear_system_would_leave_out_is_refused(name):
+    with pytest.raises(InputError, match="a rock without memory and a well without friction"):
+        nonlinear_system(drillctl.load(name))
 
 
 def test_it_says_that_it_is_regularised():

@@ -381,6 +381,11 @@ def test_a_constant_torque_and_a_gear():
     assert "command := torque_0;" in export(constant).text()
 
 
+def test_off_bottom_a_kilonewton_metre_is_one_per_unit():
+    design = drillctl.load("wob-rpm-chart", **{"operating_point.weight_on_bit": "0 N"})
+    assert export(design, per_unit=True).rated == (1e3, design.speed)
+
+
 def test_an_unknown_format_is_refused():
     with pytest.raises(InputError, match="structured-text, plcopen"):
         export(rig(), "ladder")

@@ -57,7 +57,7 @@ class Export(Result, kind="export"):
         own, drive, design = self.design.tables.export, self.drive, self.design
         steady = torque_at_set_speed(design.tables)
         steady += float(design.string.ground_damping.sum()) * design.speed
-        torque = own.rated_torque or (drive.most if math.isfinite(drive.most) else steady)
+        torque = own.rated_torque or (drive.most if math.isfinite(drive.most) else steady or 1e3)
         speed = own.rated_speed or (1.0 / drive.slowness if drive.slowness > 0.0 else design.speed)
         return float(torque), float(speed)
 
