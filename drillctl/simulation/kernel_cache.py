@@ -29,7 +29,8 @@ _notes = logging.getLogger(__name__)
 
 def njit(function: Any, cache: bool = True, **options: Any) -> Any:
     """`numba.njit` of a function."""
-    made: Any = numba.njit(**options)(function)
+    # Nothing compiled calls it by an address of its own: `cfunc` is for that.
+    made: Any = numba.njit(**{"no_cfunc_wrapper": True} | options)(function)
     if cache:
         made._cache = _cache_of(function)
     return made

@@ -32,6 +32,7 @@ from drillctl.simulation import kernel_cache
 from drillctl.simulation import reference_wall as wall
 from drillctl.simulation.law_calls import (
     CALL,
+    INNER,
     OPTIONS,
     STATE,
     compiled,
@@ -41,7 +42,7 @@ from drillctl.simulation.law_calls import (
     version,
 )
 
-shown = numba.njit(nogil=True, _nrt=True, **OPTIONS)
+shown = numba.njit(nogil=True, _nrt=True, **INNER)
 """Decorator of what returns an array, which numba does not compile without counting."""
 
 STUCK, CREEPING, PUSHED, FORWARD_EDGE, BACKWARD_EDGE = 0, 2, 3, 4, 5
