@@ -322,7 +322,8 @@ def test_every_verb_on_every_design(call, name):
         if verb == "compare" and name == "six-drives-100kn":
             # From 70 rpm their torque is at its peak at once, and falls to half of it in a step.
             for case in ("Z-torque, a = 0.5", "torsional rectification"):
-                note += f"{case}: audit: check: the step is too long for peak top torque\n"
+                note += f"{case}: audit: check: the step is too long for peak top torque, "
+                note += "peak drive power\n"
         note += "".join(f"warning: {one}\n" for one in drillctl.load(name).warnings)
         assert (code, err) == (0, f"{note}results: runs/{name}-{verb}-1\n")
         assert parsed(out)
