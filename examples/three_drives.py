@@ -11,13 +11,13 @@ from pathlib import Path
 
 import drillctl
 from drillctl.linear import drive_impedance
-from drillctl.linear.tuning import soft_torque, stick_slip_frequency, stiff_speed
+from drillctl.linear.tuning import soft_torque, stiff_speed
 
 
 def main(folder: Path) -> None:
     """Print how much of a wave each drive sends back at the stick-slip frequency; draw both."""
     design = drillctl.load("monteiro-trindade-140kn")
-    at = stick_slip_frequency(design.string) / (2.0 * math.pi)
+    at = design.string.stick_slip_frequency / (2.0 * math.pi)
     gains = {
         "stiff speed control": stiff_speed(design.string),
         "soft torque, P = 4 zeta": soft_torque(design.string),

@@ -195,7 +195,7 @@ def loop(design: Design) -> Iterator[Loop]:
     from drillctl.linear.ends import bit_side, ends_of
     from drillctl.linear.loop_analysis import tolerated_slope
     from drillctl.linear.loop_margins import margins
-    from drillctl.linear.loop_model import loop_poles, model_poles
+    from drillctl.linear.loop_model import poles_of
     from drillctl.linear.operating_point import operating_point
     from drillctl.linear.response import frequency_response, telling_frequencies
     from drillctl.studies.loop.compute import smooth_loop
@@ -210,11 +210,10 @@ def loop(design: Design) -> Iterator[Loop]:
     curve = frequency_response(design, frequency, "open_loop", slope=bit.slope, path=path)
     result = Loop(drive, curve.between("speed_error", "top_speed"), point.slope, tolerated, None)
     yield result
-    ends, gains = ends_of(string), design.linear_drive.gains()
-    simple = design.simple_loop
-    poles = loop_poles(string, *gains, point.slope) if simple else model_poles(design, bit)
+    poles = poles_of(design, bit)
     curve = smooth_loop(design, poles, bit.slope, path)
-    at_top = margins(ends, design.linear_drive, bit, poles) if result.stable else None
+    ends, drive_law = ends_of(string), design.linear_drive
+    at_top = margins(ends, drive_law, bit, poles) if result.stable else None
     yield replace(result, loop=curve.between("speed_error", "top_speed"), margins=at_top)
 
 

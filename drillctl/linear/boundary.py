@@ -30,7 +30,7 @@ from drillctl.arrays import Array, ComplexArray, Mask, runs
 from drillctl.design import Design, parameter
 from drillctl.errors import InputError
 from drillctl.linear.ends import Ends, Route, bit_side, ends_of, telling_grid
-from drillctl.linear.loop_model import loop_poles, model_poles
+from drillctl.linear.loop_model import poles_of
 from drillctl.linear.operating_point import at_speed, operating_point
 from drillctl.linear.slope_margin import slope_margins
 from drillctl.store.codec import documented, label
@@ -299,9 +299,7 @@ def root_locus(
 
 def _lowest(design: Design, count: int) -> ComplexArray:
     point = operating_point(design)
-    if design.simple_loop:
-        return loop_poles(design.sliding_string, *design.linear_drive.gains(), point.slope)[:count]
-    return model_poles(design, bit_side(design, point.slope, point.speed))[:count]
+    return poles_of(design, bit_side(design, point.slope, point.speed))[:count]
 
 
 def _followed(before: ComplexArray, now: ComplexArray, width: int) -> ComplexArray:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from drillctl.design import Design
 from drillctl.errors import InputError, nearest
 from drillctl.linear.modal import Expansion
 from drillctl.linear.observer import Observer, observer_of
-from drillctl.linear.transmission import Banded, EndMobility, Lines
+from drillctl.linear.transmission import Banded, FromMobility, Lines
 from drillctl.rig.bit_rock.law import by_weight
 from drillctl.rig.drillstring import Drillstring, Parts
 from drillctl.rig.drillstring.frequencies import Model, natural_frequencies
@@ -35,29 +35,8 @@ WAVE_MODES = 40  # modes of a continuum that are computed; there are infinitely 
 BETWEEN = 24  # frequencies between two neighbouring natural frequencies
 
 
-class Ends(Protocol):
-    """A string that gives the speeds of its ends per torque on them."""
-
-    @property
-    def parts(self) -> Parts:
-        """Sections and ends."""
-        ...
-
-    def mobility(
-        self, s: ComplexArray, top: ComplexArray | complex = 0.0, bit: ComplexArray | complex = 0.0
-    ) -> EndMobility:
-        """Response at complex frequencies `s` (1/s) with impedances added at the ends."""
-        ...
-
-    def bit_impedance(self, s: ComplexArray, top: ComplexArray | complex = 0.0) -> ComplexArray:
-        """Torque per speed at the bit (N m s/rad), with `top` added at the drive."""
-        ...
-
-    def top_impedance(self, s: ComplexArray, bit: ComplexArray | complex = 0.0) -> ComplexArray:
-        """Torque per speed at the top (N m s/rad), with `bit` added at the rock."""
-        ...
-
-
+Ends = Lines | FromMobility
+"""A string that gives the speeds of its ends per torque on them."""
 Route = Literal["finite-elements", "wave", "matrices"]
 """How a string is computed: as its elements, as the continuum, or by solving M, C and K."""
 ROUTES = ("finite-elements", "wave", "matrices")
@@ -119,16 +98,7 @@ def telling_grid(ends: Ends) -> Array:
 @functools.lru_cache(maxsize=64)
 def _grid_of(parts: Parts, model: Model, count: int) -> Array:
     """The same for maps of loops on one string, made once; not to be written to."""
-    marks = np.unique(
-        np.concatenate(
-            [
-                natural_frequencies(parts, model, count, top, bit)
-                for top in (False, True)
-                for bit in (False, True)
-            ]
-        )
-    )
-    marks = marks[marks > 0.0]
+    marks = marks_of(parts, model, count)
     apart = np.concatenate([[True], np.diff(marks) > 1e-13 * marks[1:]])
     marks = np.append(marks[apart], 3.0 * marks[-1])
     share = 0.5 * (1.0 - np.cos(np.pi * (np.arange(BETWEEN) + 0.5) / BETWEEN))
@@ -137,6 +107,17 @@ def _grid_of(parts: Parts, model: Model, count: int) -> Array:
     grid = np.unique(np.concatenate([slow, inner]))
     grid.flags.writeable = False
     return grid
+
+
+def marks_of(parts: Parts, model: Model, count: int) -> Array:
+    """Natural frequencies (rad/s) but zero, each end free or held."""
+    every = [
+        natural_frequencies(parts, model, count, top, bit)
+        for top in (False, True)
+        for bit in (False, True)
+    ]
+    marks = np.unique(np.concatenate(every))
+    return marks[marks > 0.0]
 
 
 class Feedback(NamedTuple):

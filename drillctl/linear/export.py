@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drillctl.arrays import Array
 from drillctl.design import Design
@@ -14,12 +13,9 @@ from drillctl.errors import InputError
 from drillctl.linear.loop_model import closed_loop, with_slope
 from drillctl.linear.operating_point import operating_point
 from drillctl.linear.state_space import (
-    INPUTS,
     LOOP_OUTPUTS,
-    OUTPUTS,
     StateMatrices,
-    closed_loop_matrices,
-    open_loop_matrices,
+    open_loop,
     plant_matrices,
     state_names,
 )
@@ -110,18 +106,12 @@ def write_matrices(design: Design, path: str | Path) -> Path:
 def _content(design: Design) -> dict[str, Any]:
     string = design.sliding_string
     slope = operating_point(design).slope
-    plant_states = state_names(string.nodes, 0.0)
-    rows: dict[str, Row] = {
-        "plant": (plant_matrices(string), plant_states, INPUTS, OUTPUTS),
-        **(_of_gains(design) if design.simple_drive else _of_any(design)),
-    }
-    closed, states, inputs, outputs = rows["closed_loop"]
-    rows["closed_loop_with_slope"] = (with_slope(closed, slope), states, inputs, outputs)
-    systems = {
-        name: dict(zip("ABCD", matrices, strict=True))
-        | {"states": _names(states), "inputs": _names(inputs), "outputs": _names(outputs)}
-        for name, (matrices, states, inputs, outputs) in rows.items()
-    }
+    systems = {"plant": _system(design.plant()), "closed_loop": _system(closed_loop(design))}
+    if design.simple_drive:  # else it is not cut open
+        systems["open_loop"] = _system(open_loop(design))
+    closed = systems["closed_loop"]
+    matrices = with_slope(StateMatrices(*(closed[name] for name in "ABCD")), slope)
+    systems["closed_loop_with_slope"] = closed | {"A": matrices.a}
     string_matrices = {
         "M": string.mass.toarray(),
         "C": string.damping.toarray(),
@@ -137,32 +127,12 @@ def _content(design: Design) -> dict[str, Any]:
     }
 
 
-Row = tuple[StateMatrices, list[str], tuple[str, ...], tuple[str, ...]]
-"""Matrices of a system, its states, inputs and outputs."""
-
-
-def _of_gains(design: Design) -> dict[str, Row]:
-    """Loops of a drive that two gains tell."""
-    kp, ki = design.linear_drive.gains()
-    states = state_names(design.string.nodes, ki)
-    opened = open_loop_matrices(design.sliding_string, kp, ki)
-    closed = closed_loop_matrices(design.sliding_string, kp, ki)
-    return {
-        "open_loop": (opened, states, ("speed_error", "bit_torque"), LOOP_OUTPUTS),
-        "closed_loop": (closed, states, ("set_speed", "bit_torque"), LOOP_OUTPUTS),
+def _system(of: control.StateSpace) -> dict[str, Any]:
+    """Matrices of a system and the names of its signals."""
+    names = {"states": of.state_labels, "inputs": of.input_labels, "outputs": of.output_labels}
+    return {name: np.asarray(getattr(of, name)) for name in "ABCD"} | {
+        kind: np.array(own, dtype=np.str_) for kind, own in names.items()
     }
-
-
-def _of_any(design: Design) -> dict[str, Row]:
-    """The loop of a drive with filters, lags or torque feedback; it is not cut open."""
-    system = closed_loop(design)
-    matrices = StateMatrices(*(np.asarray(x) for x in (system.A, system.B, system.C, system.D)))
-    signals = ("set_speed", "bit_torque"), LOOP_OUTPUTS
-    return {"closed_loop": (matrices, list(system.state_labels), *signals)}
-
-
-def _names(names: tuple[str, ...] | list[str]) -> NDArray[np.str_]:
-    return np.array(list(names), dtype=np.str_)
 
 
 def _flat(content: dict[str, Any]) -> dict[str, Any]:

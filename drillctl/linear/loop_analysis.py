@@ -15,7 +15,7 @@ from drillctl.design import Design
 from drillctl.errors import InputError
 from drillctl.linear.ends import BitSide, Route, bit_side, ends_of, weight_path
 from drillctl.linear.loop_margins import Margins, margins, weight_delay_margin, whole_crossings
-from drillctl.linear.loop_model import loop_poles, model_poles
+from drillctl.linear.loop_model import model_poles, poles_of
 from drillctl.linear.mesh_limited import Figures, figures_of, mesh_limited
 from drillctl.linear.operating_point import OperatingPoint, at_speed, operating_point
 from drillctl.linear.regenerative import CuttingLoop, cutting_loop
@@ -142,16 +142,10 @@ def loop(design: Design) -> LoopAnalysis:
         There is no steady drilling: the drive cannot turn the bit.
     """
     point = operating_point(design)
-    string = design.sliding_string
-    ends, bit = ends_of(string), bit_side(design, point.slope, point.speed)
+    ends, bit = ends_of(design.sliding_string), bit_side(design, point.slope, point.speed)
     tolerated, omega = tolerated_slope(design, point.speed)
-    # Two gains describe the drive, and a weight that acts at once is in the slope already.
     at_once = not isinstance(design.weight_on_bit, RealWeight)
-    poles = (
-        loop_poles(string, *design.linear_drive.gains(), point.slope)
-        if design.simple_loop
-        else model_poles(design, bit)
-    )
+    poles = poles_of(design, bit)
     stable = bool(point.slope < tolerated)
     cutting = None if design.axial is None else cutting_loop(design)
     at_top = margins(ends, design.linear_drive, bit, poles) if stable else None

@@ -20,7 +20,6 @@ from drillctl.arrays import Array, ComplexArray, Index
 from drillctl.design import Design
 from drillctl.linear.ends import BitSide, WeightPath
 from drillctl.linear.state_space import (
-    LOOP_OUTPUTS,
     StateMatrices,
     closed_loop_matrices,
     named,
@@ -221,17 +220,11 @@ def closed_loop(design: Design) -> control.StateSpace:
         plant and `top_torque` (N m). States of the plant and, with integral action, `integral`
         (rad, of the speed error).
     """
-    inputs = ("set_speed", "bit_torque")
     if not design.simple_drive:
         return _whole_loop(design)
     kp, ki = design.linear_drive.gains()
-    return named(
-        closed_loop_matrices(design.sliding_string, kp, ki),
-        "closed_loop",
-        inputs,
-        LOOP_OUTPUTS,
-        state_names(design.string.nodes, ki),
-    )
+    matrices = closed_loop_matrices(design.sliding_string, kp, ki)
+    return named(matrices, "closed_loop", state_names(design.string.nodes, ki))
 
 
 def _whole_loop(design: Design) -> control.StateSpace:
@@ -239,13 +232,23 @@ def _whole_loop(design: Design) -> control.StateSpace:
     matrices = loop_model(design, BitSide(0.0))
     strings = string_states(design.string.nodes)
     others = [f"drive_{i}" for i in range(1, len(matrices.a) - len(strings) + 1)]
-    inputs = ("set_speed", "bit_torque")
-    return named(matrices, "closed_loop", inputs, LOOP_OUTPUTS, [*strings, *others])
+    return named(matrices, "closed_loop", [*strings, *others])
+
+
+def poles_of(design: Design, bit: BitSide) -> ComplexArray:
+    """Poles of the loop (1/s), by magnitude: of two gains where these are all of the drive."""
+    if design.simple_loop:
+        return loop_poles(design.sliding_string, *design.linear_drive.gains(), bit.slope)
+    return model_poles(design, bit)
 
 
 def model_poles(design: Design, bit: BitSide) -> ComplexArray:
-    """Poles of the loop (1/s), by magnitude."""
-    poles = np.linalg.eigvals(loop_model(design, bit).a)
+    """The same of any design."""
+    return _poles(loop_model(design, bit))
+
+
+def _poles(matrices: StateMatrices) -> ComplexArray:
+    poles = np.linalg.eigvals(matrices.a)
     return np.asarray(poles[np.argsort(np.abs(poles), kind="stable")])
 
 
@@ -260,9 +263,7 @@ def with_slope(matrices: StateMatrices, slope: float) -> StateMatrices:
 
 def loop_poles(string: Drillstring, kp: float, ki: float, slope: float) -> ComplexArray:
     """Eigenvalues of the closed loop."""
-    matrices = with_slope(closed_loop_matrices(string, kp, ki), slope)
-    poles = np.linalg.eigvals(matrices.a)
-    return np.asarray(poles[np.argsort(np.abs(poles), kind="stable")])
+    return _poles(with_slope(closed_loop_matrices(string, kp, ki), slope))
 
 
 def many_loop_poles(

@@ -15,7 +15,7 @@ import numpy as np
 
 from drillctl.arrays import ComplexArray
 from drillctl.design import Design
-from drillctl.linear.ends import WAVE_MODES, BitSide, Ends, ends_of
+from drillctl.linear.ends import WAVE_MODES, BitSide, Ends, ends_of, marks_of
 from drillctl.linear.loop_margins import Margins, margins, weight_delay_margin, whole_crossings
 from drillctl.linear.slope_margin import crossings
 from drillctl.rig.drillstring.frequencies import followed, natural_frequencies
@@ -111,13 +111,8 @@ def line_poles(ends: Ends, drive: TopDriveLaw, bit: BitSide, poles: ComplexArray
     It starts at the natural frequencies, at two distances from the axis, and at the poles of the
     elements.
     """
-    marks = [
-        natural_frequencies(ends.parts, "wave", WAVE_MODES, top, held)
-        for top in (False, True)
-        for held in (False, True)
-    ]
-    omega = np.unique(np.concatenate(marks))
-    starts = [shift * omega[omega > 0.0] for shift in (1j - 1e-5, 1j - 1e-2)]
+    omega = marks_of(ends.parts, "wave", WAVE_MODES)
+    starts = [shift * omega for shift in (1j - 1e-5, 1j - 1e-2)]
     s: ComplexArray = np.concatenate([*starts, poles[poles.imag > 0.0]])
 
     def impedance(s: ComplexArray) -> ComplexArray:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from drillctl.arrays import Array, ComplexArray
 from drillctl.errors import InputError, nearest
 from drillctl.linear.ends import Route, WeightPath, ends_of
-from drillctl.linear.state_space import INPUTS, LOOP_OUTPUTS, OUTPUTS
+from drillctl.linear.state_space import INPUTS, OUTPUTS, SIGNALS
 from drillctl.linear.transmission import EndMobility
 from drillctl.rig.drillstring import Drillstring
 from drillctl.rig.drillstring.frequencies import natural_frequencies
@@ -25,13 +25,6 @@ if TYPE_CHECKING:
     from drillctl.design import Design
 
 Loop = Literal["plant", "open_loop", "closed_loop"]
-
-LOOPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "plant": (INPUTS, OUTPUTS),
-    "open_loop": (("speed_error", "bit_torque"), LOOP_OUTPUTS),
-    "closed_loop": (("set_speed", "bit_torque"), LOOP_OUTPUTS),
-}
-"""Inputs and outputs of each loop; those of `state_space.py`."""
 
 FREQUENCIES = tuple(np.geomspace(0.02, 5.0, 1200).tolist())
 """Frequencies (Hz) where none are given: from under the first mode to well above stick-slip."""
@@ -179,10 +172,9 @@ def frequency_response(
         No frequency, or one that is not finite and more than zero; unknown loop or model; a path
         through an observer, which acts on the top too: see `linear.loop_model`.
     """
-    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
-    refuse_frequencies(frequency)
-    if loop not in LOOPS:
-        raise InputError(f"no loop {loop!r}; {nearest(loop, LOOPS)}", "loop")
+    frequency = frequencies_of(frequency_hz)
+    if loop not in SIGNALS:
+        raise InputError(f"no loop {loop!r}; {nearest(loop, SIGNALS)}", "loop")
     if not math.isfinite(slope):
         raise InputError(f"must be a number, got {slope:g}", "slope")
     string = subject if isinstance(subject, Drillstring) else subject.sliding_string
@@ -199,11 +191,10 @@ def frequency_response(
             raise InputError("takes a measured bit speed; see drillctl.linear.loop_model", "path")
         at_bit = at_bit + path.feedback(s).bit
     seen = ends_of(string, model).mobility(s, closed, at_bit)
-    inputs, outputs = LOOPS[loop]
     columns = _columns(seen, s)
     response = columns if loop == "plant" else _driven(columns, drive, loop)
     title = _TITLES[loop] + (" (continuum)" if model == "wave" else "")
-    return FrequencyResponse(frequency, response, inputs, outputs, title)
+    return FrequencyResponse(frequency, response, *SIGNALS[loop], title)
 
 
 _TITLES = {
@@ -246,15 +237,15 @@ def response_of(system: control.StateSpace, frequency_hz: ArrayLike) -> Frequenc
     InputError
         No frequency, or one that is not finite and more than zero.
     """
-    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
-    refuse_frequencies(frequency)
+    frequency = frequencies_of(frequency_hz)
     response = np.asarray(system(2j * math.pi * frequency, squeeze=False)).transpose(2, 0, 1)
     inputs, outputs = tuple(system.input_labels), tuple(system.output_labels)
     return FrequencyResponse(frequency, response, inputs, outputs, str(system.name))
 
 
-def refuse_frequencies(frequency: Array) -> None:
-    """Refuse (`InputError`) no frequencies, or one that is not finite and more than zero."""
+def frequencies_of(frequency_hz: ArrayLike) -> Array:
+    """Frequencies (Hz) as an array; none, or one not finite and more than zero, is refused."""
+    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     if frequency.ndim != 1 or frequency.size == 0:
         raise InputError("needs a list of one frequency or more (Hz)", "frequency_hz")
     wrong = frequency[~(np.isfinite(frequency) & (frequency > 0.0))]
@@ -262,6 +253,7 @@ def refuse_frequencies(frequency: Array) -> None:
         raise InputError(
             f"frequencies must be finite and more than 0 Hz, got {wrong[0]:g}", "frequency_hz"
         )
+    return frequency
 
 
 def _index(name: str, names: tuple[str, ...]) -> int:

@@ -16,7 +16,7 @@ elements and for the continuum.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,24 +31,15 @@ CANDIDATES = 5
 the one of lowest frequency."""
 
 
-@dataclass(frozen=True, eq=False)
-class Crossings:
-    """Slopes at which one pair of poles lies on the imaginary axis."""
+class Crossings(NamedTuple):
+    """Slopes at which a pair of poles, or a real one, lies on the imaginary axis."""
 
-    slope: Array  # shape (crossings,): Falling slope (N m s/rad), lowest first
-    omega: Array  # shape (crossings,): Angular frequency of the poles (rad/s); 0 for a real pole
-
-
-@dataclass(frozen=True, eq=False)
-class SlopeMargins:
-    """Slope margins of a number of gain pairs."""
-
-    slope: Array  # D* (N m s/rad)
-    omega: Array  # angular frequency of the poles that decide (rad/s); 0 for a real pole
+    slope: Array  # falling slope (N m s/rad)
+    omega: Array  # angular frequency of the poles (rad/s); 0 for a real pole
 
 
 def crossings(ends: Ends, kp: float, ki: float) -> Crossings:
-    """All slopes at which poles reach the imaginary axis under PI control."""
+    """All slopes at which poles reach the imaginary axis under PI control, lowest first."""
     search = _Search(ends)
     gains = np.array([[kp, ki]], dtype=float)
     refuse_gains(gains)
@@ -77,7 +68,7 @@ def slope_margin(ends: Ends, kp: float, ki: float) -> tuple[float, float]:
 
 def slope_margins(
     ends: Ends, kp: ArrayLike, ki: ArrayLike, candidates: int = CANDIDATES
-) -> SlopeMargins:
+) -> Crossings:
     """D* over many gain pairs at once.
 
     Parameters
@@ -91,9 +82,9 @@ def slope_margins(
 
     Returns
     -------
-    SlopeMargins
-        In the common shape of the gains. Of each pair the few crossings that look lowest on
-        the grid are refined, so that among high modes of nearly one margin the wrong one may
+    Crossings
+        Those that decide, in the common shape of the gains. Of each pair the few that look lowest
+        on the grid are refined, so that among high modes of nearly one margin the wrong one may
         decide: that changes D* by 1e-4 of itself at most, see `docs/linear.md`.
     """
     kp, ki = np.broadcast_arrays(np.asarray(kp, dtype=float), np.asarray(ki, dtype=float))
@@ -115,7 +106,7 @@ def slope_margins(
     at_rest = np.where(gains[:, 1] == 0.0, gains[:, 0] + search.rigid, np.inf)
     real = at_rest < slope
     slope, omega = np.where(real, at_rest, slope), np.where(real, 0.0, omega)
-    return SlopeMargins(slope.reshape(kp.shape), omega.reshape(kp.shape))
+    return Crossings(slope.reshape(kp.shape), omega.reshape(kp.shape))
 
 
 def refuse_gains(gains: Array) -> None:

@@ -28,6 +28,12 @@ OUTPUTS = ("top_speed", "bit_speed", "pipe_torque", "twist")
 """Outputs of the plant (rad/s, rad/s, N m, rad)."""
 LOOP_OUTPUTS = (*OUTPUTS, "top_torque")
 """Outputs of a loop: those of the plant and the torque of the drive (N m)."""
+SIGNALS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "plant": (INPUTS, OUTPUTS),
+    "open_loop": (("speed_error", "bit_torque"), LOOP_OUTPUTS),
+    "closed_loop": (("set_speed", "bit_torque"), LOOP_OUTPUTS),
+}
+"""Inputs and outputs of each loop."""
 
 
 class StateMatrices(NamedTuple):
@@ -121,9 +127,7 @@ def plant(string: Drillstring) -> control.StateSpace:
         damper of the first element, positive when the top leads), `twist` (rad, top minus
         bit). States `twist_1`... (rad) and `speed_0`... (rad/s).
     """
-    return named(
-        plant_matrices(string), "drillstring", INPUTS, OUTPUTS, string_states(string.nodes)
-    )
+    return named(plant_matrices(string), "plant", string_states(string.nodes), "drillstring")
 
 
 def open_loop(design: Design) -> control.StateSpace:
@@ -149,14 +153,8 @@ def open_loop(design: Design) -> control.StateSpace:
             "controller",
         )
     kp, ki = design.linear_drive.gains()
-    inputs = ("speed_error", "bit_torque")
-    return named(
-        open_loop_matrices(design.sliding_string, kp, ki),
-        "open_loop",
-        inputs,
-        LOOP_OUTPUTS,
-        state_names(design.string.nodes, ki),
-    )
+    matrices = open_loop_matrices(design.sliding_string, kp, ki)
+    return named(matrices, "open_loop", state_names(design.string.nodes, ki))
 
 
 def string_states(nodes: int) -> list[str]:
@@ -171,17 +169,14 @@ def state_names(nodes: int, ki: float) -> list[str]:
 
 
 def named(
-    matrices: StateMatrices,
-    name: str,
-    inputs: tuple[str, ...],
-    outputs: tuple[str, ...],
-    states: list[str],
+    matrices: StateMatrices, loop: str, states: list[str], name: str | None = None
 ) -> control.StateSpace:
-    """A system of python-control with named signals."""
+    """A loop as a system of python-control with the names of its signals."""
     import control
 
+    inputs, outputs = map(list, SIGNALS[loop])
     # dt and the states are given, so that no default of the user's `control.config` counts.
     return control.StateSpace(
         *matrices, dt=0, remove_useless_states=False,
-        name=name, inputs=list(inputs), outputs=list(outputs), states=states,
+        name=name or loop, inputs=inputs, outputs=outputs, states=states,
     )  # fmt: skip

@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from drillctl.arrays import Array, ComplexArray
 from drillctl.design import Design
-from drillctl.linear.response import FREQUENCIES, refuse_frequencies
-from drillctl.rig.drillstring import Drillstring
+from drillctl.linear.response import FREQUENCIES, frequencies_of
 from drillctl.rig.top_drive.tuned import (
     active_damping,
     soft_torque,
@@ -28,9 +26,7 @@ __all__ = [
     "DriveImpedance",
     "active_damping",
     "drive_impedance",
-    "pipe_impedance",
     "soft_torque",
-    "stick_slip_frequency",
     "stiff_speed",
     "torsional_rectification",
     "z_torque",
@@ -99,8 +95,7 @@ def drive_impedance(
     InputError
         An impossible frequency, or a string whose uppermost section is a lumped spring.
     """
-    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
-    refuse_frequencies(frequency)
+    frequency = frequencies_of(frequency_hz)
     s = 2j * math.pi * frequency
     parts = design.string.parts
     impedance = design.linear_drive.impedance(s) + s * parts.top_inertia + parts.top_damping
@@ -109,14 +104,4 @@ def drive_impedance(
         if design.simple_drive:
             kp, ki = design.linear_drive.gains()
             label += f", Kp {kp:.4g} N*m*s/rad, Ki {ki:.4g} N*m/rad"
-    return DriveImpedance(frequency, impedance, pipe_impedance(design.string), label)
-
-
-def pipe_impedance(string: Drillstring) -> float:
-    """Characteristic impedance of the uppermost pipe (N m s/rad): J sqrt(G rho)."""
-    return string.pipe_impedance
-
-
-def stick_slip_frequency(string: Drillstring) -> float:
-    """Lowest angular frequency with the top held (rad/s)."""
-    return string.stick_slip_frequency
+    return DriveImpedance(frequency, impedance, design.string.pipe_impedance, label)

@@ -13,7 +13,7 @@ from drillctl.linear import ends_of
 from drillctl.linear.ends import BitSide
 from drillctl.linear.export import nonlinear_system
 from drillctl.linear.loop_model import loop_poles, model_poles, pade
-from drillctl.linear.tuning import active_damping, pipe_impedance, stick_slip_frequency
+from drillctl.linear.tuning import active_damping
 from drillctl.rig.top_drive import PI, RealDrive, SampledDrive
 
 HOLDS = {
@@ -58,12 +58,12 @@ def test_changing_the_law_keeps_the_drive_around_it():
     limited = rig(drive={"torque_limit": "20 kN*m"})
     soft = limited.replace({"controller.law": "soft-torque"})
     assert soft.top_drive.most == 20e3
-    assert soft.top_drive.kp == pytest.approx(4 * pipe_impedance(soft.string))
+    assert soft.top_drive.kp == pytest.approx(4 * soft.string.pipe_impedance)
     assert "20 kN*m" in drillctl.design.to_toml(soft)
 
 
 def test_torque_laws_take_their_numbers_from_the_string():
-    zeta, inertia = pipe_impedance(rig().string), 500.0
+    zeta, inertia = rig().string.pipe_impedance, 500.0
     matched = rig({"law": "z-torque", "absorption": 0.5, "high_pass": "20 s"}).top_drive
     assert matched.mobility == pytest.approx(0.5 / zeta)
     assert (matched.sensed_inertia, matched.corner) == pytest.approx((inertia, math.tau / 20))
@@ -88,7 +88,7 @@ def test_active_damping_makes_two_pairs_of_poles_coincide():
     assert np.abs(np.abs(poles) - w).max() < 1e-5 * w
     assert np.ptp(np.abs(poles.real)) < 1e-4
     found = active_damping(rig().string)
-    assert found[1] == pytest.approx(stick_slip_frequency(rig().string) ** 2 * 500.0)
+    assert found[1] == pytest.approx(rig().string.stick_slip_frequency ** 2 * 500.0)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5, 0.0])
@@ -97,7 +97,7 @@ def test_z_torque_absorbs_what_it_says(share):
     design = rig({"law": "z-torque", "absorption": share, "high_pass": "1e6 s", "stiffness": 1e7})
     s = 2j * np.pi * np.array([0.05, 0.2, 1.0])
     impedance = design.top_drive.impedance(s) + s * 500.0
-    zeta = pipe_impedance(design.string)
+    zeta = design.string.pipe_impedance
     reflected = (zeta - impedance) / (zeta + impedance)
     expected = abs(1.0 - 1.0 / share) / (1.0 + 1.0 / share) if share else 1.0
     assert np.abs(reflected) == pytest.approx(expected, abs=2e-3)

@@ -8,7 +8,7 @@ import pytest
 
 import drillctl
 from drillctl.errors import InputError
-from drillctl.linear.tuning import pipe_impedance, soft_torque, stiff_speed
+from drillctl.linear.tuning import soft_torque, stiff_speed
 from drillctl.rig.top_drive.law import DriveTable, StringNumbers, drive_laws, tracking
 
 DESIGN = "monteiro-trindade-140kn"
@@ -21,7 +21,7 @@ def test_gains_come_from_the_string():
     stiff = drillctl.load(DESIGN, controller={"law": "stiff-speed"})
     assert stiff.top_drive == stiff_speed(stiff.string)
     matched = drillctl.load(DESIGN, controller={"law": "soft-torque", "share": 1.0})
-    assert matched.top_drive.kp == pytest.approx(pipe_impedance(matched.string))
+    assert matched.top_drive.kp == pytest.approx(matched.string.pipe_impedance)
 
 
 def test_a_longer_string_is_tuned_anew():

@@ -10,12 +10,7 @@ import pytest
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import drive_impedance
-from drillctl.linear.tuning import (
-    pipe_impedance,
-    soft_torque,
-    stick_slip_frequency,
-    stiff_speed,
-)
+from drillctl.linear.tuning import soft_torque, stiff_speed
 
 DESIGN = "monteiro-trindade-140kn"
 
@@ -29,7 +24,7 @@ def design():
 def test_tuned_drive_reflects_what_it_should(design, share, reflection):
     kp, ki = soft_torque(design.string, share)
     tuned = design.replace({"controller.kp": kp, "controller.ki": ki})
-    at = stick_slip_frequency(design.string) / (2 * math.pi)
+    at = design.string.stick_slip_frequency / (2 * math.pi)
     found = drive_impedance(tuned, [at])
     assert abs(found.reflection[0]) == pytest.approx(reflection, abs=1e-12)
     assert found.impedance[0].imag == pytest.approx(0.0, abs=1e-9)
@@ -37,8 +32,8 @@ def test_tuned_drive_reflects_what_it_should(design, share, reflection):
 
 def test_numbers_of_the_paper(design):
     string = design.string
-    assert pipe_impedance(string) == pytest.approx(297.06, abs=5e-3)
-    assert stick_slip_frequency(string) == pytest.approx(0.80134, abs=5e-6)
+    assert string.pipe_impedance == pytest.approx(297.06, abs=5e-3)
+    assert string.stick_slip_frequency == pytest.approx(0.80134, abs=5e-6)
     assert soft_torque(string)[1] == pytest.approx(321.07, abs=0.01)
     assert stiff_speed(string) == pytest.approx((50 * 297.06, 2500.0), rel=1e-4)
 

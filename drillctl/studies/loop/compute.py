@@ -20,7 +20,7 @@ from drillctl.linear.ends import WeightPath, ends_of
 from drillctl.linear.loop_analysis import LoopAnalysis, loop
 from drillctl.linear.loop_margins import pole_grid
 from drillctl.linear.response import FrequencyResponse, frequency_response, telling_frequencies
-from drillctl.linear.tuning import drive_impedance, stick_slip_frequency
+from drillctl.linear.tuning import drive_impedance
 from drillctl.progress import Progress
 from drillctl.store.codec import label
 from drillctl.studies.base import Picture
@@ -127,7 +127,7 @@ def _mobility_of(design: Design, system: units.System) -> Figure:
 
 
 def _impedance(design: Design, system: units.System) -> Figure:
-    mark = stick_slip_frequency(design.string) / (2.0 * math.pi)
+    mark = design.string.stick_slip_frequency / (2.0 * math.pi)
     marks = {"stick-slip": mark}
     return plots.drive_impedance(drive_impedance(design), marks=marks, system=system)
 

@@ -16,7 +16,7 @@ from drillctl.errors import InputError
 from drillctl.linear.ends import bit_side, ends_of
 from drillctl.linear.loop_analysis import tolerated_slope
 from drillctl.linear.loop_margins import Margins, margins, whole_crossings
-from drillctl.linear.loop_model import loop_poles, model_poles
+from drillctl.linear.loop_model import model_poles, poles_of
 from drillctl.linear.operating_point import operating_point
 from drillctl.rig.drillstring.frequencies import followed, natural_frequencies
 from drillctl.rig.top_drive.law import DriveTable
@@ -105,13 +105,8 @@ def slope_margin_of(design: Design, speed: float) -> tuple[float, float, bool]:
 
 def _margins(design: Design, slope: float, speed: float) -> Margins:
     bit, ends = bit_side(design, slope, speed), ends_of(design.sliding_string)
-    drive = design.linear_drive
-    poles = (
-        loop_poles(design.sliding_string, *drive.gains(), slope)
-        if design.simple_loop
-        else model_poles(design, bit)
-    )
-    return margins(ends, drive, bit, poles, followed(design.string.parts))
+    limit = followed(design.string.parts)
+    return margins(ends, design.linear_drive, bit, poles_of(design, bit), limit)
 
 
 def drive_of(design: Design) -> DriveTable:

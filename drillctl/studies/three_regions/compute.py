@@ -33,7 +33,7 @@ from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
 from drillctl.linear.loop_analysis import tolerated_slope
 from drillctl.linear.operating_point import operating_point, rock_at
-from drillctl.linear.slope_margin import SlopeMargins, slope_margins
+from drillctl.linear.slope_margin import Crossings, slope_margins
 from drillctl.progress import SILENT, Progress
 from drillctl.simulation.batch import Prepared, prepare, trace
 from drillctl.simulation.lanes import Kind, Lanes
@@ -114,7 +114,7 @@ def steady_drilling(design: Design, axes: tuple[Axis, ...], group: Group) -> Ste
 
 def slopes_tolerated(
     design: Design, axes: tuple[Axis, ...], group: Group, speed: Array
-) -> SlopeMargins:
+) -> Crossings:
     """Slope margins of the cells of a group that drill steadily at `speed`, shape (lanes,)."""
     # All at once where two gains define the loop, one by one for other drives and for a weight that
     # comes late.
@@ -125,7 +125,7 @@ def slopes_tolerated(
     for lane in np.flatnonzero(np.isfinite(speed)):
         cell = cell_design(design, axes, int(group.cells[lane]))
         slope[lane], omega[lane] = tolerated_slope(cell, float(speed[lane]))
-    return SlopeMargins(slope, omega)
+    return Crossings(slope, omega)
 
 
 def gains_of(lanes: Lanes) -> tuple[Array, Array]:
