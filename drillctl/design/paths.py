@@ -31,9 +31,9 @@ USUAL_NAMES = {
 """What the usual parameters are called in pictures and sentences; others keep their path."""
 SI_OF = {
     "kp": "N*m*s/rad", "ki": "N*m/rad", "spring": "N*m/rad", "damper": "N*m*s/rad",
-    "mobility": "rad/(N*m*s)", "sensed_inertia": "kg*m^2", "corner": "1/s",
+    "mobility": "rad/(N*m*s)", "sensed_inertia": "kg*m^2", "corner": "1/s", "high_pass": "s",
 }  # fmt: skip
-"""Units of the numbers that a drive has, where their paths have none."""
+"""Units of the numbers that a drive has, whichever law that of a design is."""
 _HIDDEN = (
     "title", "author", "source", "status", "notes", "schema_version", "map", "uncertain",
     "uncertainty",

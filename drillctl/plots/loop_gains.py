@@ -24,7 +24,7 @@ from drillctl.errors import InputError
 from drillctl.linear.boundary import GainBoundary, RootLocus
 from drillctl.linear.tuning import DriveImpedance
 from drillctl.plots import style
-from drillctl.plots.plant import hertz, listed
+from drillctl.plots.plant import hertz
 
 GREY = "#777777"
 
@@ -47,7 +47,7 @@ def drive_impedance(
     wave near 1, where the line is drawn. Below, the share of the amplitude of a wave that is sent
     back: 0 takes all, 1 takes nothing.
     """
-    drives = listed(results)
+    drives = style.listed(results)
     names = [units.told(drive.label, system) for drive in drives]
     figure, (above, below) = style.grid_or_new(ax, 2, 1, 7.5, 6.0, share_x=True)
     for number, (drive, name) in enumerate(zip(drives, names, strict=True)):
@@ -108,7 +108,7 @@ def gain_boundary(
     The first result is coloured by frequency, its region filled; curves of others are dashed.
     Each mode adds a branch; those of high modes are thin.
     """
-    boundaries = listed(result)
+    boundaries = style.listed(result)
     first = boundaries[0]
     figure, ax = style.axes_or_new(ax, 7.8, 5.8)
     sides = [

@@ -78,8 +78,7 @@ def loop_map(
     if boundary is not None:
         _outline(ax, boundary, paths, system)
     _marks(ax, result, quantity, system)
-    ax.set_xlim(*style.edges(x)[[0, -1]])
-    ax.set_ylim(*style.edges(y)[[0, -1]])
+    style.within_cells(ax, x, y)
     if ax.get_legend_handles_labels()[0]:
         style.legend_under(ax, 2)
     style.note(figure, _caption(result, quantity))
@@ -119,10 +118,8 @@ def _colour(
     values, unit = units.displayed(result.values[quantity], result.unit(quantity), system)
     look = _look(quantity, values)
     ax.set_facecolor(EMPTY)
-    mesh = ax.pcolormesh(
-        x, y, np.ma.masked_invalid(values.T), cmap=look.colours, norm=look.norm,
-        shading="nearest", rasterized=True,
-    )  # fmt: skip
+    known = np.ma.masked_invalid(values)
+    mesh = style.cells(ax, x, y, known, cmap=look.colours, norm=look.norm)
     name = NAMES.get(quantity, quantity)
     label = name if unit in ("", "1") else f"{name} ({unit})"
     style.colour_bar(figure, mesh, ax, label, style.beyond(values, look.norm))

@@ -69,13 +69,9 @@ def nyquist(
     loop = _loop(result, analysis)
     figure, ax = style.axes_or_new(ax, 8.0, 6.2)
     ax.plot(
-        loop.real,
-        -loop.imag,
-        color=style.SKY,
-        linewidth=0.6,
-        linestyle="--",
+        loop.real, -loop.imag, color=style.SKY, linewidth=0.6, linestyle="--",
         label="conjugate (f < 0)",
-    )
+    )  # fmt: skip
     _curve(ax, result.frequency_hz, loop, loop.real, loop.imag)
     _arrows(ax, result.frequency_hz, loop)
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
@@ -93,7 +89,7 @@ def nyquist(
     _legend(ax)
     within = (loop.real > left) & (loop.real < right) & (np.abs(loop.imag) < high)
     notes = [_outside(result.frequency_hz, loop, within), _turns(loop, analysis)]
-    _note(figure, ax, notes)
+    _note(ax, notes)
     return figure
 
 
@@ -130,7 +126,7 @@ def nichols(
     _legend(ax)
     size = 20.0 * np.log10(np.abs(loop))
     within = (size > LEVELS_DB[0]) & (size < LEVELS_DB[1])
-    _note(figure, ax, [_outside(result.frequency_hz, loop, within)])
+    _note(ax, [_outside(result.frequency_hz, loop, within)])
     return figure
 
 
@@ -226,6 +222,8 @@ def _critical(ax: Axes, x: float) -> None:
 
 def _arrows(ax: Axes, frequency: Array, loop: ComplexArray) -> None:
     """An arrow and the frequency where the curve comes nearest to -1, before and after."""
+    if len(loop) < 3:  # points that show no way to go
+        return
     near = int(np.argmin(np.abs(1.0 + loop)))
     written: list[complex] = []
     for share in (1.0, 0.7, 1.4, 2.0):
@@ -326,7 +324,7 @@ def turns_about_critical(loop: ComplexArray, at_rest: int) -> int | None:
     return round(total) if abs(total - round(total)) < 0.2 else None
 
 
-def _note(figure: Figure, ax: Axes, notes: list[str]) -> None:
+def _note(ax: Axes, notes: list[str]) -> None:
     text = "\n".join(note for note in notes if note)
     if text:
         ax.annotate(

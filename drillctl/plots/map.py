@@ -46,10 +46,7 @@ def stability_map(result: Sweep, ax: Axes | None = None, system: units.System = 
     i, j = (slice(None, None, -(-len(a) // MOST_COLOURED)) for a in result.axes)
     # Without the darkest end, on which black contours would be lost.
     part = style.colours(0.18, 1.0).reversed()
-    mesh = ax.pcolormesh(
-        x[i], y[j], result.j1[i, j].T, cmap=part, vmin=0.0, vmax=top, shading="nearest",
-        rasterized=True,
-    )  # fmt: skip
+    mesh = style.cells(ax, x[i], y[j], result.j1[i, j], cmap=part, vmin=0.0, vmax=top)
     bar = style.colour_bar(figure, mesh, ax, "J1 (s)", "max")
     finite = result.j1[np.isfinite(result.j1)]
     shown = [v for v in result.levels if finite.size and finite.min() <= v <= finite.max()]
@@ -74,8 +71,8 @@ def _mark_cells(result: Sweep, ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
     if len(result.audit.cells):
         i, j = np.unravel_index(result.audit.cells, shape)
         ax.plot(
-            x[i], y[j], "o", markerfacecolor="none", markeredgecolor=style.VERMILLION, markersize=6,
-            markeredgewidth=1.3, label="audited with the reference solver",
+            x[i], y[j], **style.RING, markersize=6, markeredgewidth=1.3,
+            label="audited with the reference solver",
         )  # fmt: skip
     failed = np.nonzero(result.status == STATUSES.index("failed"))
     if len(failed[0]):
@@ -105,10 +102,8 @@ def sweep_line(result: Sweep, ax: Axes | None = None, system: units.System = "si
     x, label = style.axis_label(result.axes[0], system)
     ax.plot(x, result.j1, "-", color=style.BLACK, linewidth=style.LINE, label="batch engine")
     if len(result.audit.cells):
-        ax.plot(
-            x[result.audit.cells], result.audit.reference["j1"], "o", markerfacecolor="none",
-            markeredgecolor=style.VERMILLION, label="reference solver",
-        )  # fmt: skip
+        again = x[result.audit.cells], result.audit.reference["j1"]
+        ax.plot(*again, **style.RING, label="reference solver")
     for level in result.levels:
         ax.axhline(level, color=style.GREY, linewidth=0.8, linestyle="--")
         ax.annotate(
@@ -142,8 +137,7 @@ def error_estimate(result: Doctor, ax: Axes | None = None) -> Figure:
         ax.loglog(
             np.maximum(result.audit.batch["j1"], SMALLEST),
             np.maximum(result.audit.differences, ROUNDING),
-            "o", markerfacecolor="none", markeredgecolor=style.VERMILLION, markersize=8,
-            label="beside the reference solver",
+            **style.RING, markersize=8, label="beside the reference solver",
         )  # fmt: skip
     promise = PROMISES[result.accuracy]
     for value, dash, name in ((promise.median, "--", "median"), (promise.p99, "-", "99 %")):
@@ -223,8 +217,7 @@ def three_regions(
         *_fills(result, ax, x, y),
         *(h for name in _MARKS for h in _marked(result, name, ax, x, y)),
     ]
-    ax.set_xlim(*style.edges(x)[[0, -1]])
-    ax.set_ylim(*style.edges(y)[[0, -1]])
+    style.within_cells(ax, x, y)
     style.legend_under(ax, 2, handles, drop=0.1)
     style.note(figure, _caption_of_regions(result))
     return figure

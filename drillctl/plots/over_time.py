@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 
 @style.picture(
-    paths="Parameters named in the title of each panel; by default the numbers of the drive."
+    paths="Parameters named in the title of each panel; by default the numbers of the drive.",
+    raises="Nothing to draw.",
 )
 def time_response(
     results: Simulation | Sequence[Simulation],
@@ -32,7 +33,7 @@ def time_response(
     system: units.System = "si",
 ) -> Figure:
     """Speeds of top drive and bit against time."""
-    runs = list(results) if isinstance(results, Sequence) else [results]
+    runs = style.listed(results)
     columns = 1 if len(runs) == 1 else 2
     rows = -(-len(runs) // columns)
     given = [ax] if isinstance(ax, Axes) else ax

@@ -9,13 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import (
-    FormatStrFormatter,
-    LogLocator,
-    MaxNLocator,
-    MultipleLocator,
-    NullFormatter,
-)
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from drillctl import units
 from drillctl.arrays import Array, ComplexArray
@@ -103,7 +97,7 @@ def mobility(
     top torque among its inputs). High peaks at the bit are where the rock's falling slope feeds
     the string; those of an undamped string end where the nearest frequency lies.
     """
-    given = listed(results)
+    given = style.listed(results)
     for one in given:
         one.between("bit_torque", "bit_speed")
     shown = [end for end in ENDS if any(_has(one, end) for one in given)]
@@ -159,7 +153,7 @@ def bode(
     Magnitude in dB of the unit named; phase between -180 and 180 degrees. The peaks of an undamped
     string are infinite: as drawn they end where the nearest frequency lies.
     """
-    results = listed(result)
+    results = style.listed(result)
     names = TARGETS if targets is None else tuple(targets)
     if not names:
         raise InputError("needs one output or more", "targets")
@@ -189,20 +183,10 @@ def bode(
     return figure
 
 
-def listed(result: Any) -> list[Any]:
-    """Results as a list, whether one was given or a sequence of them."""
-    results = list(result) if isinstance(result, Sequence) else [result]
-    if not results:
-        raise InputError("nothing to draw: give one result or more")
-    return results
-
-
 def hertz(ax: Axes) -> None:
     """Frequency axis with plain numbers and no empty margin."""
     ax.margins(x=0.0)
-    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-    ax.xaxis.set_minor_formatter(NullFormatter())
+    style.written_out(ax.xaxis)
 
 
 def spoken(name: str) -> str:

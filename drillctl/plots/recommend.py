@@ -56,8 +56,7 @@ def recommended(
         style.dress(panel, name, "")
         panel.tick_params(labelleft=panel is spread)
     # Over the whole picture: a long title of the first panel alone would push the others aside.
-    title = style.heading(result, "What to set")
-    figure.suptitle(title, fontsize=style.TITLE, x=0.01, ha="left")
+    style.headline(figure, style.heading(result, "What to set"))
     text = (
         f"{len(result.present.j1)} fresh draws (seed {result.seed}): 5 to 95 % (line), 25 to 75 % "
         "(bar), median (dot) of J1; 95 % interval of the probability. Bars: speeds and weights "

@@ -32,6 +32,7 @@ from drillctl.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axis import Axis as Scale
+    from matplotlib.collections import QuadMesh
 
     from drillctl.studies import Axis
 
@@ -62,6 +63,10 @@ STAR: dict[str, Any] = {
     "color": VERMILLION, "markeredgecolor": "white", "markersize": 15, "linestyle": "none",
 }  # fmt: skip
 """Mark of the best."""
+RING: dict[str, Any] = {
+    "marker": "o", "markerfacecolor": "none", "markeredgecolor": VERMILLION, "linestyle": "none",
+}  # fmt: skip
+"""Mark of what the reference solver ran again."""
 USUAL = {
     "ax": "Axes to draw on; by default those of a new figure.",
     "system": "Units of axes and labels.",
@@ -238,6 +243,25 @@ def written_out(axis: Scale, digits: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
     axis.set_major_locator(LogLocator(subs=digits))
     axis.set_major_formatter(FormatStrFormatter("%g"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def cells(ax: Axes, x: Array, y: Array, values: Array, **colours: Any) -> QuadMesh:
+    """Cells by their values, shape (x, y), as a bitmap."""
+    return ax.pcolormesh(x, y, values.T, shading="nearest", rasterized=True, **colours)
+
+
+def within_cells(ax: Axes, x: Array, y: Array) -> None:
+    """Limits at the outer borders of the cells."""
+    ax.set_xlim(*edges(x)[[0, -1]])
+    ax.set_ylim(*edges(y)[[0, -1]])
+
+
+def listed(result: Any) -> list[Any]:
+    """Results as a list, whether one was given or a sequence of them; none is refused."""
+    results = list(result) if isinstance(result, Sequence) else [result]
+    if not results:
+        raise InputError("nothing to draw: give one result or more")
+    return results
 
 
 def colour_bar(

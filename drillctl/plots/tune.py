@@ -85,14 +85,9 @@ def tune_neighbourhood(result: Tune, ax: Axes | None = None, system: units.Syste
     return figure
 
 
-def _map(
-    result: Tune, figure: Figure, ax: Axes, x: Array, y: Array,
-    name: str,
-) -> None:  # fmt: skip
+def _map(result: Tune, figure: Figure, ax: Axes, x: Array, y: Array, name: str) -> None:
     shares = result.certificate.neighbourhood.probability
-    mesh = ax.pcolormesh(
-        x, y, shares.T, cmap="cividis", vmin=0.0, vmax=1.0, shading="nearest", rasterized=True
-    )
+    mesh = style.cells(ax, x, y, shares, cmap="cividis", vmin=0.0, vmax=1.0)
     style.colour_bar(figure, mesh, ax, name)
     required = result.certificate.required
     if shares.min() < required <= shares.max():

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -228,10 +228,7 @@ def probability_map(
     scale = ScalarMappable(share, "cividis")
     for panel, level in zip(panels, result.levels, strict=True):
         probability = result.maps[level].probability
-        panel.pcolormesh(
-            x, y, probability.T, cmap=scale.cmap, norm=share, shading="nearest",
-            rasterized=True,
-        )  # fmt: skip
+        style.cells(panel, x, y, probability, cmap=scale.cmap, norm=share)
         shown = [v for v in (OUTER, MEDIAN, INNER) if probability.min() < v < probability.max()]
         if shown:
             at = [border(v, result.realizations) for v in shown]
@@ -252,17 +249,12 @@ def region_error(
     Cells whose probability is at least 95 %, or is not, by intervals that hold in all cells at
     once with 95 %; and those of which neither can be said.
     """
-    from matplotlib.colors import ListedColormap
-
     figure, panels, x, y = _panels(result, ax, system)
     colours = ("#FFFFFF", "#F2C59F", style.VERMILLION)
     for panel, level in zip(panels, result.levels, strict=True):
         low, high = result.maps[level].simultaneous
         kind = np.where(low >= INNER, 2, np.where(high >= INNER, 1, 0))
-        panel.pcolormesh(
-            x, y, kind.T, cmap=ListedColormap(colours), vmin=-0.5, vmax=2.5, shading="nearest",
-            rasterized=True,
-        )  # fmt: skip
+        style.cells(panel, x, y, kind, cmap=ListedColormap(colours), vmin=-0.5, vmax=2.5)
         value, (least, most) = result.areas[level][INNER]
         panel.annotate(
             f"area {value:.1%} ({100 * least:.1f} to {100 * most:.1f})", (0.98, 0.96),
@@ -273,13 +265,8 @@ def region_error(
         Patch(facecolor=colour, edgecolor=style.GREY, label=name)
         for colour, name in zip(colours, names, strict=True)
     ]
-    _finish(
-        figure,
-        result,
-        "Sampling error of the inner regions",
-        handles,
-        "sampling error: all cells at once, with 95 %",
-    )
+    what = "sampling error: all cells at once, with 95 %"
+    _finish(figure, result, "Sampling error of the inner regions", handles, what)
     return figure
 
 
@@ -310,7 +297,7 @@ def border(probability: float, total: int) -> float:
 def _outline(
     panel: Axes, x: Array, y: Array, j1: Array, level: float, colour: str, width: float
 ) -> None:
-    if np.nanmin(j1) < level < np.nanmax(j1):
+    if (j1 < level).any() and (j1 > level).any():
         panel.contour(x, y, j1.T, levels=[level], colors=[colour], linewidths=width)
 
 

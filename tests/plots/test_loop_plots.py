@@ -242,6 +242,11 @@ def test_resonance_loops_of_the_study_are_round(analysed):
     assert turns(drawn.axes[0]).max() < corner
 
 
+def test_a_single_frequency_is_a_point_without_an_arrow(design):
+    one = frequency_response(design, [0.2], "open_loop")
+    assert drawn(plots.nyquist(one))
+
+
 def test_turns_need_enough_frequencies():
     angle = np.linspace(0.0, 3.0 * np.pi, 400)
     assert turns_about_critical(-1.0 + np.exp(1j * angle), 0) == 3

@@ -17,6 +17,7 @@ from drillctl.plots import stability_map, sweep_line, time_response
 from drillctl.plots.style import axis_label
 from drillctl.simulation.measures import BATCH_MEASURES, STATUSES
 from drillctl.studies import Axis, Sweep, responses
+from drillctl.studies.map import pictures as map_pictures
 
 OK, FAILED = STATUSES.index("ok"), STATUSES.index("failed")
 NOBODY = unaudited()
@@ -268,6 +269,13 @@ def test_a_panel_each(runs, count):
     assert sum(ax.get_visible() for ax in figure.axes) == count
 
 
+def test_no_run_is_nothing_to_draw(design):
+    lost = made(design, np.full((6, 5), np.nan))
+    assert [picture.name for picture in map_pictures(lost)] == ["map"]
+    with pytest.raises(InputError, match="nothing to draw"):
+        time_response(responses(lost))
+
+
 def test_as_many_axes_as_runs(runs):
     own = Figure()
     axes = list(own.subplots(1, 2))
@@ -287,10 +295,8 @@ def test_responses_of_a_map(design):
     assert drawn(time_response(found))
 
 
-def test_responses_of_a_map_at_rest(design):
-    """The smallest J1 may be 0, and all cells may have failed."""
+def test_the_smallest_j1_may_be_zero(design):
     assert len(responses(made(design, np.zeros((6, 5))))) == 1
-    assert responses(made(design, np.full((6, 5), np.nan))) == []
 
 
 # --- settings ----------------------------------------------------------------------------------

@@ -89,6 +89,16 @@ def test_few_draws_are_shown_one_by_one(result):
     assert not any("each draw" in text for text in texts(plots.uncertain_regions(stopped)))
 
 
+def test_a_design_that_fails_in_all_cells_has_no_outline(result):
+    import dataclasses
+
+    lost = dataclasses.replace(result, nominal=np.full_like(result.nominal, np.nan))
+    before, after = (
+        len(plots.uncertain_regions(one).axes[1].collections) for one in (result, lost)
+    )
+    assert after == before - 1
+
+
 @pytest.mark.parametrize("total", [1, 9, 10, 20, 40, 10_000])
 @pytest.mark.parametrize("probability", [0.05, 0.5, 0.95])
 def test_a_band_ends_between_two_counts(total, probability):

@@ -117,6 +117,13 @@ def test_the_table_of_stands_holds_the_rule_at_each(heavy):
     assert {path: one[at] for path, one in heavy.stand_gains.items()} == gains
 
 
+def test_the_picture_gives_the_unit_of_each_number(heavy):
+    gains = {"controller.absorption": 1.0, "controller.high_pass": 20.0}
+    rows = tuple(replace(one, gains=gains, stale_gains=gains) for one in heavy.rows)
+    panels = drillctl.plots.schedule(replace(heavy, rows=rows)).axes
+    assert [panel.get_ylabel() for panel in panels[:2]] == ["absorption", "high-pass (s)"]
+
+
 def test_searched_gains_begin_with_those_of_the_depth_before():
     values = {"schedule.law": "tuned", "schedule.realizations": 12, "schedule.kept_from": 0.9}
     result = schedule(line(**SMALL | values | {"schedule.values": "2800 m:3000 m:2"}))

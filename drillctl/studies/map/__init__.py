@@ -85,7 +85,7 @@ def pictures(result: Sweep) -> Iterator[Picture]:
         "map", f"J1 over the map{', with ' * bool(marked)}{', '.join(marked)}.", alt,
         lambda system: draw(result, system=system), paper=len(axes) == 2,
     )  # fmt: skip
-    if len(axes) == 2:
+    if len(axes) == 2 and minimum is not None:
         yield Picture(
             "responses", "Speeds of bit and top drive at cells of growing J1.",
             "Time responses at the best cell and at cells of growing J1.",
