@@ -193,6 +193,21 @@ def test_the_tone_is_ranked_first_and_windows_keep_to_stretches(log):
     assert windows.swing.argmax() != first.best  # the step is larger
 
 
+@pytest.mark.parametrize(("rows", "twice"), [
+    (slice(None), True), (slice(3000, 4000), True), (slice(8000, None), True), (None, False),
+])  # fmt: skip
+def test_rows_are_not_counted_twice(rows, twice, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    whole = np.array([TIME, TORQUE, SPEED])
+    more = np.concatenate([whole[:, rows], whole[:, :100] + 0.3], axis=1) if twice else whole + 0.3
+    csv(tmp_path / "a.csv")
+    csv(tmp_path / "b.csv", columns=[np.arange(more.shape[1]) / RATE, *more[1:]])
+    for order in (["a.csv", "b.csv"], ["b.csv", "a.csv"]):
+        assert run(["log", *order]) == 2 * twice
+        told = f"drillctl: {order[1]}: holds rows of {order[0]}: give each row once\n"
+        assert (told == capsys.readouterr().err) == twice
+
+
 def test_the_command(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     csv(tmp_path / "a.csv", "t,TQ,RPM")

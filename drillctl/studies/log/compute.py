@@ -24,6 +24,7 @@ from drillctl.store.codec import label
 from drillctl.store.json_files import picked
 from drillctl.store.result import Result
 
+PIECE, PIECES = 32, 16  # rows of a piece of a log by which it is known again, and how many
 BINS = 1500  # of the outline of a signal over time
 DRAWN = ("top_torque", "top_speed", "weight_on_bit", "bit_speed")
 
@@ -182,7 +183,21 @@ def read_logs(
     """The logs of one well, with the columns that a design names."""
     if not files:
         raise InputError("there is no log: name one, or [log] files in the design", "--log")
-    return tuple(read_log(file, design.tables.log.given, progress) for file in files)
+    logs = tuple(read_log(file, design.tables.log.given, progress) for file in files)
+    for number, log in enumerate(logs):
+        for other in logs[:number]:
+            if _holds_some(other, log) or _holds_some(log, other):
+                # Rows that count twice leave a fit surer than it is, and are no test of it.
+                raise InputError(f"holds rows of {other.file}: give each row once", log.file)
+    return logs
+
+
+def _holds_some(log: Log, other: Log) -> bool:
+    """Whether a log holds one of a few pieces of another, whose torques tell it from any other."""
+    all_of_it, torque = log.signals["top_torque"].tobytes(), other.signals["top_torque"]
+    begins = np.linspace(0, max(len(torque) - PIECE, 0), PIECES).astype(int)
+    pieces = (torque[begin : begin + PIECE] for begin in begins)
+    return any(len(np.unique(p)) > PIECE // 2 and p.tobytes() in all_of_it for p in pieces)
 
 
 def named_files(design: Design) -> list[Path]:
