@@ -20,11 +20,6 @@ DESIGN = "monteiro-trindade-140kn"
 
 
 @pytest.fixture(scope="module")
-def design():
-    return drillctl.load(DESIGN)
-
-
-@pytest.fixture(scope="module")
 def boundary(design):
     return gain_boundary(design)
 

@@ -12,13 +12,6 @@ from drillctl.errors import InputError
 from drillctl.linear import drive_impedance
 from drillctl.linear.tuning import soft_torque, stiff_speed
 
-DESIGN = "monteiro-trindade-140kn"
-
-
-@pytest.fixture(scope="module")
-def design():
-    return drillctl.load(DESIGN)
-
 
 @pytest.mark.parametrize(("share", "reflection"), [(1.0, 0.0), (0.5, 1 / 3), (0.25, 0.6)])
 def test_tuned_drive_reflects_what_it_should(design, share, reflection):

@@ -8,8 +8,6 @@ import pytest
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import closed_loop, frequency_response, open_loop, plant, response_of
-from drillctl.linear.loop_model import with_slope
-from drillctl.linear.state_space import closed_loop_matrices
 
 DESIGN = "monteiro-trindade-140kn"
 PIPE = "drillstring.sections.pipe"
@@ -44,16 +42,6 @@ def test_every_route_gives_the_state_spaces_response(name, values, loop):
         found = frequency_response(design, FREQUENCY, loop, model=model)
         assert (found.inputs, found.outputs) == (expected.inputs, expected.outputs)
         close(found.response, expected.response)
-
-
-def test_slope_of_the_rock_closed_around_the_bit():
-    design = drillctl.load(DESIGN)
-    a, b, c, d = with_slope(closed_loop_matrices(design.string, 625.0, 125.0), 290.0)
-    s = 2j * np.pi * FREQUENCY
-    expected = np.array([c @ np.linalg.solve(x * np.eye(len(a)) - a, b) + d for x in s])
-    design = design.replace({"controller.kp": 625.0, "controller.ki": 125.0})
-    found = frequency_response(design, FREQUENCY, "closed_loop", slope=290.0)
-    close(found.response, expected)
 
 
 def test_the_continuum_is_near_and_not_the_same():

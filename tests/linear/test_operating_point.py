@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear.ends import ends_of
+from drillctl.linear.loop_model import loop_poles
 from drillctl.linear.operating_point import at_speed, equilibria, operating_point
 from drillctl.linear.slope_margin import slope_margin
-from drillctl.linear.state_space import closed_loop_matrices
 
 DESIGN = "monteiro-trindade-140kn"
 LUMPED = "navarro-lopez-2dof"
@@ -34,8 +34,7 @@ def torque_by_hand(weight, speed):
 
 def growth(design, slope):
     """Largest real part of the poles with the falling slope at the bit."""
-    a, b, c, _ = closed_loop_matrices(design.string, *design.top_drive.gains())
-    return np.linalg.eigvals(a - slope * np.outer(b[:, 1], c[1])).real.max()
+    return loop_poles(design.string, *design.top_drive.gains(), slope).real.max()
 
 
 def test_published_equilibria_of_two_inertias():

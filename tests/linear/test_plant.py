@@ -13,7 +13,8 @@ from scipy.optimize import brentq
 
 import drillctl
 from drillctl.linear import closed_loop, open_loop, plant
-from drillctl.linear.state_space import closed_loop_matrices, plant_matrices
+from drillctl.linear.loop_model import loop_poles
+from drillctl.linear.state_space import plant_matrices
 
 HOLDS = {
     "plant": "banded frequency response, 1e-10; signs",
@@ -29,14 +30,8 @@ def of(design=DESIGN, **values):
     return drillctl.load(design, **values)
 
 
-def with_slope(string, kp, ki, slope):
-    """State matrix of the loop with the bit torque -slope x bit speed."""
-    a, b, c, _ = closed_loop_matrices(string, kp, ki)
-    return a - slope * np.outer(b[:, 1], c[1])
-
-
-def abscissa(string, kp, ki, slope=SLOPE):
-    return np.linalg.eigvals(with_slope(string, kp, ki, slope)).real.max()
+def abscissa(string, kp, ki):
+    return loop_poles(string, kp, ki, SLOPE).real.max()
 
 
 def steady_state(system, inputs):
@@ -174,17 +169,6 @@ def test_design_offers_plant_and_loop():
     design = of()
     np.testing.assert_array_equal(design.plant().A, plant(design.string).A)
     np.testing.assert_array_equal(design.loop().A, closed_loop(design).A)
-
-
-@pytest.mark.parametrize("pole", [-0.1772 + 0.4407j, -0.0574 + 0.7822j, -0.0115 + 3.697j], ids=str)
-def test_poles_with_the_slope_of_the_bit_law(pole):
-    design = of()
-    _, slope = design.bit_rock.torque_and_slope(140e3, design.speed, np.exp)
-    assert -slope == pytest.approx(SLOPE, abs=5e-4)
-    poles = np.linalg.eigvals(with_slope(design.string, 625.0, 125.0, -slope))
-    nearest = poles[np.argmin(np.abs(poles - pole))]
-    assert nearest.real == pytest.approx(pole.real, abs=5.1e-5)
-    assert nearest.imag == pytest.approx(pole.imag, abs=5.1e-4)
 
 
 def test_linear_region_of_the_gains():

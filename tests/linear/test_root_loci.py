@@ -9,13 +9,6 @@ import drillctl
 from drillctl.errors import InputError
 from drillctl.linear import critical_weight_on_bit, root_locus
 
-DESIGN = "monteiro-trindade-140kn"
-
-
-@pytest.fixture(scope="module")
-def design():
-    return drillctl.load(DESIGN)
-
 
 def test_every_row_holds_the_poles_of_its_design(design):
     found = root_locus(design, "controller.kp", np.linspace(300.0, 900.0, 61))

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dense import answered, solved
 
 import drillctl
 from drillctl.errors import InputError
@@ -67,33 +68,11 @@ STRINGS = {
 }
 
 
-def solved(string, s, top=0.0, bit=0.0):
-    """Columns top, bit, transfer, transfer, pipe torque (twice) from M, C, K; own dense solve."""
-    m, c, k = (x.toarray() for x in (string.mass, string.damping, string.stiffness))
-    forces = np.zeros((string.nodes, 2))
-    forces[0, 0] = forces[-1, 1] = 1.0
-    top, bit = np.broadcast_to(top, s.shape), np.broadcast_to(bit, s.shape)
-    found = []
-    for at, above, below in zip(s, top, bit, strict=True):
-        matrix = k + at * c + at**2 * m
-        matrix[0, 0] += at * above
-        matrix[-1, -1] += at * below
-        angle = np.linalg.solve(matrix, forces)
-        link = string.element_stiffness[0] + at * string.element_damping[0]
-        pipe = link * (angle[0] - angle[1])
-        v = at * angle
-        found.append([v[0, 0], v[-1, 1], v[-1, 0], v[0, 1], pipe[0], pipe[1]])
-    return np.array(found).T
-
-
 def check(seen, expected, rtol):
-    top, bit, down, up, pipe_from_top, pipe_from_bit = expected
-    np.testing.assert_allclose(seen.top, top, rtol=rtol)
-    np.testing.assert_allclose(seen.bit, bit, rtol=rtol)
-    np.testing.assert_allclose(seen.transfer, down, rtol=rtol)
-    np.testing.assert_allclose(seen.transfer, up, rtol=rtol)
-    np.testing.assert_allclose(seen.pipe_from_top, pipe_from_top, rtol=rtol)
-    np.testing.assert_allclose(seen.pipe_from_bit, pipe_from_bit, rtol=rtol)
+    """Mobilities of both ends, across from either, and both pipe torques."""
+    found = (seen.top, seen.bit, seen.transfer, *seen[2:])
+    for value, exact in zip(found, expected, strict=True):
+        np.testing.assert_allclose(value, exact, rtol=rtol)
 
 
 @pytest.mark.parametrize("name", STRINGS)
@@ -134,12 +113,10 @@ def test_on_the_real_axis(s):
 @pytest.mark.parametrize("name", STRINGS)
 def test_named_responses_have_signals_and_signs_of_the_plant(name):
     string = STRINGS[name]()
-    a, b, c, d = plant_matrices(string)
+    expected = answered(plant_matrices(string), HZ)
     for route in ("finite-elements", "matrices"):
         response = frequency_response(string, HZ, model=route).response
-        for f, at in zip(HZ, range(len(HZ)), strict=True):
-            expected = c @ np.linalg.solve(2j * math.pi * f * np.eye(len(a)) - a, b) + d
-            np.testing.assert_allclose(response[at], expected, rtol=1e-10)
+        np.testing.assert_allclose(response, expected, rtol=1e-10)
 
 
 @pytest.mark.parametrize("name", DESIGNS)
@@ -147,16 +124,12 @@ def test_named_responses_have_signals_and_signs_of_the_plant(name):
 def test_closed_loop_with_the_falling_slope_against_state_space(name, route):
     design, values = DESIGNS[name]
     rig = drillctl.load(design, **values)
-    kp, ki = rig.top_drive.gains()
     slope = 0.6 * 290.0
-    a, b, c, d = closed_loop_matrices(rig.string, kp, ki)
-    a = a - slope * np.outer(b[:, 1], c[1])
+    expected = answered(closed_loop_matrices(rig.string, *rig.top_drive.gains()), HZ, slope)
     found = frequency_response(rig, HZ, loop="closed_loop", model=route, slope=slope)
     assert found.outputs == ("top_speed", "bit_speed", "pipe_torque", "twist", "top_torque")
-    for f, response in zip(HZ, found.response, strict=True):
-        expected = c @ np.linalg.solve(2j * math.pi * f * np.eye(len(a)) - a, b) + d
-        # What the drive adds to a torque on the string vanishes where kp and ki do.
-        np.testing.assert_allclose(response, expected, rtol=1e-9, atol=1e-300)
+    # What the drive adds to a torque on the string vanishes where kp and ki do.
+    np.testing.assert_allclose(found.response, expected, rtol=1e-9, atol=1e-300)
 
 
 def test_unknown_routes_are_refused_with_the_nearest():
@@ -173,12 +146,7 @@ TOP, BIT = 500.0, 394.0
 
 def check_by_hand(seen, v0, v1, pipe, rtol=1e-11):
     """v0, v1, pipe: each a pair, per torque on the top and on the bit."""
-    np.testing.assert_allclose(seen.top, v0[0], rtol=rtol)
-    np.testing.assert_allclose(seen.transfer, v0[1], rtol=rtol)
-    np.testing.assert_allclose(seen.transfer, v1[0], rtol=rtol)
-    np.testing.assert_allclose(seen.bit, v1[1], rtol=rtol)
-    np.testing.assert_allclose(seen.pipe_from_top, pipe[0], rtol=rtol)
-    np.testing.assert_allclose(seen.pipe_from_bit, pipe[1], rtol=rtol)
+    check(seen, (v0[0], v1[1], v0[1], v1[0], *pipe), rtol)
 
 
 @pytest.mark.parametrize("hz", [0.02, 0.1, 0.31, 0.9, 2.7, 5.0])

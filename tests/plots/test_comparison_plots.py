@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
-import warnings
-
 import numpy as np
 import pytest
+from looks import drawn, legend
 from matplotlib.figure import Figure
 
 import drillctl
@@ -54,19 +52,15 @@ def result(design):
     return made(design, case(design, "one", 0.0), case(design, "two", -4.0, failed=6))
 
 
-def drawn(figure):
-    """Render, with any warning an error; the texts of the figure in one."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        figure.savefig(io.BytesIO(), dpi=40)
-    (ax,) = figure.axes
-    texts = [t.get_text() for t in ax.texts] + [ax.get_xlabel(), ax.get_title(loc="left")]
-    texts += [t.get_text() for t in ax.get_legend().get_texts()]
-    return ax, "\n".join([*texts, figure._supxlabel.get_text()])
+def told(figure):
+    """The axes, and the texts of the figure in one."""
+    (ax,) = drawn(figure)
+    texts = [*(t.get_text() for t in ax.texts), ax.get_xlabel(), ax.get_title(loc="left")]
+    return ax, "\n".join([*texts, *legend(ax), figure.get_supxlabel()])
 
 
 def test_curves_end_where_draws_failed(result):
-    ax, text = drawn(j1_distributions(result))
+    ax, text = told(j1_distributions(result))
     curves = {line.get_label(): line.get_ydata()[-1] for line in ax.lines[:1]}
     assert curves == {"one": 1.0}
     two = next(line for line in ax.lines if line.get_label() == "two (6 failed)")
@@ -83,7 +77,7 @@ def test_curves_end_where_draws_failed(result):
 
 
 def test_differences_stand_at_their_share_of_the_baseline(result):
-    ax, text = drawn(paired_differences(result))
+    ax, text = told(paired_differences(result))
     labels = [label.get_text() for label in ax.get_yticklabels()]
     assert labels[0] == "J1"
     assert "settling time" not in labels
@@ -99,7 +93,7 @@ def test_intervals_are_drawn(design):
     noisy = case(design, "two", -4.0)
     noisy.measures["j1"][:] += np.random.default_rng(1).normal(0.0, 2.0, COUNT)
     result = made(design, case(design, "one", 0.0), noisy)
-    ax, _ = drawn(paired_differences(result))
+    ax, _ = told(paired_differences(result))
     bars = ax.containers[0].lines[2][0].get_segments()
     low, high = bars[0][:, 0]
     base = result.baseline.measures["j1"].mean()
@@ -109,7 +103,7 @@ def test_intervals_are_drawn(design):
 
 
 def test_j1_against_weight(result):
-    ax, text = drawn(j1_against_weight(result))
+    ax, text = told(j1_against_weight(result))
     means = [c.lines[0].get_xydata()[0] for c in ax.containers]
     for mean, found in zip(means, result.cases, strict=True):
         # Over draws 6 to 29 in both cases: the others failed in one of them.
@@ -119,15 +113,15 @@ def test_j1_against_weight(result):
     dots = [line for line in ax.lines if line.get_marker() == "."]
     assert [int(np.isfinite(line.get_ydata()).sum()) for line in dots] == [30, 24]
     assert "mean WOB after 20 s (kN)" in text
-    _, text = drawn(j1_against_weight(result, system="field"))
+    _, text = told(j1_against_weight(result, system="field"))
     assert "(klbf)" in text
 
 
 def test_no_case_is_called_unbeaten_where_weights_were_made_equal(design):
     cases = case(design, "one", 0.0), case(design, "two", 4.0)
-    assert "unbeaten in both" in drawn(j1_against_weight(made(design, *cases)))[1]
+    assert "unbeaten in both" in told(j1_against_weight(made(design, *cases)))[1]
     equal = made(design, *cases, equal_mean_weight=True)
-    assert "unbeaten" not in drawn(j1_against_weight(equal))[1]
+    assert "unbeaten" not in told(j1_against_weight(equal))[1]
 
 
 def ringed(ax):
@@ -140,21 +134,20 @@ def test_the_unbeaten_are_ringed(design):
                            (("light", 0.0), ("heavy", 4.0), ("worse", 8.0)))  # fmt: skip
     worse.measures["mean_weight_after_start"][:] = 142e3
     result = made(design, light, heavy, worse)
-    ax, text = drawn(j1_against_weight(result))
+    ax, text = told(j1_against_weight(result))
     means = [
         [one.measures["mean_weight_after_start"].mean() / 1e3, one.measures["j1"].mean()]
         for one in result.cases
     ]
     assert np.allclose(ringed(ax), means[:2])
     assert "no other case has less J1 and more weight" in text
-    labels = [label.get_text() for label in ax.get_legend().get_texts()]
-    assert labels == ["light", "heavy", "worse", UNBEATEN]
+    assert legend(ax) == ["light", "heavy", "worse", UNBEATEN]
 
 
 def test_one_that_beats_all_is_ringed_alone(design):
     best = case(design, "best", -5.0)
     best.measures["mean_weight_after_start"][:] = 200e3
-    ax, _ = drawn(j1_against_weight(made(design, case(design, "one", 0.0), best)))
+    ax, _ = told(j1_against_weight(made(design, case(design, "one", 0.0), best)))
     assert np.allclose(ringed(ax), [[200.0, 19.5]])
 
 
@@ -165,7 +158,7 @@ def test_a_case_is_not_the_better_for_failing_at_the_worst(design):
         found.measures["mean_weight_after_start"][:] = 140e3
     two.measures["j1"][20:] = np.nan
     assert np.nanmean(two.measures["j1"]) < one.measures["j1"].mean()
-    ax, _ = drawn(j1_against_weight(made(design, one, two)))
+    ax, _ = told(j1_against_weight(made(design, one, two)))
     assert np.allclose(ringed(ax), [[140.0, one.measures["j1"][:20].mean()]])
 
 
@@ -174,8 +167,7 @@ def test_no_draw_in_common_is_no_mean(design):
     one.measures["j1"][:15] = np.nan
     two.measures["j1"][15:] = np.nan
     figure = j1_against_weight(made(design, one, two))
-    figure.savefig(io.BytesIO(), dpi=40)
-    (ax,) = figure.axes
+    (ax,) = drawn(figure)
     assert not ax.containers
     assert "means over the 0 draws" in figure._supxlabel.get_text()
 
@@ -188,7 +180,7 @@ def test_the_unbeaten():
 def test_equal_means_are_told(design):
     result = made(design, case(design, "one", 0.0), equal_mean_weight=True)
     for picture in (j1_distributions, j1_against_weight):
-        text = drawn(picture(result))[1]
+        text = told(picture(result))[1]
         assert "Nominal weights shifted for equal means." in text
         assert max(map(len, text.splitlines())) <= 110
 
@@ -200,11 +192,11 @@ def test_one_case_has_no_differences(design):
 
 def test_a_case_that_failed_altogether_can_be_drawn(design):
     result = made(design, case(design, "one", 0.0), case(design, "two", 0.0, failed=COUNT))
-    assert "two (30 failed)" in drawn(j1_distributions(result))[1]
-    ax, text = drawn(j1_against_weight(result))
+    assert "two (30 failed)" in told(j1_distributions(result))[1]
+    ax, text = told(j1_against_weight(result))
     assert len(ax.containers) == 1  # the other still has its mean, over all draws
     assert "means over the draws" in text
-    drawn(paired_differences(result))
+    told(paired_differences(result))
 
 
 @pytest.mark.parametrize("picture", [j1_distributions, paired_differences, j1_against_weight])

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+from looks import drawn, legend, named
 from matplotlib.figure import Figure
 
 import drillctl
@@ -23,37 +23,25 @@ def design():
     return drillctl.load(DESIGN)
 
 
-def draws(figure):
-    """Render, which is when matplotlib finds most faults."""
-    picture = io.BytesIO()
-    figure.savefig(picture, dpi=40)
-    return picture.tell() > 5000
-
-
-def named(ax, label):
-    return next(line for line in ax.get_lines() if line.get_label() == label)
-
-
 def test_mode_shapes_stand_along_depth_downward(design):
     result = modes(design)
     figure = mode_shapes(result)
-    assert draws(figure)
+    assert drawn(figure)
     angle, torque, held, _ = figure.axes
     assert angle.get_ylim() == (3000.0, 0.0)
     assert angle.get_ylabel() == "depth (m)"
     np.testing.assert_array_equal(angle.get_lines()[1].get_xdata(), result.free_free[1].shape)
     np.testing.assert_array_equal(held.get_lines()[0].get_ydata(), result.node_depth)
-    labels = [text.get_text() for text in torque.get_legend().get_texts()]
-    assert labels == ["rigid body", "0.1806 Hz", "0.5916 Hz", "1.096 Hz"]
+    assert legend(torque) == ["rigid body", "0.1806 Hz", "0.5916 Hz", "1.096 Hz"]
 
 
 def test_lumped_strings_are_drawn_over_their_nodes():
     figure = mode_shapes(modes(drillctl.load("navarro-lopez-4dof")))
-    assert draws(figure)
+    assert drawn(figure)
     angle, torque = figure.axes[:2]
     assert angle.get_ylim() == (3.0, 0.0)
     assert angle.get_ylabel() == "node, 0 = top drive"
-    labels = [text.get_text() for text in torque.get_legend().get_texts()]
+    labels = legend(torque)
     assert labels[1] == "0.01588 Hz, overdamped"
     assert "damping 25.5 %" in labels[2]
 
@@ -61,7 +49,7 @@ def test_lumped_strings_are_drawn_over_their_nodes():
 def test_bode_shows_the_first_resonance(design):
     frequency = np.linspace(0.02, 0.5, 481)
     figure = bode(frequency_response(design.string, frequency))
-    assert draws(figure)
+    assert drawn(figure)
     magnitude, phase = figure.axes
     for line in magnitude.get_lines():
         assert line.get_xdata()[np.argmax(line.get_ydata())] == pytest.approx(0.1806, abs=1e-3)
@@ -81,9 +69,9 @@ def test_phase_has_gaps_where_it_wraps():
 
 def test_friction_curve_holds_the_set_at_rest(design):
     figure = friction_curves(design)
-    assert draws(figure)
+    assert drawn(figure)
     ax = figure.axes[0]
-    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    labels = legend(ax)
     assert labels[:5] == ["160 kN", "140 kN", "120 kN", "100 kN", "80 kN"]
     speed, torque = named(ax, "140 kN").get_data()
     at_rest = torque[speed == 0.0]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import subprocess
 import sys
-import warnings
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from looks import drawn, legend, named
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
@@ -73,23 +72,6 @@ def boundary(design):
     return gain_boundary(design)
 
 
-def drawn(figure):
-    """Render without a single warning."""
-    picture = io.BytesIO()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        figure.savefig(picture, dpi=40)
-    return picture.tell() > 3000
-
-
-def named(ax, start):
-    return next(line for line in ax.get_lines() if str(line.get_label()).startswith(start))
-
-
-def words(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
-
-
 def texts(ax):
     return " ".join(text.get_text() for text in ax.texts)
 
@@ -106,7 +88,7 @@ def test_bode_compares_models(design):
     assert len(lines) == len(phase.get_lines()) == 4
     assert len({line.get_linestyle() for line in lines}) == 4
     assert lines[0].get_linewidth() > lines[2].get_linewidth()
-    assert words(magnitude)[2] == "String without control (continuum): top torque to top speed"
+    assert legend(magnitude)[2] == "String without control (continuum): top torque to top speed"
     level = 20.0 * np.log10(np.abs(both[1].between("top_torque", "bit_speed")))
     np.testing.assert_array_equal(lines[3].get_ydata(), level)
     assert magnitude.get_ylabel() == "magnitude (dB re 1 rad/s/(N m))"
@@ -116,7 +98,7 @@ def test_bode_of_any_signal(design):
     closed = frequency_response(design, FREQUENCIES, "closed_loop")
     magnitude, phase = plots.bode(closed).axes
     assert magnitude.get_ylabel() == "magnitude (dB)"
-    assert words(magnitude) == ["set speed to top speed", "set speed to bit speed"]
+    assert legend(magnitude) == ["set speed to top speed", "set speed to bit speed"]
     assert magnitude.get_title(loc="left") == "Bode plot: string with its drive"
     magnitude, phase = plots.bode(closed, source="bit_torque", targets=["twist"]).axes
     assert magnitude.get_ylabel() == "magnitude (dB re 1 rad/(N m))"
@@ -149,7 +131,7 @@ def test_mobility_in_rpm_per_kilonewton_metre(which, request):
     bit, top = figure.axes
     assert drawn(figure)
     assert (len(bit.get_lines()), len(top.get_lines())) == (2, 1)
-    assert words(bit) == ["String without control", "String with its drive"]
+    assert legend(bit) == ["String without control", "String with its drive"]
     assert bit.get_ylabel() == "mobility at the bit (rpm/(kN m))"
     assert top.get_xlabel() == "frequency (Hz)"
     at_bit = np.abs(closed.between("bit_torque", "bit_speed")) * 30e3 / np.pi
@@ -175,7 +157,7 @@ def test_impedance_over_that_of_the_pipe(design):
     figure = plots.drive_impedance([soft, stiff], marks={"stick-slip": 0.1275})
     above, below = figure.axes
     assert drawn(figure)
-    assert words(above) == ["design", "stiff"]
+    assert legend(above) == ["design", "stiff"]
     np.testing.assert_array_equal(
         named(above, "stiff").get_ydata(), np.abs(stiff.impedance) / stiff.pipe
     )
@@ -289,7 +271,7 @@ def test_nichols_has_the_critical_point_in_the_middle(analysed):
     same = np.isfinite(x)
     assert same.mean() > 0.99
     np.testing.assert_allclose(back[same], transfer[same], rtol=1e-9)
-    assert "disk margin 0.103" in words(ax)
+    assert "disk margin 0.103" in legend(ax)
     assert {"|S| 1.4", "|S| 2", "|S| 4"} <= {t.get_text() for t in ax.texts}
     assert "outside the picture 30 times" in texts(ax)
 
@@ -344,7 +326,7 @@ def test_map_draws_each_quantity(gains_map, quantity):
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("Kp (N m s)", "Ki (N m)")
     unit = QUANTITIES[quantity][0]
     assert unit == "1" or bar.get_ylabel().endswith(")")
-    assert "stability boundary, D* = D" in words(ax)
+    assert "stability boundary, D* = D" in legend(ax)
     assert named(ax, "the design").get_xdata() == [625.0]
     assert named(ax, "the design").get_ydata() == [125.0]
     assert "grey" in figure.get_supxlabel()
@@ -412,7 +394,7 @@ def test_map_of_other_parameters(bistable, boundary):
     assert drawn(same)
     low, high = same.axes[0].collections[0].get_clim()
     assert (low, high) == pytest.approx((0.9 * 327.0863 - 0.1, 1.1 * 327.0863 + 0.1), rel=1e-6)
-    assert "largest" not in " ".join(words(same.axes[0]))
+    assert "largest" not in " ".join(legend(same.axes[0]))
     with pytest.raises(InputError, match="boundary of gains does not fit"):
         plots.loop_map(result, boundary=boundary)
 
@@ -436,7 +418,7 @@ def test_boundary_is_drawn_with_its_region(design, boundary):
     (region,) = ax.patches
     box = region.get_path().get_extents()
     assert (box.x0, box.y0, box.x1, box.y1) == pytest.approx(boundary.region.bounds)
-    assert "continuum" in words(ax)
+    assert "continuum" in legend(ax)
     assert named(ax, "gains of the design").get_xdata() == [625.0]
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("Kp (N m s)", "Ki (N m)")
     assert (ax.get_xlim(), ax.get_ylim()) == boundary.window
@@ -449,10 +431,10 @@ def test_boundary_is_drawn_with_its_region(design, boundary):
 def test_boundary_without_branches(bistable):
     figure = plots.gain_boundary(gain_boundary(bistable))
     assert drawn(figure)
-    assert words(figure.axes[0]) == ["stable gains"]
+    assert legend(figure.axes[0]) == ["stable gains"]
     nothing = plots.gain_boundary(gain_boundary(bistable, slope=1e4))
     assert drawn(nothing)
-    assert "no stable gains within the picture" in words(nothing.axes[0])
+    assert "no stable gains within the picture" in legend(nothing.axes[0])
 
 
 # --- root locus ------------------------------------------------------------------------------

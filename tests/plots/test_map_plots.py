@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import warnings
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from looks import drawn, legend, named
 from matplotlib.figure import Figure
 
 import drillctl
@@ -53,23 +53,6 @@ def field():
     x = (KP.values - 200.0) / 100.0
     y = (WEIGHT.values - 125e3) / 25e3
     return 12.0 + np.add.outer(x**2, 3.0 * y**2)
-
-
-def drawn(figure):
-    """Render without a single warning, which is when matplotlib finds most faults."""
-    picture = io.BytesIO()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        figure.savefig(picture, dpi=40)
-    return picture.tell() > 3000
-
-
-def legend(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
-
-
-def named(ax, label):
-    return next(line for line in ax.get_lines() if line.get_label() == label)
 
 
 def contour_levels(ax):

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
-import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import shapely
+from looks import drawn, legend
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 
@@ -46,18 +45,10 @@ def result(design):
     return compare(cases, realizations=2)
 
 
-def drawn(figure):
-    """Render, with any warning an error; the figure's axes."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        figure.savefig(io.BytesIO(), dpi=40)
-    return figure.axes
-
-
 def regions(result, **options):
     (ax,) = drawn(compared_regions(result, **options))
     patches = [patch for patch in ax.patches if isinstance(patch, PathPatch)]
-    return ax, patches, [text.get_text() for text in ax.get_legend().get_texts()]
+    return ax, patches, legend(ax)
 
 
 # --- regions -----------------------------------------------------------------------------------
@@ -183,9 +174,8 @@ def test_lines_are_the_responses(result):
     assert widths[0] > widths[1] > widths[2]
     assert panels[2].get_xlabel() == "time (s)"
     assert panels[0].get_xlim() == panels[2].get_xlim() == (0.0, 30.0)
-    labels = [text.get_text() for text in panels[2].get_legend().get_texts()]
     j1 = result.baseline.nominal.response.measures.j1
-    assert labels[0] == f"constant (J1 {j1:.1f} s)"
+    assert legend(panels[2])[0] == f"constant (J1 {j1:.1f} s)"
 
 
 def test_field_units_of_responses(result):

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
-import warnings
-
 import numpy as np
 import pytest
+from looks import drawn, legend
 from matplotlib.figure import Figure
 
 import drillctl
@@ -51,18 +49,6 @@ def result(design):
         sticking_from_rest=[(1, 2), (0, 0)],
         failed=[(4, 0)],
     )
-
-
-def drawn(figure):
-    picture = io.BytesIO()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        figure.savefig(picture, dpi=40)
-    return picture.tell() > 3000
-
-
-def legend(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def covered(contours, point):
