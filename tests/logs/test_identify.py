@@ -177,6 +177,17 @@ def test_a_straight_fall_leaves_beta_open():
     assert known == {"a1": False, "a2": True, "beta": False, "static_friction": True}
 
 
+def test_what_is_said_is_said_of_the_law_that_is_written(motion, tmp_path):
+    time, torque, speed, bit = sampled(motion, 100.0, 40.0, 150.0)
+    speed = np.where(time < 50.0, speed[0], speed)  # so that another law explains more of it
+    path = write(tmp_path / "a.csv", (time, torque, speed, bit), weight=WEIGHT)
+    result = drillctl.identify(design(**PI), [path])
+    leading = max(result.fits, key=lambda one: one.explained)
+    assert leading.name != result.law == "navarro-lopez-suarez"
+    assert result.identifiable["beta"]
+    assert not any("flat" in one for one in result.findings)
+
+
 def test_several_damped_sections(tmp_path):
     """The log is made by the reference solver: two sections, damping, another bit."""
     pipe = {"pipe": "5 in 19.5 lb/ft", "length": "2500 m", "stiffness_damping": "0.001 s"}

@@ -234,9 +234,8 @@ def identify(
     if any(n.off for n in numbers) and checked is not None:
         described = [_widened(d, f, checked) for d, f in zip(described, fits, strict=True)]
     law = settings.law or _best(described, fits)
-    own = next(f for f in described if f.name == (law if settings.law else main.family.name))
-    findings, identifiable = _findings(main, own, numbers, known, at)
-    chosen = next(f for f in fits if f.family.name == law)
+    chosen, own = next(both for both in zip(fits, described, strict=True) if both[1].name == law)
+    findings, identifiable = _findings(chosen, own, numbers, known, at)
     below_surface = _downhole(problem, main)
     if below_surface is not None:
         findings.append(
@@ -427,7 +426,7 @@ def _best(described: list[FittedLaw], fits: list[Fit]) -> str:
 def _findings(
     main: Fit, law: FittedLaw, numbers: list[StringNumber], known: bool, at: float
 ) -> tuple[list[str], dict[str, bool]]:
-    """What the log says and does not say."""
+    """What the log says and does not say, by the law that is written."""
     findings: list[str] = []
     sticks = any(main.sticks)
     said = dict.fromkeys((*law.names, "static_friction"), True)
