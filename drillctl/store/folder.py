@@ -133,6 +133,8 @@ def resolved(folder: str | Path, where: str = "--out") -> Path:
     text = os.fspath(folder)
     if "::" in text or "\0" in text or re.match(r"[\w+.-]{2,}:/", text):
         raise InputError(f"{shown(text)} is the address of something else than a folder", where)
+    if text.startswith("--"):  # what followed is taken for the folder that was left out
+        raise InputError(f"{shown(text)} is an option: name a folder before it", where)
     try:
         path = Path(os.path.realpath(Path(text).expanduser()))
     except RuntimeError as error:

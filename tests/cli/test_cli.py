@@ -639,6 +639,7 @@ def test_out_that_cannot_be_written(call):
         ("file/inside", "cannot be written"), ("x" * 300, "too long"), ("a/" * 2000, "too long"),
         ("a::b", "something else than a folder"), ("memory::z", "something else"),
         ("memory://z", "something else"), ("~nobody-at-all/x", "cannot be a folder"),
+        ("--json", "is an option: name a folder before it"),
     ):  # fmt: skip
         code, said, err = call("map", DESIGN, *SMALL, "--out", out)
         assert (code, said) == (2, "")
