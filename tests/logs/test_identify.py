@@ -137,6 +137,20 @@ def test_wrong_columns_are_named(noisy, tmp_path):
         identify(drillctl.load("monteiro-trindade-140kn", **rows), [path])
 
 
+@pytest.mark.parametrize("times", [1e-3, 1e3])
+def test_a_weight_in_another_unit_is_refused(times, motion, tmp_path):
+    samples = sampled(motion, 100.0, 60.0, 150.0)
+    path = write(tmp_path / "unit.csv", samples, weight=times * WEIGHT)
+    with pytest.raises(InputError, match=r"the weight on bit of this log is 1[^ ]* N at a top"):
+        identify(design(), [path])
+
+
+def test_a_weight_that_is_logged_and_left_out_is_not_called_absent(motion, tmp_path):
+    path = write(tmp_path / "none.csv", sampled(motion, 100.0, 60.0, 150.0), weight=-WEIGHT)
+    said = " ".join(identify(design(), [path]).findings)
+    assert "the weight on bit is missing or next to nothing somewhere: the curve" in said
+
+
 def test_one_sample_a_second_is_refused(motion, tmp_path):
     path = write(tmp_path / "slow.csv", sampled(motion, 1.0, 30.0, 290.0))
     with pytest.raises(InputError, match=r"1 Hz is too slow for a period of 7\.84 s"):

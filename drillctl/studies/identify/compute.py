@@ -29,6 +29,7 @@ BEYOND = 1.3  # of how far another law is away: a band that holds it, and what l
 FOREIGN = 0.005  # unexplained share of the returning wave from which units are doubted
 NEARLY = 1.1  # error of a prediction over the least one that counts as equal
 USUAL_TWIST = (0.002, 20.0)  # of a string, over what the top turns in a period
+USUAL_LEVER = (1e-4, 2.0)  # top torque over the weight on bit (m), of bits of any size
 DRAWN_POINTS = 4000  # of a portrait
 NUMBERS = {
     "travel_time": ("travel time", "s"), "impedance": ("pipe impedance", "N*m*s/rad"),
@@ -200,8 +201,8 @@ def identify(
             f"cycles of {period:.3g} s",
             "--log",
         )
-    _refuse_implausible(windows, line, period)
     held, weight = ident.weighted(windows)
+    _refuse_implausible(windows, weight, line, period)
     if "travel_time" in settings.free and not travel_time(line):
         raise InputError("a lumped string has no travel time to be fitted", "identify.free")
     problem = Problem(line, held, settings.free)
@@ -260,8 +261,10 @@ def identify(
     )  # fmt: skip
 
 
-def _refuse_implausible(windows: Sequence[Any], line: Parts, period: float) -> None:
-    """Refuse a speed or a torque that no rig has: another column, or another unit."""
+def _refuse_implausible(
+    windows: Sequence[Any], weight: float | None, line: Parts, period: float
+) -> None:
+    """Refuse a speed, a torque or a weight that no rig has: another column, or another unit."""
     speed = float(np.median([np.median(w.track.speed) for w in windows]))
     torque = float(np.median([np.median(w.track.torque) for w in windows]))
     text = ""
@@ -272,6 +275,9 @@ def _refuse_implausible(windows: Sequence[Any], line: Parts, period: float) -> N
     if not text and not USUAL_TWIST[0] <= turns <= USUAL_TWIST[1]:
         twist = torque / stiffness(line) / (2.0 * np.pi)
         text = f"top torque of this log is {torque:.4g} N m, {twist:.3g} turns of the string,"
+    lever = None if weight is None else torque / weight
+    if not text and lever is not None and not USUAL_LEVER[0] <= lever <= USUAL_LEVER[1]:
+        text = f"weight on bit of this log is {weight:.4g} N at a top torque of {torque:.4g} N m"
     if text:
         raise InputError(
             f"the {text} on the median, which no rig drills with: another column, or its unit is "
@@ -473,8 +479,10 @@ def _findings(
     if len(main.sticks) < 2:
         findings.append("one window alone: its scatter is hardly known, the band is a guess")
     if not known:
+        logged = all(w.track.weight is not None for w in main.problem.windows)
+        absent = "missing or next to nothing somewhere" if logged else "not in the log"
         findings.append(
-            f"the weight on bit is not in the log: the curve is torque at its mean weight, and the "
+            f"the weight on bit is {absent}: the curve is torque at its mean weight, and the "
             f"coefficients take it for the design's {units.full(at, 'N', 4)}"
         )
     for one in numbers:
