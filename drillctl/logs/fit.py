@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from drillctl.arrays import Array
-from drillctl.logs.inclusion import RESTS, SLIPS, advance
+from drillctl.logs.inclusion import Exponentials, Rock, advance
 from drillctl.logs.laws import Curve, Family
 from drillctl.logs.waves import FINEST, PER_SWING, Below, Factors, Track, below, split, swing
 from drillctl.rig.drillstring import Parts
@@ -126,21 +126,18 @@ class Motion:
 def run(made: Driven, curve: Curve, scale: float, begin: float | None = None) -> Motion:
     """Run the inclusion over a window, the torque of the rock times `scale`."""
     string = made.string
-    count = len(made.drive)
-    speed, other, torque = np.empty(count), np.empty(count), np.empty(count)
     start = made.begin if begin is None else begin
     start = start if start > made.slow else 0.0
-    state = _state(made, start, scale * curve.static)
-    advance(
-        string.rates, string.drive, string.torque, string.bit, string.top, made.step, made.drive,
-        curve.kind, scale * curve.static, _scaled(curve, scale), curve.knots, state,
-        RESTS if start <= 0.0 else SLIPS, speed, other, torque,
+    rock = Rock(curve.kind, scale * curve.static, _scaled(curve, scale), curve.knots)
+    speed, other, torque = advance(
+        Exponentials(string.rates, string.drive, string.torque, string.bit, string.top),
+        rock, made.step, made.drive, start <= 0.0, _state(made, start, rock.static),
     )  # fmt: skip
-    bit, top, rock = (_means(one, made) for one in (speed, other, torque))
+    bit, top, held = (_means(one, made) for one in (speed, other, torque))
     z = 2.0 * string.impedance
     up = made.down[made.lead :] - z * (bit if string.delay else top)
     rest = float(np.mean(speed[made.lead * made.part :] == 0.0))
-    return Motion(bit, rock, up, rest)
+    return Motion(bit, held, up, rest)
 
 
 def _scaled(curve: Curve, scale: float) -> Array:
