@@ -224,7 +224,7 @@ class _Line:
         own = {"length", "total length"} & set(self.cells)
         if "od" in self.cells or not own or (self.name and not _WHOLE.search(self.name.lower())):
             return False
-        length, whole = self._value(own.pop()), 0.0
+        length, whole = self.value(own.pop()), 0.0
         for section in reversed(sections):
             whole += _span(section)
             if abs(length / whole - 1.0) < 0.01 and (self.name or section is sections[0]):
@@ -234,9 +234,9 @@ class _Line:
     @property
     def longer_than_a_piece(self) -> bool:
         """Whether its length must be that of all its pieces."""
-        if "length" not in self.cells or self.adds_up or self._count() == 1:
+        if "length" not in self.cells or self.adds_up or self.count() == 1:
             return False
-        return self._value("length") > LONGEST_PIECE
+        return self.value("length") > LONGEST_PIECE
 
     def of_all_pieces(self) -> None:
         """Let its length be that of all its pieces."""
@@ -252,14 +252,6 @@ class _Line:
         return bool(own) and bool(
             re.search(r"f(ee|oo)?t|['\u2032\u2019]", self._quantity(field).lower())
         )
-
-    def own_length(self) -> float:
-        """Length of all its pieces (m), by the length of one."""
-        return self._value("length") * self._count()
-
-    def total_length(self) -> float:
-        """As the line gives it (m)."""
-        return self._value("total length")
 
     def section(self) -> dict[str, Any]:
         """Keys of a section as in a design file."""
@@ -294,17 +286,18 @@ class _Line:
             raise InputError(problem + hint, cell.where)
         return text
 
-    def _value(self, field: str) -> float:
+    def value(self, field: str) -> float:
+        """A quantity of the line (SI)."""
         kind = FIELDS[field].kind
         assert kind is not None
         return units.parse(self._quantity(field), kind)
 
     def _lengths(self) -> dict[str, Any]:
-        count = self._count()
+        count = self.count()
         keys: dict[str, Any] = {"repeat": count} if count > 1 else {}
-        total = self._value("total length") if "total length" in self.cells else None
+        total = self.value("total length") if "total length" in self.cells else None
         if "length" in self.cells:
-            if total is not None and abs(self._value("length") * count / total - 1.0) > 0.01:
+            if total is not None and abs(self.value("length") * count / total - 1.0) > 0.01:
                 raise InputError(
                     f"{count} x {self._quantity('length')} is not the total length "
                     f"{self._quantity('total length')}",
@@ -317,7 +310,8 @@ class _Line:
             return {"length": self._quantity("total length")}
         return {**keys, "length": f"{total / count!r} m"}
 
-    def _count(self) -> int:
+    def count(self) -> int:
+        """Number of its pieces."""
         cell = self.cells.get("count") or self.cells.get("stands")
         if cell is None:
             return 1
@@ -328,7 +322,7 @@ class _Line:
         if found is None or count == 0:
             raise InputError(f"{cell.text!r} is not a number of pieces", cell.where)
         stands = bool(found[2]) or "count" not in self.cells
-        short = "length" in self.cells and self._value("length") < SHORTEST_STAND
+        short = "length" in self.cells and self.value("length") < SHORTEST_STAND
         if stands and short and count > 1:
             raise InputError(
                 f"{self._quantity('length')} is the length of a joint, not of a stand: give that "
@@ -342,14 +336,14 @@ class _Line:
             return self._by_name(grade)
         outer = self._quantity("od")
         wide = _is_bit(self.name) or _WIDE.search(self.name.lower())
-        if not 0.02 <= self._value("od") <= (1.0 if wide else 0.36):
+        if not 0.02 <= self.value("od") <= (1.0 if wide else 0.36):
             raise InputError(
                 f"{outer} is no outer diameter of a component: is it of another column, "
                 "or in another unit?",
                 self.cells["od"].where,
             )
         if "id" in self.cells:
-            if self._value("id") >= self._value("od"):
+            if self.value("id") >= self.value("od"):
                 raise InputError(
                     f"inner diameter {self._quantity('id')} is not less than the outer, {outer}",
                     self.cells["id"].where,
@@ -376,8 +370,8 @@ class _Line:
     def _compare_weight(self) -> None:
         """Say where a weight is not that of the diameters, which count."""
         if "weight" in self.cells:
-            body = 0.25 * math.pi * STEEL * (self._value("od") ** 2 - self._value("id") ** 2)
-            share = self._value("weight") / body
+            body = 0.25 * math.pi * STEEL * (self.value("od") ** 2 - self.value("id") ** 2)
+            share = self.value("weight") / body
             if not 0.6 < share < 1.8:
                 self.notes.append(
                     f"{self._quantity('weight')} is {share:.2g} times what steel of its diameters "
@@ -386,9 +380,9 @@ class _Line:
 
     def _bore(self) -> tuple[float, str]:
         """An inner diameter (m) that no cell gives, and where it is from."""
-        outer = self._value("od")
+        outer = self.value("od")
         if "weight" in self.cells:
-            weight, heavy = self._value("weight"), kind_in(self.name) == "HWDP"
+            weight, heavy = self.value("weight"), kind_in(self.name) == "HWDP"
             known = drill_pipe(outer, weight, heavy)
             if known is not None:
                 return PIPES[known].inner_diameter, f"that of {known}"
@@ -441,7 +435,7 @@ class _Line:
         """The pipe of the catalogue that is next in size."""
         if not _PIPE.search(self.name.lower()):
             return None
-        kind, outer = kind_in(self.name), self._value("od")
+        kind, outer = kind_in(self.name), self.value("od")
         known = [name for name, pipe in PIPES.items() if pipe.kind == kind]
         return min(known, key=lambda name: abs(PIPES[name].outer_diameter - outer), default=None)
 
@@ -449,8 +443,8 @@ class _Line:
         """Tool joints of a pipe that gives none: of its size, weight or bore, and grade."""
         if "pipe" in section or not _PIPE.search(self.name.lower()):
             return {}
-        outer, bore = self._value("od"), units.parse(section["inner_diameter"], units.DIAMETER)
-        weight = self._value("weight") if "weight" in self.cells else None
+        outer, bore = self.value("od"), units.parse(section["inner_diameter"], units.DIAMETER)
+        weight = self.value("weight") if "weight" in self.cells else None
         known = drill_pipe(outer, weight, kind_in(self.name) == "HWDP", bore)
         if known is None or abs(PIPES[known].inner_diameter - bore) > SAME_BORE:
             self.notes.append(
@@ -501,8 +495,8 @@ def _adds_up(lines: list[_Line]) -> bool:
     for way in (both, both[::-1]):
         so_far, adds = 0.0, len(both) > 2
         for one in way:
-            so_far += one.own_length()
-            adds = adds and abs(one.total_length() / so_far - 1.0) < 0.01
+            so_far += one.value("length") * one.count()
+            adds = adds and abs(one.value("total length") / so_far - 1.0) < 0.01
         if adds:
             for one in both:
                 del one.cells["total length"]

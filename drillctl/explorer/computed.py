@@ -136,7 +136,7 @@ class _Strips:
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """What the linear loop says of a map."""
+    """Slope margin and stability boundary of the linear loop over a map."""
 
     axes: Axes
     ratio: Array  # slope that the loop tolerates over that of the rock; NaN without steady drilling
@@ -218,7 +218,7 @@ def loop(design: Design) -> Iterator[Loop]:
 
 
 def _drive(design: Design, frequency: Array) -> dict[str, Array]:
-    """What the drive is to the pipe, over frequency."""
+    """Impedance of the drive over that of the pipe, and reflection, over frequency."""
     from drillctl.linear.tuning import drive_impedance
 
     try:

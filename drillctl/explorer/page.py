@@ -2,8 +2,8 @@
 
 What goes to the browser is a text: a JSON list of answers, each a name of `takes` in `page.js` with
 its value, arrays as the bytes of their doubles. The browser tells when it has drawn pictures; until
-then the newest result of each kind waits. So a fast engine does not flood a slow browser, and what
-is dropped nobody would have seen.
+then the newest result of each kind waits. So a fast engine does not flood a slow browser:
+results that newer ones have replaced by then are not sent.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class Page:
             where = str(asked.get("path") or asked.get("name") or asked.get("do"))
             self._say(error={"at": where, "said": units.told(error.problem, self.state.units)
                              if isinstance(error, InputError) else str(error)})  # fmt: skip
-        except Exception as error:  # the page survives what nobody thought of, and says it
+        except Exception as error:  # a fault of the program is shown, and the page goes on
             LOG.exception("a request failed")
             self._say(error={"at": "", "said": f"{type(error).__name__}: {error}"})
         if self._settled or not self._owed:
@@ -243,7 +243,7 @@ class Page:
             for kind in kinds:
                 for queue in self._engine.queues:
                     queue.drop(self, kind)
-                self._shown.pop(kind, None)
+            self._forget(*kinds)
             self._ready |= dict.fromkeys(kinds, self._count)
             return
         self._put("quick", "response of A", 1, computed.response(case))

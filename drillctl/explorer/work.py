@@ -79,7 +79,7 @@ class Queue:
         with self._changed:
             self._forget((piece.owner, piece.kind))
             self._waiting[piece.owner, piece.kind] = piece
-            # A page that comes late has not the turns of all that went before it.
+            # A page that is opened later starts with as many turns as the page with the fewest.
             self._turns.setdefault(piece.owner, min(self._turns.values(), default=0))
             self._changed.notify_all()
 

@@ -173,7 +173,7 @@ def _loop(result: FrequencyResponse, analysis: LoopAnalysis | None) -> ComplexAr
     """L, refused where there is none or where it is not that of the analysis."""
     loop = result.between("speed_error", "top_speed")
     if not np.any(loop):
-        raise InputError("the drive does not react to speed: there is no loop to look at")
+        raise InputError("the drive does not react to speed: there is no loop to draw")
     if analysis is not None:
         first = int(np.argmin(result.frequency_hz))
         bit, frequency = analysis.bit_side, result.frequency_hz[first]

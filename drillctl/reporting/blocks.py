@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -86,6 +86,12 @@ class Code:
 
 
 Block = Text | Table | Checks | Figure | InteractiveMap | Code
+
+
+def figures_of(blocks: Iterable[Block]) -> list[Figure]:
+    """The figures among blocks, that of a map too."""
+    found = (one.figure if isinstance(one, InteractiveMap) else one for one in blocks)
+    return [one for one in found if isinstance(one, Figure)]
 
 
 @dataclass(frozen=True)

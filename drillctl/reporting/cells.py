@@ -28,6 +28,7 @@ FILE = "cells.json"
 MOST = 200  # most cells with stored time responses
 SAMPLES = 300  # intervals of a time response
 PART = 10  # speeds are stored in units of 1 / PART rpm
+SPEED = "operating_point.speed"
 
 
 def traced(design: Design, run: Run) -> dict[str, Any]:
@@ -48,7 +49,6 @@ def traced(design: Design, run: Run) -> dict[str, Any]:
         "own": own,
         "best": best,
         "duration": design.tables.simulation.duration,
-        "set_speed": design.speed / units.RPM,
         "part": PART,
         "traced": chosen,
         "bit": _whole(bit),
@@ -73,9 +73,10 @@ def interactive(gathered: Gathered, block: Block) -> Block:
     return InteractiveMap(block, lambda: shown(own.folder, result, gathered.words))
 
 
-def shown(folder: Path, result: Sweep, words: Words) -> dict[str, object]:
+def shown(folder: Path, result: Sweep, words: Words) -> dict[str, Any]:
     """Read what `traced` wrote, with axes in the units of the reader."""
-    held: dict[str, object] = json.loads((folder / FILE).read_text(encoding="utf-8"))
+    held: dict[str, Any] = json.loads((folder / FILE).read_text(encoding="utf-8"))
+    held["set_speed"] = _set_speeds(result, held["traced"])
     held["axes"] = [
         {
             "name": name_of(axis.path),
@@ -85,6 +86,12 @@ def shown(folder: Path, result: Sweep, words: Words) -> dict[str, object]:
         for axis in result.axes
     ]
     return held
+
+
+def _set_speeds(result: Sweep, cells: list[int]) -> list[float]:
+    """Set speeds of cells (rpm): those of the map, if it runs over them."""
+    speeds = [_at(result.axes, cell).get(SPEED, result.design.speed) for cell in cells]
+    return [float(f"{speed / units.RPM:.6g}") for speed in speeds]
 
 
 def _short(value: float) -> float | None:
@@ -156,7 +163,7 @@ def _responses(
             continue
         prepared = prepare(group.telling, group.design.tables.simulation)
         time, signals = trace(group.some(lane[rows]), prepared, times[1])
-        for row, column in zip(rows, range(len(rows)), strict=True):
+        for column, row in enumerate(rows):
             bit[row] = np.interp(times, time, signals["bit_speed"][:, column])
             top[row] = np.interp(times, time, signals["top_speed"][:, column])
         progress.advance(len(rows))

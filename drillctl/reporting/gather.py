@@ -114,11 +114,8 @@ PROFILES = {profile.name: profile for profile in (QUICK, STANDARD, FULL)}  # pro
 def _recipes() -> dict[str, tuple[Kind, Recipe]]:
     """Every run of a report by name, with the study that it is of, in order of execution."""
     placed = [(study, recipe) for study in (*studies().values(), CELLS) for recipe in study.recipes]
-    return {recipe.name: (study, recipe) for study, recipe in sorted(placed, key=_order)}
-
-
-def _order(placed: tuple[Kind, Recipe]) -> int:
-    return placed[1].order
+    placed.sort(key=lambda pair: pair[1].order)
+    return {recipe.name: (study, recipe) for study, recipe in placed}
 
 
 RECIPES = _recipes()

@@ -29,6 +29,7 @@ from drillctl.reporting.blocks import (
     Section,
     Table,
     Words,
+    figures_of,
 )
 from drillctl.reporting.gather import (
     INTERRUPTED,
@@ -144,14 +145,9 @@ def compose(gathered: Gathered, sections: Iterable[str], title: str | None) -> D
     )
 
 
-def _figures(section: Section) -> list[Figure]:
-    blocks = (one.figure if isinstance(one, InteractiveMap) else one for one in section.blocks)
-    return [one for one in blocks if isinstance(one, Figure)]
-
-
 def _taken_twice(sections: Iterable[Section]) -> set[str]:
     """Names of figures that several sections have."""
-    names = Counter(one.name for section in sections for one in _figures(section))
+    names = Counter(one.name for section in sections for one in figures_of(section.blocks))
     return {name for name, count in names.items() if count > 1}
 
 

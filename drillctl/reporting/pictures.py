@@ -7,7 +7,7 @@ import re
 import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl.errors import InputError
 from drillctl.plots.style import axes_or_new, default_look, lay_out
-from drillctl.reporting.blocks import Document, Figure, InteractiveMap
+from drillctl.reporting.blocks import Document, Figure, figures_of
 from drillctl.reporting.gather import Gathered
 from drillctl.store.json_files import read_json, replaced, write_json, write_text
 
@@ -62,16 +62,13 @@ class FigureFiles:
         self._folder, self._gathered = folder, gathered
         self._index: dict[str, Any] = {}
         if (folder / INDEX).is_file():
-            try:
+            with suppress(InputError):  # an unreadable index: draw all figures again
                 self._index = dict(read_json(folder / INDEX))
-            except InputError:  # an unreadable index: draw all figures again
-                self._index = {}
 
     def collect(self, document: Document, helpers: Executor | None = None) -> tuple[str, ...]:
         """Draw the missing figures of a document; return the errors."""
         blocks = (block for section in document.sections for block in section.blocks)
-        figures = [b.figure if isinstance(b, InteractiveMap) else b for b in blocks]
-        missing = [b for b in figures if isinstance(b, Figure) and self._held(b) is None]
+        missing = [one for one in figures_of(blocks) if self._held(one) is None]
         return tuple(self._draw_all(missing, helpers))
 
     def picture(self, figure: Figure) -> Picture:

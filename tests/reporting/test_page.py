@@ -123,6 +123,7 @@ def test_the_map_carries_its_cells_and_some_responses(page):
     assert cells == len(held["j1"]) == len(held["status"]) == 20
     assert len(held["bit"]) == len(held["top"]) == len(held["traced"])
     assert len(held["bit"][0]) == 301
+    assert held["set_speed"] == [100.0] * len(held["traced"])
     assert held["best"] in held["traced"]
     assert held["own"] in held["traced"]
 

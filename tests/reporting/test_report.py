@@ -15,8 +15,9 @@ import drillctl
 from drillctl.cli import run
 from drillctl.design import axis_tables
 from drillctl.errors import InputError, SimulationError
-from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, gather, making
+from drillctl.reporting import PROFILES, QUICK, SECTIONS, STANDARD, cells, gather, making
 from drillctl.reporting import pages as pdf
+from drillctl.reporting.blocks import Words
 from drillctl.reporting.sections.runs import mesh_check
 from drillctl.reporting.sections.summary import verdict
 
@@ -75,6 +76,17 @@ def test_the_audit_judges_the_mesh(small, finer, answer):
     assert check.answer is answer
     assert ("3.8 %" in check.detail) is not answer
     assert not list(mesh_check(SimpleNamespace(have=lambda name: None)))
+
+
+def test_cells_of_a_map_over_the_set_speed_have_each_its_own(tmp_path):
+    axes = [
+        {"path": "operating_point.speed", "min": "60 rpm", "max": "120 rpm", "points": 3},
+        {"path": "controller.kp", "min": 500, "max": 600, "points": 2},
+    ]
+    short = {"simulation.duration": "1 s", "simulation.j1_from": "0 s", "map.audit_cells": 0}
+    result = drillctl.stability_map(small_design(**short, **{"map.axes": axes}))
+    (tmp_path / cells.FILE).write_text('{"traced": [0, 3, 5]}')
+    assert cells.shown(tmp_path, result, Words("si"))["set_speed"] == [60.0, 90.0, 120.0]
 
 
 def test_saved_studies_and_pictures_are_read_not_done_again(small, monkeypatch):

@@ -23,24 +23,22 @@ class Kind(NamedTuple):
     title: str  # its heading
     studies: tuple[str, ...]  # that it reads
     build: Callable[[Gathered], tuple[Block, ...]]  # its blocks
+    order: int  # place among the sections
 
 
 KINDS = (
     Kind("summary", "Summary and verdict",
-         ("simulate", "loop", "setting", "map", "cells", "uncertainty", "tune"), summary.build),
-    Kind("rig", "The rig", (), rig.build),
-    Kind("responses", "Time responses", ("simulate", "cells", "best", "bad"), runs.build_responses),
+         ("simulate", "loop", "setting", "map", "cells", "uncertainty", "tune"), summary.build, 0),
+    Kind("rig", "The rig", (), rig.build, 10),
+    Kind("responses", "Time responses", ("simulate", "cells", "best", "bad"), runs.build_responses,
+         60),
     Kind("audit", "Accuracy audit",
          ("simulate", "map", "uncertainty", "doctor", "mesh-1", "mesh-2", "mesh-4", "step-2",
-          "step-4"), runs.build_audit),
-    Kind("glossary", "Glossary", (), rig.build_glossary),
-    Kind("design", "Appendix: the design", (), rig.build_design),
+          "step-4"), runs.build_audit, 120),
+    Kind("glossary", "Glossary", (), rig.build_glossary, 130),
+    Kind("design", "Appendix: the design", (), rig.build_design, 140),
 )  # fmt: skip
-"""Every section that is not of a study object, in the order in which they are read."""
-_ORDER = {
-    "summary": 0, "rig": 10, "responses": 60, "audit": 120, "glossary": 130,
-    "design": 140,
-}  # fmt: skip
+"""Every section that is not of a study object."""
 
 
 def _generic(section: Section, others: set[str]) -> Callable[[Gathered], tuple[Block, ...]]:
@@ -70,13 +68,13 @@ def _generic(section: Section, others: set[str]) -> Callable[[Gathered], tuple[B
 
 def _sections() -> dict[str, Kind]:
     """Every section by name, in reading order."""
-    placed = [(_ORDER[kind.name], kind) for kind in KINDS]
+    placed = list(KINDS)
     for study in studies().values():
         for one in study.sections:
             others = {name for other in study.sections if other is not one for name in other.shows}
             build = one.build or _generic(one, others)
-            placed.append((one.order, Kind(one.name, one.title, one.reads, build)))
-    return {kind.name: kind for _, kind in sorted(placed, key=lambda pair: pair[0])}
+            placed.append(Kind(one.name, one.title, one.reads, build, one.order))
+    return {kind.name: kind for kind in sorted(placed, key=lambda kind: kind.order)}
 
 
 SECTIONS = _sections()  # sections by name

@@ -51,8 +51,8 @@ def rig_drawing(design: Design, words: Words) -> Drawn:
             ax.text(-0.22, part.bottom, shown, ha="right", va="center", fontsize=style.SMALL)
             ax.plot([-0.2, -part.half], [part.bottom] * 2, color="#888888", linewidth=0.6)
     _ends(ax, design, words)
-    title = (design.tables.title or design.name).replace("$", r"\$")
-    ax.set_title(title, fontsize=style.TITLE, loc="left", wrap=True)
+    name = design.tables.title or design.name
+    style.title(ax, name.replace("$", r"\$"), wrap=True)
     return figure
 
 

@@ -112,9 +112,9 @@
 
   function draw(place, held, row, title) {
     const width = 640, height = 260, left = 52, right = 24, top = 40, bottom = 42;
-    const bit = held.bit[row], motor = held.top[row], count = bit.length;
+    const bit = held.bit[row], motor = held.top[row], asked = held.set_speed[row], count = bit.length;
     const known = [...bit, ...motor].filter((v) => v !== null).map((v) => v / held.part);
-    const high = Math.max(1.05 * held.set_speed, ...known), low = Math.min(0, ...known);
+    const high = Math.max(1.05 * asked, ...known), low = Math.min(0, ...known);
     const x = (k) => left + (width - left - right) * k / (count - 1);
     const y = (v) => top + (height - top - bottom) * (high - v) / (high - low);
     const svg = document.createElementNS(SVG, "svg");
@@ -139,7 +139,7 @@
       shape("text", { x: x(k), y: height - bottom + 17, "text-anchor": "middle" }, svg)
         .textContent = brief(t);
     }
-    shape("line", { x1: left, x2: width - right, y1: y(held.set_speed), y2: y(held.set_speed),
+    shape("line", { x1: left, x2: width - right, y1: y(asked), y2: y(asked),
       stroke: "var(--ink)", "stroke-dasharray": "2 4" }, svg);
     line(motor, "var(--top)", "6 3");
     line(bit, "var(--bit)", "");
