@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -45,12 +44,11 @@ from drillctl.ensemble.running import (
 from drillctl.ensemble.storing import Store, in_memory
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
-from drillctl.provenance import provenance
 from drillctl.simulation.batch import CHUNK, Prepared, prepare
 from drillctl.simulation.measures import BATCH_MEASURES, MEASURES, STATUSES, status_counts
 from drillctl.store.codec import documented, label
 from drillctl.store.json_files import picked
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 from drillctl.store.tables import in_columns, write_columns
 
 if TYPE_CHECKING:
@@ -137,7 +135,7 @@ def _parts(geometry: Any) -> list[Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep(Result, kind="map"):
+class Sweep(Timed, kind="map"):
     """Measures over a grid of parameters."""
 
     design: Design = label(means="what was varied")
@@ -152,10 +150,6 @@ class Sweep(Result, kind="map"):
     step: float | None = label(unit="s", means="of the batch engine; None where it differs")
     modes: int | None = label(means="of the batch engine; None where it differs")
     seconds: float = label(unit="s", means="in the lanes alone")
-    total_seconds: float = label(unit="s", means="from call to return")
-    provenance: dict[str, str] = label(
-        means="versions and processor it came from", default_factory=provenance
-    )
     section_torque: dict[str, float] = label(
         unit="N*m", default_factory=dict,
         means="largest in each section whose torsional yield is known, at the cells of the largest "
@@ -226,7 +220,7 @@ class Sweep(Result, kind="map"):
         return self.design, settings
 
 
-@own_errstate()
+@timed
 def sweep(
     design: Design,
     axes: tuple[Axis, ...] | None = None,
@@ -269,7 +263,6 @@ def sweep(
         An axis that does not fit the design, no measure of that name, or a grid too large for
         the memory.
     """
-    begin = time.perf_counter()
     table, kept = design.tables.map, kept_measures(measures)
     axes = axes_of(design, kept=len(kept)) if axes is None else axes
     refuse_too_large(shape_of(axes), kept=len(kept))
@@ -293,7 +286,6 @@ def sweep(
         modes=modes,
         section_torque=_section_torque(design, axes, result),
         seconds=times.lanes,
-        total_seconds=time.perf_counter() - begin,
     )
 
 

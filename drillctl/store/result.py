@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, ParamSpec, TypeVar
 
 from drillctl import units
+from drillctl.arrays import own_errstate
 from drillctl.design import Design
+from drillctl.provenance import provenance
 from drillctl.store import showing
-from drillctl.store.codec import dataset, documented, read, write
+from drillctl.store.codec import dataset, documented, label, read, write
 from drillctl.store.folder import Growing, claim, finished_run, resolved
 
 if TYPE_CHECKING:
@@ -137,6 +143,33 @@ class Result:
         with claim(self.kind, design, folder, self.growing(), **settings) as run:
             run.conclude(self, self.summary())
             return run.path
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Timed(Result):
+    """Base class of results that take their time, made by functions that are `timed`."""
+
+    total_seconds: float = label(unit="s", means="from call to return", default=math.nan)
+    provenance: dict[str, str] = label(
+        means="versions and processor it came from", default_factory=provenance
+    )
+
+
+Asked = ParamSpec("Asked")
+Made = TypeVar("Made", bound=Timed)
+
+
+def timed(study: Callable[Asked, Made]) -> Callable[Asked, Made]:
+    """A function of a study whose result knows how long it took; numpy warns as it is usual."""
+
+    @wraps(study)
+    def computed(*given: Asked.args, **named: Asked.kwargs) -> Made:
+        begin = time.perf_counter()
+        with own_errstate():
+            result = study(*given, **named)
+        return replace(result, total_seconds=time.perf_counter() - begin)
+
+    return computed
 
 
 def open(folder: str | Path) -> Any:

@@ -11,7 +11,6 @@ its interval first holds zero.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array, Mask, own_errstate
+from drillctl.arrays import Array, Mask
 from drillctl.design import Design
 from drillctl.ensemble.cases import Crossing, Estimate, percentile_estimate, resampled_crossing
 from drillctl.ensemble.draws import CommonDraws
@@ -31,7 +30,7 @@ from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked, strict
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 from drillctl.studies.advantage.cases import (
     ALL_TERMS,
     DELAY,
@@ -391,7 +390,7 @@ def _line(name: str, points: Points, constant: Array, share: float) -> DelayLine
 
 
 @dataclass(frozen=True, eq=False)
-class Advantage(Result, kind="advantage"):
+class Advantage(Timed, kind="advantage"):
     """PI against PI with a weight that follows the bit speed, each at its own robust optimum.
 
     Its design's `[advantage]` and `[tune]` say what was compared and to what end.
@@ -408,7 +407,6 @@ class Advantage(Result, kind="advantage"):
     front: Chart = label(means="over weights at the design's own speed")
     chart: Chart = label(name="map", means="over weights and speeds")
     delay: DelayCurve = label(means="against the delay of the real path")
-    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def baseline(self) -> Case:
@@ -477,7 +475,7 @@ def _chart_summary(result: Chart) -> Any:
     return strict({"weights": result.weights, "speeds": result.speeds, "policies": policies})
 
 
-@own_errstate()
+@timed
 def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
     """Compare PI with a constant weight on bit and PI with one that follows the bit speed.
 
@@ -509,7 +507,6 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
     -----
     The law of the weight is that of Navarro-Lopez & Suarez, Proc. IEEE CCA (2004) 1454-1460.
     """
-    begin = time.perf_counter()
     compared = policies(design)
     checked(compared)
     table = design.tables.advantage
@@ -532,7 +529,6 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
         front=front,
         chart=over,
         delay=curve,
-        total_seconds=time.perf_counter() - begin,
     )
 
 

@@ -7,7 +7,6 @@ cases is their paired difference, see `ensemble.cases`.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array, own_errstate
+from drillctl.arrays import Array
 from drillctl.design import Design, axis_tables, parameter, to_toml
 from drillctl.ensemble.audit import Audit, audited, choose_cells, kept, unaudited
 from drillctl.ensemble.cases import Estimate, Runs
@@ -38,7 +37,7 @@ from drillctl.simulation import Simulation, simulate
 from drillctl.simulation.measures import with_axial
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 
 if TYPE_CHECKING:
     from drillctl.design.tables import AxisTable
@@ -211,7 +210,7 @@ class ComparedCase(Runs):
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Result, kind="compare"):
+class Comparison(Timed, kind="compare"):
     """Cases at the same starts and the same draws."""
 
     design: Design = label(means="whose cases they are; of cases given one by one the first")
@@ -223,7 +222,6 @@ class Comparison(Result, kind="compare"):
         unit="s", means="where the window of `mean_weight_after_start` begins"
     )
     equal_mean_weight: bool = label(means="whether nominal weights were shifted for equal means")
-    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def baseline(self) -> ComparedCase:
@@ -277,7 +275,7 @@ class Comparison(Result, kind="compare"):
         return self.design, {"cases": {name: to_toml(case) for name, case in cases.items()}}
 
 
-@own_errstate()
+@timed
 def compare(
     cases: Design | Mapping[str, Design],
     realizations: int | None = None,
@@ -315,7 +313,6 @@ def compare(
         Cases that are not on equal terms, impossible settings, every draw impossible, a mean
         weight that cannot be reached, or maps too large for the memory.
     """
-    begin = time.perf_counter()
     given = {
         "uncertainty.realizations": realizations,
         "uncertainty.seed": seed,
@@ -355,7 +352,6 @@ def compare(
         levels=design.tables.map.levels,
         weight_from=start_up(design.tables.simulation.duration),
         equal_mean_weight=equal,
-        total_seconds=time.perf_counter() - begin,
     )
 
 

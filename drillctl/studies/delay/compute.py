@@ -7,7 +7,6 @@ with the constant weight, which is the same law with K_w = 0.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drillctl import units
-from drillctl.arrays import Array, own_errstate
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.ensemble.cases import (
     Crossing,
@@ -45,7 +44,7 @@ from drillctl.simulation.lanes import Lanes
 from drillctl.simulation.measures import AXIAL_MEASURES, MEASURES, STATUSES, with_axial
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 from drillctl.studies.delay.settings import LAW, VARIED
 
 LAWS = ("navarro-lopez-suarez", "surface-observer")  # laws of a weight that follows the bit speed
@@ -121,7 +120,7 @@ def lasting(shares: Sequence[float], enough: float = ENOUGH) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class WeightDelay(Result, Runs, kind="delay"):
+class WeightDelay(Timed, Runs, kind="delay"):
     """A weight on bit that follows the bit speed, over gains and delays, at the same draws.
 
     Its design's `[weight_delay]` holds gains, delays and law, its `[uncertainty]` number and seed
@@ -139,7 +138,6 @@ class WeightDelay(Result, Runs, kind="delay"):
     drawn: dict[str, Array] = label("realization", means="drawn values by path, SI")
     constant: Runs = label(means="of the constant weight, K_w = 0")
     failures: tuple[Failures, ...] = label(means="draws without a result, by reason")
-    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def gains(self) -> Array:
@@ -244,7 +242,7 @@ class WeightDelay(Result, Runs, kind="delay"):
         }
 
 
-@own_errstate()
+@timed
 def weight_delay(
     design: Design,
     gains: Sequence[float | str] | None = None,
@@ -285,7 +283,6 @@ def weight_delay(
     The law is that of Navarro-Lopez & Suarez, Proc. IEEE CCA (2004) 1454-1460, behind the way of
     `drillctl.rig.weight_on_bit.RealWeight`.
     """
-    begin = time.perf_counter()
     design = _given(design, gains, delays, realizations)
     refuse_dependent(design)
     table, count = design.tables.weight_delay, design.tables.uncertainty.realizations
@@ -309,7 +306,6 @@ def weight_delay(
         drawn=draws.values,
         constant=constant,
         failures=lanes.parts[0][0].failures,
-        total_seconds=time.perf_counter() - begin,
     )
 
 

@@ -17,7 +17,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from drillctl.arrays import Array, Index, own_errstate
+from drillctl.arrays import Array, Index
 from drillctl.design import Design
 from drillctl.design.tables import SimulationTable
 from drillctl.ensemble import audit as auditing
@@ -34,7 +34,6 @@ from drillctl.ensemble.grid import (
 from drillctl.ensemble.running import load_kernel, measured
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.provenance import provenance
 from drillctl.rig.bit_rock import PrintedThreeBranch
 from drillctl.rig.drillstring import Drillstring
 from drillctl.simulation.batch import Prepared, bounds_of, prepare
@@ -57,7 +56,7 @@ from drillctl.simulation.scheme import (
 )
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 
 SHORTENED = 1e-3
 """Share by which a step must be shorter than its bound for whole steps to be the reason."""
@@ -204,7 +203,7 @@ REPEATS = 3  # runs of which the fastest counts: what others take of the machine
 
 
 @dataclass(frozen=True, eq=False)
-class Doctor(Result, kind="doctor"):
+class Doctor(Timed, kind="doctor"):
     """What the batch engine does with a design, on a sample of the cells of its map.
 
     The sample is the design alone where the default map does not fit it. `scheme` holds step,
@@ -226,10 +225,6 @@ class Doctor(Result, kind="doctor"):
     )
     refused: str | None = label(means="why the batch engine does not take this design")
     advice: str | None = label(means="what would keep the promise of the accuracy")
-    total_seconds: float = label(unit="s", means="from call to return")
-    provenance: dict[str, str] = label(
-        default_factory=provenance, means="versions and processor it came from"
-    )
 
     @property
     def engine(self) -> str:
@@ -302,7 +297,7 @@ class Doctor(Result, kind="doctor"):
         return self.design, audit
 
 
-@own_errstate()
+@timed
 def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILENT) -> Doctor:
     """Examine what the batch engine does with a design.
 
@@ -325,9 +320,8 @@ def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILE
     InputError
         A map that does not fit the design, or a given step too long for its friction or string.
     """
-    begin = time.perf_counter()
     if isinstance(design.bit_rock, PrintedThreeBranch):
-        return _refused(design, begin)
+        return _refused(design)
     axes, result = _cells_of(design)
     sample = _sample(axes, result)
     progress.begin("simulating lanes at three schemes", len(REFINEMENTS) * len(sample.cells))
@@ -351,11 +345,10 @@ def doctor(design: Design, audit_cells: int = AUDITED, progress: Progress = SILE
         speed=speed,
         refused=None,
         advice=advice,
-        total_seconds=time.perf_counter() - begin,
     )
 
 
-def _refused(design: Design, begin: float) -> Doctor:
+def _refused(design: Design) -> Doctor:
     """Of a rock that is no law of the batch engine."""
     return Doctor(
         design=design,
@@ -371,7 +364,6 @@ def _refused(design: Design, begin: float) -> Doctor:
         refused="'printed-three-branch' is not a law of the batch engine: maps, regions and "
         "comparisons refuse it; single runs with the reference solver take it",
         advice="bit_rock.law = 'navarro-lopez-suarez', the set that it stands in for",
-        total_seconds=time.perf_counter() - begin,
     )
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from drillctl.arrays import Array, ComplexArray, Mask, own_errstate
+from drillctl.arrays import Array, ComplexArray, Mask
 from drillctl.design import Design
 from drillctl.ensemble.grid import (
     Axis,
@@ -28,7 +27,7 @@ from drillctl.linear.loop_model import many_loop_poles
 from drillctl.progress import SILENT, Progress
 from drillctl.rig.drillstring.frequencies import natural_frequencies
 from drillctl.store.codec import label
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 from drillctl.studies.three_regions.compute import gains_of, slopes_tolerated, steady_drilling
 
 QUANTITIES = {
@@ -49,7 +48,7 @@ ALL = QUANTITIES | CUTTING
 
 
 @dataclass(frozen=True, eq=False)
-class LoopMap(Result, kind="loop-map"):
+class LoopMap(Timed, kind="loop-map"):
     """Quantities of the loop over a grid of parameters.
 
     `low_damping` is negative where one of these modes grows; `peak_sensitivity` is NaN where the
@@ -61,7 +60,6 @@ class LoopMap(Result, kind="loop-map"):
     values: dict[str, Array] = label(
         "axes", flat=True, unit=lambda name: ALL[name][0], means=lambda name: ALL[name][1],
     )  # fmt: skip
-    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def stable(self) -> Mask:
@@ -100,7 +98,7 @@ class LoopMap(Result, kind="loop-map"):
         return self.design, some | other_axes(self)
 
 
-@own_errstate()
+@timed
 def loop_map(
     design: Design,
     axes: tuple[Axis, ...] | None = None,
@@ -126,7 +124,6 @@ def loop_map(
     InputError
         An axis that does not fit the design, or an unknown quantity.
     """
-    begin = time.perf_counter()
     for name in quantities:
         if name not in ALL or (name in CUTTING and design.axial is None):
             allowed = QUANTITIES if design.axial is None else ALL
@@ -142,8 +139,7 @@ def loop_map(
         if wanted & CUTTING.keys():
             _cut(design, axes, group, values)
         progress.advance(len(group.cells))
-    seconds = time.perf_counter() - begin
-    return LoopMap(design, axes, {k: v.reshape(shape) for k, v in values.items()}, seconds)
+    return LoopMap(design, axes, {k: v.reshape(shape) for k, v in values.items()})
 
 
 def _figures(

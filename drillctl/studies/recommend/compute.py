@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from drillctl.arrays import own_errstate
 from drillctl.design import Design
 from drillctl.ensemble.cases import mean_estimate
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.provenance import provenance
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 from drillctl.store.tables import Estimate
 from drillctl.studies.delay.compute import following_law
 from drillctl.studies.recommend import candidates as c
@@ -29,7 +26,7 @@ from drillctl.studies.tune.tuned import tuned_parameters
 
 
 @dataclass(frozen=True, eq=False)
-class Recommendation(Result, kind="recommend"):
+class Recommendation(Timed, kind="recommend"):
     """What to set, what limits it, and what else was considered."""
 
     design: Design = label(means="as it was given")
@@ -44,10 +41,6 @@ class Recommendation(Result, kind="recommend"):
     )
     seed: int = label(means="of the draws")
     trajectories: int = label(means="runs of the search")
-    total_seconds: float = label(unit="s", means="from call to return")
-    provenance: dict[str, str] = label(
-        default_factory=provenance, means="versions and processor it came from"
-    )
 
     @cached_property
     def recommended(self) -> Assessed:
@@ -108,7 +101,7 @@ class Recommendation(Result, kind="recommend"):
         }
 
 
-@own_errstate()
+@timed
 def recommend(design: Design, progress: Progress = SILENT) -> Recommendation:
     """Find what to set in the drive, judge it, and say what limits it.
 
@@ -130,7 +123,6 @@ def recommend(design: Design, progress: Progress = SILENT) -> Recommendation:
     InputError
         Impossible settings, or no candidate that a rig can have.
     """
-    begin = time.perf_counter()
     listed, found = _listed(design, progress)
     progress.begin("assessing settings", len(listed))
     results: list[Assessed] = []
@@ -158,7 +150,6 @@ def recommend(design: Design, progress: Progress = SILENT) -> Recommendation:
         until=until_depth(best),
         seed=design.tables.tune.fresh_seed,
         trajectories=0 if found is None else found.trajectories,
-        total_seconds=time.perf_counter() - begin,
     )
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array, own_errstate
+from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.design.parts import weight_moves
 from drillctl.ensemble.grid import Axis, axes_of, other_axes, span
@@ -17,7 +16,7 @@ from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
 from drillctl.store.codec import label
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 
 WIDTHS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
 """Widths of the regularisation that are compared by default (rad/s)."""
@@ -25,7 +24,7 @@ WIDTH_PATH = "bit_rock.regularised_over"
 
 
 @dataclass(frozen=True, eq=False)
-class Regularisation(Result, kind="regularisation"):
+class Regularisation(Timed, kind="regularisation"):
     """A map with set-valued friction beside the same map with smoothed friction."""
 
     design: Design = label(means="the rig, its friction set-valued")
@@ -39,7 +38,6 @@ class Regularisation(Result, kind="regularisation"):
     smoothed: Array = label(
         "width", "axes", unit="s", name="smoothed_j1", means="J1 of the regularised law"
     )
-    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def shifts(self) -> Array:
@@ -83,7 +81,7 @@ class Regularisation(Result, kind="regularisation"):
         return self.design, other_axes(self) | widths
 
 
-@own_errstate()
+@timed
 def regularisation(
     design: Design,
     widths: tuple[float, ...] = WIDTHS,
@@ -109,7 +107,6 @@ def regularisation(
         A law that is not regularised, a width that is not more than zero, or a weight on bit
         that moves (its friction law has no regularised form).
     """
-    begin = time.perf_counter()
     if not hasattr(design.tables.bit_rock, "regularised_over"):
         raise InputError(
             f"{design.tables.bit_rock.law!r} has no regularised form; allowed: "
@@ -129,7 +126,6 @@ def regularisation(
         sweep(design.replace({WIDTH_PATH: units.SI(float(w))}), axes, 0, progress).j1
         for w in ordered
     ]
-    seconds = time.perf_counter() - begin
     return Regularisation(
-        design, axes, design.tables.map.levels, ordered, reference.j1, np.array(smoothed), seconds
+        design, axes, design.tables.map.levels, ordered, reference.j1, np.array(smoothed)
     )

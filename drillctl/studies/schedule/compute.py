@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array, own_errstate
+from drillctl.arrays import Array
 from drillctl.design import Design, parameter, tuned_ranges
 from drillctl.ensemble.cases import Interval, share_interval
 from drillctl.errors import InputError
 from drillctl.linear.tuning import drive_impedance
 from drillctl.progress import SILENT, Progress
-from drillctl.provenance import provenance
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked, strict
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 from drillctl.store.tables import percent
 from drillctl.studies.recommend.assess import drawn
 from drillctl.studies.recommend.candidates import gains_of
@@ -89,7 +87,7 @@ class Change:
 
 
 @dataclass(frozen=True, eq=False)
-class Schedule(Result, kind="schedule"):
+class Schedule(Timed, kind="schedule"):
     """Gains over the depth, or along another axis."""
 
     design: Design = label(means="as it was given")
@@ -100,10 +98,6 @@ class Schedule(Result, kind="schedule"):
     changes: tuple[Change, ...] = label(means="where gains must be changed")
     stands: Array = label("stand", name="stand", means="values along the axis, a stand apart")
     stand_gains: dict[str, Array] = label("stand", means="gains at each (SI), by path")
-    total_seconds: float = label(unit="s", means="from call to return")
-    provenance: dict[str, str] = label(
-        default_factory=provenance, means="versions and processor it came from"
-    )
 
     @property
     def costs(self) -> float:
@@ -167,7 +161,7 @@ class Schedule(Result, kind="schedule"):
         }
 
 
-@own_errstate()
+@timed
 def schedule(design: Design, progress: Progress = SILENT) -> Schedule:
     """Schedule the gains of a drive over the depth of the well.
 
@@ -187,7 +181,6 @@ def schedule(design: Design, progress: Progress = SILENT) -> Schedule:
     InputError
         A depth that the string cannot have, or a law that does not apply to it.
     """
-    begin = time.perf_counter()
     along = Along(design)
     depths = along.values()
     for depth in (depths[0], depths[-1]):  # refused before anything is searched
@@ -209,7 +202,6 @@ def schedule(design: Design, progress: Progress = SILENT) -> Schedule:
         changes=_changes(tuned, rows),
         stands=stands,
         stand_gains={path: np.array([one[path] for one in at_stands]) for path in at_stands[0]},
-        total_seconds=time.perf_counter() - begin,
     )
 
 

@@ -9,13 +9,12 @@ from a wound-up string.
 from __future__ import annotations
 
 import itertools
-import time
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from drillctl.arrays import Array, Mask, own_errstate
+from drillctl.arrays import Array, Mask
 from drillctl.design import Design
 from drillctl.ensemble.grid import (
     Axis,
@@ -40,7 +39,7 @@ from drillctl.simulation.lanes import Kind, Lanes
 from drillctl.simulation.measures import NARROW_BAND, STATUSES, WINDOW
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 
 HORIZON = 200.0
 """Length of the runs (s): on the paper's map sticking that will end has ended by 80 s."""
@@ -147,7 +146,7 @@ MASKS = (
 
 
 @dataclass(frozen=True, eq=False)
-class ThreeRegions(Result, kind="regions"):
+class ThreeRegions(Timed, kind="regions"):
     """Local stability, J1 and attraction over one grid.
 
     With integral action the operating speed is the set speed; a drive without it has the
@@ -179,7 +178,6 @@ class ThreeRegions(Result, kind="regions"):
     horizon: float = label(unit="s", means="length of the runs from either start")
     window: float = label(unit="s", means="their end that counts")
     band: float = label(means="steady drilling, as a share of the operating speed")
-    total_seconds: float = label(unit="s", means="from call to return")
 
     @property
     def attracted(self) -> Mask:
@@ -243,7 +241,7 @@ class ThreeRegions(Result, kind="regions"):
         return self.design, other_axes(self) | level
 
 
-@own_errstate()
+@timed
 def three_regions(
     design: Design,
     axes: tuple[Axis, ...] | None = None,
@@ -275,14 +273,13 @@ def three_regions(
         An axis that does not fit the design, a grid too large for the memory, or a level that
         is not positive.
     """
-    begin = time.perf_counter()
     level = PAPER_LEVEL if level is None else float(level)
     if not (np.isfinite(level) and level > 0.0):
         raise InputError(f"{level:g} must be positive and finite", "level")
     axes = axes_of(design) if axes is None else axes
     swept = sweep(design, axes, audit_cells=0, progress=progress)
     cells = swept.j1.size
-    fields = {name: np.full(cells, np.nan) for name in FIELDS if name != "j1"}
+    fields: dict[str, Any] = {name: np.full(cells, np.nan) for name in FIELDS if name != "j1"}
     masks = {name: np.zeros(cells, dtype=bool) for name in MASKS if name != "inside_level"}
     masks["failed"] = np.isnan(swept.j1.ravel())
     progress.begin("long runs from either start", cells)
@@ -301,7 +298,6 @@ def three_regions(
         horizon=HORIZON,
         band=NARROW_BAND,
         window=WINDOW,
-        total_seconds=time.perf_counter() - begin,
     )
 
 

@@ -13,17 +13,16 @@ from typing import Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array, own_errstate
+from drillctl.arrays import Array
 from drillctl.design import Design, load, parameter, tuned_ranges
 from drillctl.ensemble.grid import Axis
 from drillctl.ensemble.sweeps import sweep
 from drillctl.errors import InputError
 from drillctl.progress import SILENT, Progress
-from drillctl.provenance import provenance
 from drillctl.rig.top_drive.law import drive_laws
 from drillctl.store.codec import label
 from drillctl.store.json_files import picked
-from drillctl.store.result import Result
+from drillctl.store.result import Timed, timed
 from drillctl.studies.tune.certificate import Certificate, FreshDraws, FreshRuns, certified
 from drillctl.studies.tune.linear_design import LinearDesign, linear_or_why
 from drillctl.studies.tune.problem import PRICE, GainProblem
@@ -32,7 +31,7 @@ from drillctl.studies.tune.tuned import Tuned, by_path, spelled, tuned_parameter
 
 
 @dataclass(frozen=True, eq=False)
-class Tune(Result, kind="tune"):
+class Tune(Timed, kind="tune"):
     """Gains with their certificate."""
 
     design: Design = label(means="as it was given")
@@ -40,10 +39,6 @@ class Tune(Result, kind="tune"):
     certificate: Certificate = label(flat=True, means="the gains at fresh realizations")
     baselines: tuple[Baseline, ...] = label(
         over="baseline", name="baseline", means="other gains and laws at the same realizations"
-    )
-    total_seconds: float = label(unit="s", means="from call to return")
-    provenance: dict[str, str] = label(
-        default_factory=provenance, means="versions and processor it came from"
     )
 
     @property
@@ -136,7 +131,7 @@ def _allowed(design: Design, path: str, value: float) -> bool:
     return True
 
 
-@own_errstate()
+@timed
 def tune(
     design: Design, exhaustive: bool = False, progress: Progress = SILENT, verbose: bool = False
 ) -> Tune:
@@ -167,7 +162,6 @@ def tune(
         Nothing that can be tuned, bounds that cannot be used, or no realization that a rig can
         have.
     """
-    begin = time.perf_counter()
     tuned = tuned_parameters(design)
     fresh = FreshDraws(design, tuned)  # an impossible certificate is refused before the search
     linear = linear_or_why(design, verbose)
@@ -178,7 +172,6 @@ def tune(
         tuning=result,
         certificate=certified(result.design, fresh, result.values, progress),
         baselines=baselines(design, fresh, linear, grid, progress),
-        total_seconds=time.perf_counter() - begin,
     )
 
 
@@ -279,8 +272,7 @@ def _linear(result: LinearDesign | InputError, fresh: FreshDraws) -> Made:
 
 
 def _nominal(design: Design, fresh: FreshDraws) -> Made:
-    tuned = fresh.problem.tuned
-    begin = time.perf_counter()
+    begin, tuned = time.perf_counter(), fresh.problem.tuned
     axes = tuple(Axis(t.path, t.unit, line) for t, line in zip(tuned, _lines(tuned), strict=True))
     result = sweep(design, axes, audit_cells=0, measures=("j1",))
     if result.minimum is None:

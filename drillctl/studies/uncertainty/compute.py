@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctl import units
-from drillctl.arrays import Array, own_errstate
+from drillctl.arrays import Array
 from drillctl.design import Design, parameter
 from drillctl.design.uncertain_tables import SensitivityTable
 from drillctl.ensemble import audit as auditing
@@ -28,6 +28,7 @@ from drillctl.ensemble.sweeps import kept_measures, sweep
 from drillctl.errors import InputError, nearest
 from drillctl.progress import SILENT, Progress
 from drillctl.store.json_files import replaced
+from drillctl.store.result import timed
 from drillctl.store.tables import headed, in_columns, write_columns
 from drillctl.studies.uncertainty import sensitivity as indices
 from drillctl.studies.uncertainty.result import (
@@ -47,7 +48,7 @@ SoFar = Callable[[], Uncertainty | None]
 COPIES = 4  # of what is kept of a lane, that are held at one time at most
 
 
-@own_errstate()
+@timed
 def uncertainty(
     design: Design,
     axes: tuple[Axis, ...] | None = None,
@@ -96,14 +97,13 @@ def uncertainty(
         Impossible distributions or correlations, a parameter that is an axis too, an axis that
         does not fit the design, unknown measures, or more than fits the memory.
     """
-    begin = time.perf_counter()
     given = {"uncertainty.realizations": realizations, "uncertainty.seed": seed}
     asked = {path: value for path, value in given.items() if value is not None}
     design = design.replace(asked) if asked else design
     axes = map_axes(design) if axes is None else axes
     workers = Cluster(client) if client is not None and workers is None else workers
     study = _Study(design, axes, progress, store or in_memory, workers, interim)
-    return study.result(begin, audit_cells)
+    return study.result(audit_cells)
 
 
 class _Study:
@@ -127,7 +127,7 @@ class _Study:
             "uncertainty.realizations",
         )
 
-    def result(self, begin: float, audit_cells: int | None) -> Uncertainty:
+    def result(self, audit_cells: int | None) -> Uncertainty:
         """All of it."""
         nominal = sweep(self.design, self.axes, audit_cells=0, progress=self.progress).j1
         job = self._job(self.table.seed, None if self.table.full else self.levels[-1])
@@ -148,7 +148,6 @@ class _Study:
             sensitivity=sensitivity,
             envelope=envelope(self.design, self.draw, made.realizations),
             seconds=seconds,
-            total_seconds=time.perf_counter() - begin,
         )
 
     def _made(self, kept: Blocks, count: int, nominal: Array) -> Uncertainty:
@@ -169,7 +168,6 @@ class _Study:
             sensitivity=None,
             envelope=None,
             seconds=0.0,
-            total_seconds=0.0,
         )
 
     def _job(self, source: int | dict[str, Array], censor: float | None) -> Realizations:

@@ -37,12 +37,11 @@ from drillctl.ensemble.probability import (
 )
 from drillctl.ensemble.sweeps import Region, outline, region
 from drillctl.errors import InputError
-from drillctl.provenance import provenance
 from drillctl.simulation.measures import MEASURES, STATUSES, status_counts
 from drillctl.store.codec import label
 from drillctl.store.folder import Growing, growing_realizations
 from drillctl.store.json_files import picked
-from drillctl.store.result import Result
+from drillctl.store.result import Timed
 from drillctl.studies.uncertainty.best import (
     NEEDS_FULL,
     Best,
@@ -127,7 +126,7 @@ def look(
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty(Result, kind="uncertainty"):
+class Uncertainty(Timed, kind="uncertainty"):
     """J1 over a map at every realization of what is uncertain."""
 
     design: Design = label(means="with what is uncertain, named or by default")
@@ -154,10 +153,6 @@ class Uncertainty(Result, kind="uncertainty"):
     sensitivity: Sensitivity | None = label(means="Sobol indices, if they were requested")
     envelope: Envelope | None = label(flat=True, means="responses of the design over its draws")
     seconds: float = label(unit="s", means="in blocks, since the run was last resumed")
-    total_seconds: float = label(unit="s", means="from call to return, since then")
-    provenance: dict[str, str] = label(
-        means="versions and processor it came from", default_factory=provenance
-    )
 
     @property
     def j1(self) -> Array:
