@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import pytest
 from strict_json import strict
 
 import drillctl
-from drillctl.studies.compare import compute
+from tests.alike import rows_of
 
 SHIPPED = "pi-vs-dynamic-wob-140kn"
 ALONE = "monteiro-trindade-140kn"
@@ -53,21 +52,18 @@ def test_folder_holds_tables_pictures_and_the_run(call):
     } <= {path.name for path in Path("run").iterdir()}  # fmt: skip
     result = drillctl.open("run")
     assert result.realizations == 5
-    with Path("run/draws.csv").open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = rows_of("run/draws.csv")
     assert len(rows) == 20
     assert float(rows[6]["j1 (s)"]) == result.cases[1].measures["j1"][1]
     assert float(rows[6]["bit_rock.a1_factor"]) == result.cases[1].drawn["bit_rock.a1_factor"][1]
     assert rows[0]["settling_time (s)"] == ""
-    with Path("run/comparison.csv").open(encoding="utf-8") as stream:
-        rows = {(row["case"], row["measure"]): row for row in csv.DictReader(stream)}
+    rows = {(row["case"], row["measure"]): row for row in rows_of("run/comparison.csv")}
     told = rows["6 kN s/rad", "j1"]
     expected = result.paired["6 kN s/rad"]["j1"]
     assert float(told["difference"]) == expected.value
     assert (float(told["difference_low"]), float(told["difference_high"])) == expected.interval
     assert rows["constant weight", "j1"]["difference"] == ""
-    with Path("run/shares.csv").open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = rows_of("run/shares.csv")
     assert len(rows) == 16
     assert int(rows[0]["draws"]) == result.cases[0].share(20.0).hits
     region = result.cases[1].region(30.0)
@@ -107,8 +103,7 @@ def test_maps_may_be_left_out(call):
     assert "share of the map" not in out
     assert "cells of the map" not in out
     assert "no map" not in out  # it was asked for
-    with Path("run/shares.csv").open(encoding="utf-8") as stream:
-        assert {row["cells"] for row in csv.DictReader(stream)} == {""}
+    assert {row["cells"] for row in rows_of("run/shares.csv")} == {""}
 
 
 def test_a_case_without_map_is_told(call):
@@ -157,19 +152,6 @@ def test_options_are_part_of_the_run(call):
         code, out, err = call("compare", ALONE, *SHORT, *other, "--out", "run")
         assert (code, out) == (2, "")
         assert "another design or other settings" in err
-
-
-def test_finished_run_is_shown_again(call, monkeypatch):
-    code, first, _ = call("compare", SHIPPED, *SHORT, "--out", "run")
-    assert code == 0
-
-    def fail(*arguments, **options):
-        raise AssertionError("computed again")
-
-    monkeypatch.setattr(compute, "compare", fail)
-    code, again, err = call("compare", SHIPPED, *SHORT, "--out", "run")
-    assert (code, err.splitlines()) == (0, ["already done: run"])
-    assert again == first.replace("results: run\n", "")
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import pytest
 from strict_json import strict
 
 import drillctl
-from drillctl.studies.delay import compute
+from tests.alike import rows_of
 
 SHIPPED = "dynamic-wob-delay-140kn"
 SMALL = [
@@ -44,8 +43,7 @@ def test_folder_holds_table_picture_and_the_run(call):
     held = {path.name for path in Path("run").iterdir()}
     assert held >= {"weight-delay.png", "weight-delay.csv", "design.toml", "data.zarr"}
     result = drillctl.open("run")
-    with Path("run/weight-delay.csv").open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = rows_of("run/weight-delay.csv")
     assert len(rows) == 6
     point = result.benefits[1][1]
     assert float(rows[4]["difference (s)"]) == point.difference.value
@@ -64,22 +62,6 @@ def test_tables_for_people(call):
     assert "3 draws of bit_rock.a1_factor, bit_rock.a2_factor; seed 2012" in out
     assert "nan" not in out
     assert "klbf/rpm" in call("delay", SHIPPED, *SMALL, "--units", "field")[1]
-
-
-def test_finished_run_is_shown_again(call, monkeypatch):
-    code, first, _ = call("delay", SHIPPED, *SMALL, "--out", "run")
-    assert code == 0
-
-    def fail(*arguments, **options):
-        raise AssertionError("computed again")
-
-    monkeypatch.setattr(compute, "weight_delay", fail)
-    code, again, err = call("delay", SHIPPED, *SMALL, "--out", "run")
-    assert (code, err.splitlines()) == (0, ["already done: run"])
-    assert again == first.replace("results: run\n", "")
-    code, out, err = call("delay", SHIPPED, *SMALL, "--seed", "3", "--out", "run")
-    assert (code, out) == (2, "")
-    assert "another design or other settings" in err
 
 
 @pytest.mark.parametrize(

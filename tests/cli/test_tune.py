@@ -1,6 +1,5 @@
 """The command `tune`: its answers, files, messages and exit codes."""
 
-import csv
 import ctypes
 import os
 import subprocess
@@ -14,6 +13,7 @@ import drillctl
 from drillctl.cli import run
 from drillctl.errors import InputError
 from drillctl.studies.tune import compute
+from tests.alike import rows_of
 
 HOLDS = {
     "the command `tune`": "messages and exit codes; the tuned design in `simulate` and `map`; "
@@ -64,15 +64,11 @@ def test_json_has_the_keys_of_the_contract_and_the_folder_all_files(quick, call)
     tuned = drillctl.load("r/tuned.toml")
     assert tuned.top_drive.kp == result.gains["controller.kp"]
     assert result.design.top_drive.kp == 625.0  # as it was asked for
-    with Path("r/baselines.csv").open(encoding="utf-8") as stream:
-        rows = {row["name"]: row for row in csv.DictReader(stream)}
+    rows = {row["name"]: row for row in rows_of("r/baselines.csv")}
     assert float(rows["tuned"]["probability"]) == result.certificate.runs.probability
     assert float(rows["paper's gains"]["controller.ki (N*m/rad)"]) == 100.0
-    with Path("r/tolerance.csv").open(encoding="utf-8") as stream:
-        first = next(csv.DictReader(stream))
-    assert float(first["low"]) == result.certificate.tolerances[0].low
-    with Path("r/draws.csv").open(encoding="utf-8") as stream:
-        assert len(list(csv.DictReader(stream))) == 150
+    assert float(rows_of("r/tolerance.csv")[0]["low"]) == result.certificate.tolerances[0].low
+    assert len(rows_of("r/draws.csv")) == 150
     short = ["--set", "simulation.duration=5 s"]
     assert call("simulate", "r/tuned.toml", *short, "--out", "s")[0] == 0
     assert call("map", "r/tuned.toml", *short, "--audit", "0", "--out", "m")[0] == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import errno
 import itertools
@@ -24,6 +23,7 @@ from drillctl.ensemble import realizations as realizations_module
 from drillctl.ensemble import running as cluster_module
 from drillctl.errors import InputError
 from drillctl.studies.uncertainty import indices
+from tests.alike import TIMES, rows_of, same
 
 HOLDS = {
     "runs under uncertainty": "killed, interrupted, extended, disk full: the same bits",
@@ -40,11 +40,6 @@ FEW = [*SHORT, "--realizations", "12"]
 def _small_blocks(monkeypatch):
     """Blocks are of 4 draws."""
     monkeypatch.setattr(realizations_module, "LANES", 24)
-
-
-def table(path):
-    with Path(path).open(encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
 
 
 # --- answers -----------------------------------------------------------------------------------
@@ -85,20 +80,20 @@ def test_folder_holds_dataset_tables_pictures(call):
     result = drillctl.open("run")
     assert result.j1.shape == (12, 3, 2)
     assert list(result.measures) == ["j1", "stuck_time"]
-    cells = table("run/cells.csv")
+    cells = rows_of("run/cells.csv")
     assert len(cells) == 6
     assert float(cells[3]["probability_15"]) == result.maps[15.0].probability.ravel()[3]
     assert float(cells[3]["j1_mean (s)"]) == pytest.approx(result.mean().ravel()[3], rel=1e-15)
-    draws = table("run/draws.csv")
+    draws = rows_of("run/draws.csv")
     assert [float(row["bit_rock.a1_factor"]) for row in draws] == list(
         result.drawn["bit_rock.a1_factor"]
     )
-    areas = table("run/areas.csv")
+    areas = rows_of("run/areas.csv")
     assert float(areas[1]["area_p50"]) == result.areas[15.0][0.5].value
-    assert {row["of"] for row in table("run/sensitivity.csv")} == {
+    assert {row["of"] for row in rows_of("run/sensitivity.csv")} == {
         one.of for one in result.sensitivity.indices
     }
-    assert table("run/contours.csv")
+    assert rows_of("run/contours.csv")
 
 
 def test_what_is_saved_is_what_is_read(call):
@@ -111,13 +106,7 @@ def test_what_is_saved_is_what_is_read(call):
     assert told.pop("warnings") == []
     assert strict(json.dumps(again, default=float).replace("NaN", "null")) == told
     assert told["looks"]
-    saved = result.save("saved")
-    other = drillctl.open(saved)
-    assert other.j1.tobytes() == result.j1.tobytes()
-    assert other.status.tobytes() == result.status.tobytes()
-    assert other.looks == result.looks
-    assert json.dumps(other.summary()) == json.dumps(again)
-    assert other.data.identical(result.data)
+    same(drillctl.open(result.save("saved")), result)
 
 
 def test_a_result_of_python_is_saved_and_shown_by_the_command(call):
@@ -248,19 +237,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(call, monkeypatch, after):
         drillctl.open("run")
     code, _, _ = call("uncertainty", PAPER, *FEW, "--resume", "--out", "run")
     assert code == 0
-    same(drillctl.open("run"), whole)
-
-
-def same(one, other):
-    assert one.j1.tobytes() == other.j1.tobytes()
-    assert one.status.tobytes() == other.status.tobytes()
-    assert one.nominal.tobytes() == other.nominal.tobytes()
-    for name in ("count", "probability_low", "j1_mean", "j1_q95"):
-        assert one.data[name].values.tobytes() == other.data[name].values.tobytes()
-    left, right = one.summary(), other.summary()
-    for key in ("seconds", "total_seconds"):
-        left.pop(key), right.pop(key)
-    assert left == right
+    same(drillctl.open("run"), whole, TIMES)
 
 
 def test_interim_pictures_show_what_is_finished(call, monkeypatch):
@@ -368,7 +345,7 @@ def test_a_full_disk_is_told_and_loses_no_finished_block(call, monkeypatch):
     assert "Traceback" not in err
     assert blocks() == 1
     assert call("uncertainty", PAPER, *FEW, "--out", "run")[0] == 0
-    same(drillctl.open("run"), whole)
+    same(drillctl.open("run"), whole, TIMES)
 
 
 def test_a_read_only_folder_is_told(call, permissions_count):
@@ -425,13 +402,13 @@ def blocks():
 
 def test_a_killed_run_goes_on_to_the_same_bits(call):
     whole = drillctl.open(folder_of(call, "whole", 200))
-    same(kill_and_go_on(1, 200, seed=1), whole)
+    same(kill_and_go_on(1, 200, seed=1), whole, TIMES)
 
 
 @pytest.mark.slow
 def test_a_run_killed_thirty_times_goes_on_to_the_same_bits(call):
     whole = drillctl.open(folder_of(call, "whole", 2000))
-    same(kill_and_go_on(30, 2000, seed=2), whole)
+    same(kill_and_go_on(30, 2000, seed=2), whole, TIMES)
 
 
 # --- bad input ---------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import types
 
@@ -44,6 +43,7 @@ from drillctl.studies.advantage.cases import (
 from drillctl.studies.advantage.compute import advantage, chart, delay_curve
 from drillctl.studies.compare.compute import compare
 from drillctl.studies.tune.search import search
+from tests.alike import rows_of, same
 
 HOLDS = {
     "constant against dynamic weight, each tuned": "a weight that may not follow is the constant "
@@ -375,9 +375,7 @@ def test_a_failed_draw_counts_as_infinite(design):
 def test_saved_and_read_back(result, tmp_path):
     back = drillctl.open(result.save(tmp_path / "run"))
     assert back.summary() == result.summary() == json.loads(json.dumps(result.summary()))
-    for name, values in result.data.variables.items():
-        np.testing.assert_array_equal(back.data[name].values, values.values, str(name))
-    assert back.verdict == result.verdict
+    same(back, result)
 
 
 def test_a_finished_run_is_shown_again(result, tmp_path, capsys):
@@ -399,8 +397,7 @@ def test_tables_hold_the_figures(result, tmp_path):
     rows = {}
     for table in STUDY.tables(result):
         write_csv(table, tmp_path)
-        with (tmp_path / f"{table.name}.csv").open(encoding="utf-8") as stream:
-            rows[table.name] = list(csv.DictReader(stream))
+        rows[table.name] = rows_of(tmp_path / f"{table.name}.csv")
     kept = [float(row["advantage (s)"]) for row in rows["delays"] if row["gains"] == "ideal path"]
     np.testing.assert_array_equal(kept, result.delay.kept.advantage)
     values = [float(row["objective (s)"]) for row in rows["map"]]

@@ -11,6 +11,7 @@ from drillctl.ensemble.grid import axes_of, cell_design
 from drillctl.errors import SimulationError
 from drillctl.simulation.measures import BATCH_MEASURES, MEASURES
 from drillctl.studies.base import audit_tables, doubted
+from tests.alike import Told
 
 LEVELS = (10.0, 20.0, 30.0)
 
@@ -235,17 +236,6 @@ def test_an_interruption_ends_what_other_threads_run(design, monkeypatch):
         audited(np.arange(2), {}, [design, long], progress=Interrupting())
     assert np.isfinite(ran[10.0])
     assert np.isnan(ran.get(20000.0, np.nan))  # stopped, or never begun
-
-
-class Told:
-    def __init__(self):
-        self.tasks = []
-
-    def begin(self, task, total):
-        self.tasks.append([task, total, 0])
-
-    def advance(self, done):
-        self.tasks[-1][2] += done
 
 
 def test_real_audit_of_two_cells(design):

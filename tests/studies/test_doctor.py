@@ -15,6 +15,7 @@ from drillctl.simulation import scheme
 from drillctl.simulation.scheme import PROMISES, Promise
 from drillctl.studies.doctor import compute as examination
 from drillctl.studies.doctor.compute import ErrorEstimate, errors_of
+from tests.alike import same
 
 PAPER = "monteiro-trindade-140kn"
 GAINS = ("controller.kp=100:1000:9", "controller.ki=20:500:7")
@@ -73,11 +74,7 @@ def test_the_speed_is_of_whole_lanes(found):
 def test_it_comes_back_from_disk(found, tmp_path):
     again = drillctl.open(found.save(tmp_path / "kept"))
     assert again.summary() == found.summary()
-    np.testing.assert_array_equal(again.estimate.j1, found.estimate.j1)
-    np.testing.assert_array_equal(again.cells, found.cells)
-    np.testing.assert_array_equal(again.status, found.status)
-    for one, other in zip(again.axes, found.axes, strict=True):
-        np.testing.assert_array_equal(one.values, other.values)
+    same(again, found)
     again.save(tmp_path / "kept")  # the very same run
     with pytest.raises(InputError, match="another design or other settings"):
         examined(cells=1, **{"simulation.duration": "40 s", "map.levels": [10, 20, 40]}).save(

@@ -10,6 +10,7 @@ from drillctl import units
 from drillctl.ensemble.grid import cell_design
 from drillctl.errors import InputError
 from drillctl.studies import Axis, loop_map
+from tests.alike import same
 
 DESIGN = "monteiro-trindade-140kn"
 
@@ -95,8 +96,7 @@ def test_saved_and_read_back(tmp_path):
     found = loop_map(drillctl.load(DESIGN), axes([500.0, 600.0], [100.0, 125.0]))
     back = drillctl.open(found.save(tmp_path / "run"))
     assert back.summary() == found.summary()
-    for name, values in found.values.items():
-        np.testing.assert_array_equal(back.values[name], values)
+    same(back, found)
 
 
 def test_unknown_quantity_is_refused():

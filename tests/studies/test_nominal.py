@@ -13,10 +13,11 @@ from drillctl.errors import InputError
 from drillctl.progress import Within
 from drillctl.simulation.run import SIGNALS
 from drillctl.studies.compare.compute import NO_MAPS, case_designs, compare
+from tests.alike import Told, same
 
 HOLDS = {
     "comparison of cases": "J1 of the weight-on-bit law; a case against itself; "
-    "`scipy.stats.bootstrap`, binomial tails; weight from traces; maps and responses those of "
+    "`scipy.stats.bootstrap`; weight from traces; maps and responses those of "
     "`map` and `simulate`",
 }
 
@@ -108,7 +109,7 @@ def test_a_case_that_the_axes_do_not_fit_has_no_map_and_tells_why(short, tmp_pat
     assert told["nominal"]["map"] is None
     assert told["nominal"]["no_map"] == torque.nominal.no_map
     json.dumps(made.summary(), allow_nan=False)
-    same_nominal(made, drillctl.open(made.save(tmp_path / "run")))
+    same(made, drillctl.open(made.save(tmp_path / "run")))
 
 
 def test_the_baseline_may_be_the_one_without(short, tmp_path):
@@ -116,8 +117,7 @@ def test_the_baseline_may_be_the_one_without(short, tmp_path):
     made = compare({"torque": torque, "pi": short}, realizations=2)
     assert made.cases[0].nominal.map is None
     assert made.cases[1].nominal.map is not None
-    back = drillctl.open(made.save(tmp_path / "run"))
-    same_nominal(made, back)
+    same(made, drillctl.open(made.save(tmp_path / "run")))
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_without_maps_nothing_is_swept_and_all_comes_back(short, tmp_path, monke
     monkeypatch.setattr(sys.modules[case_designs.__module__], "sweep", swept)
     made = compare(short.replace({"compare.maps": False}), realizations=2)
     assert not [name for name in made.data.variables if name.startswith("nominal.map")]
-    same_nominal(made, drillctl.open(made.save(tmp_path / "run")))
+    same(made, drillctl.open(made.save(tmp_path / "run")))
 
 
 def test_maps_too_large_for_the_memory_are_an_error(short):
@@ -174,7 +174,7 @@ def test_a_step_of_its_own_has_times_of_its_own(short, tmp_path):
     assert a.time[1] == pytest.approx(0.1)
     assert b.time[1] == pytest.approx(0.105, rel=0.01)
     assert len(a.time) != len(b.time)
-    same_nominal(made, drillctl.open(made.save(tmp_path / "run")))
+    same(made, drillctl.open(made.save(tmp_path / "run")))
 
 
 # --- equal mean weight -------------------------------------------------------------------------
@@ -203,44 +203,16 @@ def test_a_shift_may_leave_the_friction_table(tmp_path):
     again = compare({"it": case.design.replace(exact)}, realizations=2, equal_mean_weight=True)
     (one,) = again.cases
     assert one.nominal.response.measures.j1 == pytest.approx(one.measures["j1"][0], rel=1e-6)
-    same_nominal(made, drillctl.open(made.save(tmp_path / "run")))
+    same(made, drillctl.open(made.save(tmp_path / "run")))
 
 
 # --- saved -------------------------------------------------------------------------------------
 
 
-def same_nominal(one, other):
-    for a, b in zip(one.cases, other.cases, strict=True):
-        assert a.nominal.no_map == b.nominal.no_map
-        assert a.nominal.summary() == b.nominal.summary()
-        assert a.nominal.response.design == b.nominal.response.design
-        assert a.nominal.response.time.tobytes() == b.nominal.response.time.tobytes()
-        for name, values in a.nominal.response.signals.items():
-            assert values.tobytes() == b.nominal.response.signals[name].tobytes(), name
-        assert (a.nominal.map is None) == (b.nominal.map is None)
-        if a.nominal.map is not None:
-            same_map(a.nominal.map, b.nominal.map)
-
-
-def same_map(one, other):
-    assert one.design == other.design
-    assert one.provenance == other.provenance
-    assert one.summary() == other.summary()
-    assert list(one.measures) == list(other.measures)
-    for name, values in one.measures.items():
-        assert values.tobytes() == other.measures[name].tobytes(), name
-    assert one.status.dtype == other.status.dtype
-    assert one.status.tobytes() == other.status.tobytes()
-    for a, b in zip(one.axes, other.axes, strict=True):
-        assert (a.path, a.unit, a.values.tobytes()) == (b.path, b.unit, b.values.tobytes())
-
-
 @pytest.mark.parametrize("equal", [False, True])
 def test_there_and_back(tmp_path, equal):
     made = compare(coarse(), realizations=3, equal_mean_weight=equal)
-    back = drillctl.open(made.save(tmp_path / "run"))
-    same_nominal(made, back)
-    assert back.summary() == made.summary()
+    same(made, drillctl.open(made.save(tmp_path / "run")))
 
 
 def test_an_axis_that_is_drawn_too_is_told_apart(short, tmp_path):
@@ -249,7 +221,7 @@ def test_an_axis_that_is_drawn_too_is_told_apart(short, tmp_path):
     made = compare(short.replace({"map.axes": axes}), realizations=4)
     assert made.data[f"drawn.{path}"].dims == ("case", "realization")
     assert made.data[path].values.tolist() == pytest.approx([0.9, 1.0, 1.1])
-    same_nominal(made, drillctl.open(made.save(tmp_path / "run")))
+    same(made, drillctl.open(made.save(tmp_path / "run")))
 
 
 def test_data_is_labelled(result):
@@ -266,17 +238,6 @@ def test_data_is_labelled(result):
 
 
 # --- progress ----------------------------------------------------------------------------------
-
-
-class Told:
-    def __init__(self):
-        self.tasks = []
-
-    def begin(self, task, total):
-        self.tasks.append([task, total, 0])
-
-    def advance(self, done):
-        self.tasks[-1][2] += done
 
 
 def test_progress_is_told_of_runs_and_cells(short):

@@ -21,6 +21,7 @@ from drillctl.store import claim
 from drillctl.studies import sweep
 from drillctl.studies.three_regions import compute as attraction
 from drillctl.studies.three_regions.compute import FIELDS, MASKS, three_regions
+from tests.alike import same
 
 HOLDS = {
     "three regions": "eigenvalues, reference solver, published bistability",
@@ -256,14 +257,7 @@ def test_there_and_back(around, tmp_path, level):
     if level is not None:
         one = dataclasses.replace(around, level=level, inside_level=around.j1 <= level)
     back = drillctl.open(one.save(tmp_path / "run"))
-    assert back.design == one.design
-    for name in (*FIELDS, *MASKS):
-        found, given = getattr(back, name), getattr(one, name)
-        assert (found.dtype, found.tobytes()) == (given.dtype, given.tobytes()), name
-    for a, b in zip(back.axes, one.axes, strict=True):
-        assert (a.path, a.unit, a.values.tobytes()) == (b.path, b.unit, b.values.tobytes())
-    for name in ("level", "horizon", "band", "window", "total_seconds"):
-        assert getattr(back, name) == getattr(one, name)
+    same(one, back)
     assert back.summary() == one.summary()
     json.dumps(one.summary(), allow_nan=False)
     with pytest.raises(InputError, match="another design or other settings"):

@@ -19,6 +19,7 @@ from drillctl.simulation.measures import STATUSES
 from drillctl.studies import weight_delay
 from drillctl.studies.compare.compute import compare
 from drillctl.studies.delay.compute import following_design, lasting
+from tests.alike import same
 
 HOLDS = {
     "weight on bit against its delay": "runs of `simulate`, in both engines; differences and "
@@ -210,23 +211,10 @@ def test_data_is_labelled(result):
     assert float(high) == result.benefits[2][2].difference.interval[1]
 
 
-def test_the_constant_weight_is_kept_beside_the_gains(short, tmp_path):
-    found = weight_delay(short, [6e3], [0.5], 3)
-    back = drillctl.open(found.save(tmp_path / "run"))
-    assert back.summary() == found.summary()
-    for name, values in found.constant.measures.items():
-        np.testing.assert_array_equal(back.constant.measures[name], values)
-
-
 def test_saved_and_read_back(result, tmp_path):
     back = drillctl.open(result.save(tmp_path / "run"))
     assert back.summary() == result.summary() == json.loads(json.dumps(result.summary()))
-    assert back.limits == result.limits
-    for name, values in result.measures.items():
-        np.testing.assert_array_equal(back.measures[name], values)
-    np.testing.assert_array_equal(back.status, result.status)
-    for path, values in result.drawn.items():
-        np.testing.assert_array_equal(back.drawn[path], values)
+    same(back, result)
 
 
 def test_the_numbers_of_the_page_are_those_of_the_shipped_design():

@@ -8,7 +8,6 @@ import pytest
 
 import drillctl
 from drillctl import units
-from drillctl.design import to_toml
 from drillctl.ensemble.audit import by_reference
 from drillctl.ensemble.cases import share_interval
 from drillctl.ensemble.draws import drawn_lanes, run_draws
@@ -30,6 +29,7 @@ from drillctl.studies.tune.compute import tune
 from drillctl.studies.tune.linear_design import linear_design
 from drillctl.studies.tune.search import search
 from drillctl.studies.tune.tuned import put, tuned_parameters
+from tests.alike import same
 
 HOLDS = {
     "certificate of gains": "runs of `compare` at the same draws, to the last bit; tolerances by "
@@ -268,8 +268,7 @@ def test_a_tune_is_read_back_as_it_was(found, tmp_path):
     again = drillctl.open(tmp_path / "run")
     assert strict(again.summary()) == strict(found.summary())
     assert again.data.equals(found.data)
-    assert to_toml(again.tuned_design) == to_toml(found.tuned_design)
-    assert again.message == found.message
+    same(again, found)
     json.dumps(strict(found.summary()), allow_nan=False)
     assert drillctl.tune is tune
     assert found.save(tmp_path / "run") == tmp_path / "run"  # the very same run
