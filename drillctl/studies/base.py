@@ -21,10 +21,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -187,9 +188,10 @@ class Study:
     Its functions are those of its `module` with the name of a field, and `computed` there is
     `compute`: it takes a design and a `Run` and returns a `store.result.Result`, whose class names
     the study in `kind`. Without it `call` is called, with the options of the command by their
-    names and `progress`; by default that is the function called `python` in `compute.py` of the
-    package. The other functions take that result; `tables`, `pictures` and `remarks` give what
-    people see, in units of theirs, `notes` what deserves attention on stderr.
+    names, and with `progress` and `verbose` if it takes them; by default that is the function
+    called `python` in `compute.py` of the package. What a search of it runs is kept in its folder,
+    if it resumes. The other functions take that result; `tables`, `pictures` and `remarks` give
+    what people see, in units of theirs, `notes` what deserves attention on stderr.
     """
 
     name: str
@@ -250,11 +252,24 @@ class Study:
         return {one.name: one.default for one in self.options}
 
     def computed(self, design: Design, run: Run) -> Any:
-        """The result of a run."""
+        """The result of a run, from the steps of a search that its folder may hold."""
         if self.compute is not None:
             return self.compute(design, run)
-        own = {one.name: run.options[one.name] for one in self.options if not one.sets}
-        return registry.resolve(self.call)(design, progress=run.progress, **own)
+        function = registry.resolve(self.call)
+        own = {x.name: run.options[x.name] for x in self.options if not (x.sets or x.how)}
+        told = {"progress": run.progress, "verbose": run.verbose}
+        own |= {name: told[name] for name in signature(function).parameters if name in told}
+        if "progress" not in own:
+            run.progress.begin(f"computing {self.name}", 1)
+        with self._kept(run.folder):
+            return function(design, **own)
+
+    def _kept(self, folder: Path | None) -> AbstractContextManager[None]:
+        if not self.resumes:
+            return nullcontext()
+        from drillctl.ensemble.storing import kept_in
+
+        return kept_in(folder)
 
     def run(self, design: Design, **options: Any) -> Any:
         """Compute without a folder, as Python does; `progress` goes to the `Run`."""

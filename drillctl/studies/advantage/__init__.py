@@ -14,20 +14,11 @@ from typing import TYPE_CHECKING, Any
 from drillctl import plots, units
 from drillctl.simulation.measures import MEASURES
 from drillctl.store.tables import Column, Estimate, Table
-from drillctl.studies.base import Picture, Recipe, Requested, Run, Section, Study, in_batch
+from drillctl.studies.base import Picture, Recipe, Requested, Section, Study, in_batch
 
 if TYPE_CHECKING:
     from drillctl.design import Design
     from drillctl.studies.advantage.compute import Advantage, Chart
-
-
-def computed(design: Design, run: Run) -> Advantage:
-    """The comparison, from the runs that its folder may hold."""
-    from drillctl.ensemble.storing import kept_in
-    from drillctl.studies.advantage.compute import advantage
-
-    with kept_in(run.folder):
-        return advantage(design, progress=run.progress)
 
 
 def tables(result: Advantage) -> Iterator[Table]:

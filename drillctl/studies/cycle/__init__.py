@@ -7,19 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
 from drillctl.store.tables import Column, Table, number, quantity
-from drillctl.studies.base import Picture, Run, Study
+from drillctl.studies.base import Picture, Study
 
 if TYPE_CHECKING:
-    from drillctl.design import Design
     from drillctl.simulation.limit_cycle import LimitCycle
-
-
-def computed(design: Design, run: Run) -> LimitCycle:
-    """The cycle by all three methods."""
-    from drillctl.simulation.limit_cycle import limit_cycle
-
-    run.progress.begin("following the motion", 1)
-    return limit_cycle(design)
 
 
 def tables(result: LimitCycle) -> Iterator[Table]:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from drillctl import plots, units
 from drillctl.store.tables import Column, Table
-from drillctl.studies.base import Option, Picture, Recipe, Run, Section, Study
+from drillctl.studies.base import Option, Picture, Recipe, Section, Study
 
 if TYPE_CHECKING:
-    from drillctl.design import Design
     from drillctl.linear.modal import Modes
 
 
@@ -19,13 +18,6 @@ STICK_SLIP = (
     "Stick-slip has the period of the lowest mode with the top held, or longer: a stiff drive "
     "makes the top a fixed end."
 )
-
-
-def computed(design: Design, run: Run) -> Modes:
-    """The lowest modes with either end condition."""
-    from drillctl.linear.modal import modes
-
-    return modes(design, run.options["count"])
 
 
 def tables(result: Modes) -> Iterator[Table]:

@@ -48,7 +48,6 @@ from drillctl.studies.base import (
     Picture,
     Recipe,
     Requested,
-    Run,
     Section,
     Study,
     audit_tables,
@@ -65,15 +64,6 @@ if TYPE_CHECKING:
 
 SLOPE = "N*m*s/rad"
 SHOWN = ("q50", "q95", "q99")  # quantiles of J1 that people are shown
-
-
-def computed(design: Design, run: Run) -> Tune:
-    """The search with its certificate and baselines."""
-    from drillctl.ensemble.storing import kept_in
-    from drillctl.studies.tune.compute import tune
-
-    with kept_in(run.folder):
-        return tune(design, run.options["exhaustive"], progress=run.progress, verbose=run.verbose)
 
 
 def tables(result: Tune) -> Iterator[Table]:
