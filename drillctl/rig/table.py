@@ -148,6 +148,12 @@ def _limit(least: float, most: float, kind: Kind) -> BeforeValidator:
     return BeforeValidator(Limiter(kind, Range(least, most)))
 
 
+def _partial(value: float) -> float:
+    if not 0.0 < value < 1.0:
+        raise InputError(f"must be more than 0 and less than 1, got {value:g}")
+    return value
+
+
 # A float with the `Kind` it is read and written by, and the range (SI) it must lie in. A positive
 # number has a least one as well: it stands under a line somewhere.
 Number = Annotated[float, _any(FAR)]
@@ -159,11 +165,13 @@ PoissonRatio = Annotated[float, BeforeValidator(Reader(None, Range(-1.0, 0.5)))]
 MOST_FRICTION = 10.0
 FrictionFactor = Annotated[float, _not_negative(MOST_FRICTION)]
 Share = Annotated[float, _not_negative(1.0)]
+PartialShare = Annotated[float, _not_negative(1.0), AfterValidator(_partial)]  # not 0, not 1
 Spread = Annotated[float, _not_negative(10.0)]  # coefficient of variation
 AlongWay = Annotated[float, _positive(1e-6, 1e8)]  # of depth, angle or time: m, rad or s
 Arm = Annotated[float, _not_negative(1e3)]  # torque over weight on bit (m)
 Decay = Annotated[float, _not_negative(1e4)]  # of a torque with speed (s/rad)
 Count = Annotated[int, _count(1)]
+Several = Annotated[int, _count(2)]  # from which a scatter follows
 CountOrZero = Annotated[int, _count(0)]
 
 SPRING = Range(1e-6, 1e13)  # stiffness (N m/rad) of a section

@@ -35,7 +35,7 @@ class Settings(Table):
     values: str | None = None
     along: str = DEPTH
     law: Literal["tuned", "soft-torque", "stiff-speed", "z-torque", "active-damping"] = "tuned"
-    kept_from: q.Share = 0.8
+    kept_from: q.PartialShare = 0.8
     reflection: q.Share = 0.1
     material: q.Share = 0.05
     realizations: q.Count = 400
@@ -51,13 +51,6 @@ class Settings(Table):
             if first == last:
                 raise InputError(f"begins where it ends: {text!r}")
         return text
-
-    @field_validator("kept_from")
-    @classmethod
-    def _earlier(cls, share: float) -> float:
-        if not 0.0 < share < 1.0:
-            raise InputError(f"must be more than 0 and less than 1, got {share:g}")
-        return share
 
     @property
     def ends(self) -> tuple[str, str, int]:

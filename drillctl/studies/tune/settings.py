@@ -15,12 +15,6 @@ KEY = "tune"
 FRESH = 1_000_003  # from the seed of a search to that of its certificate, where none is given
 
 
-def _inside(value: float) -> float:
-    if not 0.0 < value < 1.0:
-        raise InputError(f"must be more than 0 and less than 1, got {value:g}")
-    return value
-
-
 class RangeTable(Table):
     """Least and largest value of a tuned parameter, as they would be written at its path."""
 
@@ -59,7 +53,7 @@ class TuneConstraintsTable(Table):
     mean_weight_on_bit: q.PositiveWeight | None = None
     slope_reserve: q.Damping | None = None
     peak_sensitivity: q.PositiveNumber | None = None
-    damping_ratio: q.PositiveNumber | None = None
+    damping_ratio: q.PartialShare | None = None
     modes: q.Count = 1
     delay: q.Time | None = None
 
@@ -69,11 +63,6 @@ class TuneConstraintsTable(Table):
         if value is not None and value <= 1.0:
             raise InputError(f"must be more than 1, which any loop has, got {value:g}")
         return value
-
-    @field_validator("damping_ratio")
-    @classmethod
-    def _under_one(cls, value: float | None) -> float | None:
-        return None if value is None else _inside(value)
 
 
 class TuneCertificateTable(Table):
@@ -102,12 +91,12 @@ class TuneTable(Table):
 
     parameters: dict[str, RangeTable] = Field(default_factory=dict)
     objective: Literal["mean", "quantile", "cvar", "worst"] = "quantile"
-    quantile: q.PositiveNumber = 0.95
+    quantile: q.PartialShare = 0.95
     weights: TuneWeightsTable = TuneWeightsTable()
     constraints: TuneConstraintsTable = TuneConstraintsTable()
     level: q.PositiveNumber = 33.0
-    probability: q.PositiveNumber = 0.95
-    realizations: q.Count = 1000
+    probability: q.PartialShare = 0.95
+    realizations: q.Several = 1000
     seed: q.CountOrZero = 2012
     starts: q.Count = 3
     certificate: TuneCertificateTable = TuneCertificateTable()
@@ -117,15 +106,8 @@ class TuneTable(Table):
     def _paths(cls, value: object) -> Any:
         return flattened(value) if isinstance(value, dict) else value
 
-    @field_validator("quantile", "probability")
-    @classmethod
-    def _inside(cls, value: float) -> float:
-        return _inside(value)
-
     @model_validator(mode="after")
-    def _enough(self) -> TuneTable:
-        if self.realizations < 2:
-            raise InputError("realizations must be 2 or more")
+    def _fresh(self) -> TuneTable:
         if self.certificate.seed == self.seed:
             raise InputError(
                 f"certificate.seed {self.seed} is that of the search, whose draws certify nothing; "

@@ -201,7 +201,7 @@ def test_bounds_that_cannot_be_used_are_refused(table, told):
         ({"constraints": {"peak_top_torque": 9000}}, "N"),
         ({"constraints": {"peak_top_torque": "0 kN*m"}}, "greater than 0"),
         ({"constraints": {"mean_weight_on_bit": "0 kN"}}, "greater than 0"),
-        ({"realizations": 1}, "2 or more"),
+        ({"realizations": 1}, "at least 2"),
         ({"weights": {"effort": -1}}, "0 or more"),
         ({"parameters": {"controller.kp": {"min": 1}}}, "max"),
     ],
