@@ -324,23 +324,27 @@ class Case(Runs):
 
 
 class Optima(NamedTuple):
-    """Optima of the policies at the design's own weight and speed, at equal nominal weight."""
+    """Optima of the policies at one weight and speed, at equal nominal weight."""
 
     constant: Optimum
     ideal: Optimum
     real: Optimum
 
 
-def own_optima(compared: Policies, progress: Progress) -> Optima:
-    """Every policy tuned at the design's own weight and speed, at `tune.realizations`."""
-    count = compared.constant.design.tables.tune.realizations
-    constant = optimum(compared.constant, count)
-    progress.advance(1)
-    ideal = optimum_beside(compared.ideal, count, constant)
-    progress.advance(1)
-    real = optimum_beside(compared.real, count, constant, [ideal.values])
-    progress.advance(1)
-    return Optima(constant, ideal, real)
+def optima_of(
+    compared: Policies, realizations: int, progress: Progress, near: Sequence[Optima] = ()
+) -> Optima:
+    """Every policy tuned, from its gains where they are known and from those of the one before."""
+    results: list[Optimum] = []
+    for k, policy in enumerate(compared):
+        starts = [one[k].values for one in near] + [one.values for one in results[1:]]
+        results.append(
+            optimum_beside(policy, realizations, results[0], starts)
+            if results
+            else optimum(policy, realizations, starts)
+        )
+        progress.advance(1)
+    return Optima(*results)
 
 
 def optimum_beside(
@@ -360,7 +364,7 @@ def cases(
     baseline = compared.constant.with_gains(optima.constant.values)
     ground = measured(baseline, draws)
     results = [_case(compared.constant, NOMINAL, optima.constant, (0.0, 0.0), ground, ground)]
-    for policy, first in ((compared.ideal, optima.ideal), (compared.real, optima.real)):
+    for policy, first in zip(compared[1:], optima[1:], strict=True):
         for terms in ALL_TERMS:
             best = tuned_on_terms(policy, terms, baseline, first)
             design = policy.with_gains(best.values)

@@ -49,9 +49,8 @@ from drillctl.studies.advantage.cases import (
     fresh_draws,
     less,
     measured,
-    optimum,
+    optima_of,
     optimum_beside,
-    own_optima,
     policies,
 )
 from drillctl.studies.tune.problem import GainRuns
@@ -122,7 +121,7 @@ class Regions:
 def regions(compared: Policies, optima: Optima, progress: Progress) -> tuple[Regions, ...]:
     """Regions of every policy with the gain of the weight at its optimum."""
     results = []
-    for policy, best in zip(compared, (optima.constant, optima.ideal, optima.real), strict=True):
+    for policy, best in zip(compared, optima, strict=True):
         results.append(_regions(policy, best))
         progress.advance(1)
     return tuple(results)
@@ -187,26 +186,17 @@ def chart(
     """Tune every policy at every weight and speed, and measure it at the fresh draws."""
     shape = (len(compared), len(weights), len(speeds))
     figures = {name: np.full(shape, np.nan) for name in FIGURES}
-    known: dict[tuple[int, int, int], Optimum] = {}
+    count = compared.constant.design.tables.advantage.sweep_realizations
+    known: dict[tuple[int, int], Optima] = {}
     for j, speed in enumerate(speeds):
         for i, weight in enumerate(weights):
             here = compared.at(WEIGHT, weight).at(SPEED, speed)
-            near = [(i - 1, j), (i, j - 1)]
-            ground: Measured | None = None
-            for k, policy in enumerate(here):
-                starts = [known[k, *at].values for at in near if (k, *at) in known]
-                count = policy.design.tables.advantage.sweep_realizations
-                if k == 0:
-                    result = optimum(policy, count, starts)
-                else:
-                    starts += [known[1, i, j].values] if k > 1 else []
-                    result = optimum_beside(policy, count, known[0, i, j], starts)
-                known[k, i, j] = result
-                own = measured(policy.with_gains(result.values), draws)
-                ground = ground or own
-                for name, value in _figures(result, own, ground).items():
+            near = [known[at] for at in ((i - 1, j), (i, j - 1)) if at in known]
+            best = known[i, j] = optima_of(here, count, progress, near)
+            own = [measured(x.with_gains(y.values), draws) for x, y in zip(here, best, strict=True)]
+            for k, (result, runs) in enumerate(zip(best, own, strict=True)):
+                for name, value in _figures(result, runs, own[0]).items():
                     figures[name][k, i, j] = np.nan if value is None else value
-                progress.advance(1)
     names = tuple(policy.name for policy in compared)
     return Chart(np.array(weights), np.array(speeds), names, figures, over)
 
@@ -514,7 +504,7 @@ def advantage(design: Design, progress: Progress = SILENT) -> Advantage:
     cells = len(speeds) * len(table.weights) * len(compared)
     progress.begin("comparing", 2 * len(compared) + 2 * len(ALL_TERMS) + cells + len(table.delays))
     draws = fresh_draws(design)
-    optima = own_optima(compared, progress)
+    optima = optima_of(compared, design.tables.tune.realizations, progress)
     result = cases(compared, optima, draws, progress)
     areas = regions(compared, optima, progress)
     curve = delay_curve(compared, optima, draws, progress)
