@@ -39,7 +39,6 @@ from drillctl.studies.recommend.deeper import at_depth, depth_of
 from drillctl.studies.recommend.window import Line, window
 from drillctl.studies.recommend.words import (
     _told_apart,
-    detail,
     in_drive_units,
     numbers_of,
     others,
@@ -169,7 +168,8 @@ def test_each_criterion_of_the_loop_is_kept_or_missed_alone(changed, missed):
     ],
 )
 def test_criteria_of_the_runs(j1, status, interval, missed):
-    kept = run_criteria(j1, status, 33.0, 0.96, interval, 0.95)
+    share = SimpleNamespace(value=0.96, interval=interval, total=1000)
+    kept = run_criteria(j1, status, 33.0, share, 0.95)
     assert [one.name for one in kept if not one.kept] == missed
 
 
@@ -181,25 +181,26 @@ def test_criteria_of_the_runs(j1, status, interval, missed):
     ],
 )
 def test_draws_that_leave_it_open_are_told_from_those_that_say_no(share, interval, ending):
-    _, probable = run_criteria(20.0, "ok", 33.0, share, interval, 0.95)
+    share = SimpleNamespace(value=share, interval=interval, total=1000)
+    _, probable = run_criteria(20.0, "ok", 33.0, share, 0.95)
     assert probable.said == f"P(J1 <= 33 s) is {ending}"
 
 
 def test_what_is_kept_is_told_with_its_numbers(result):
     design = drillctl.load("monteiro-trindade-140kn")
     kept = loop_criteria(design, figures(), design.tables.recommend)
-    told = [detail(result.present, one) for one in kept]
+    told = [one.detail for one in kept]
     assert told[0] == "the loop bears 150 N*m*s/rad, the rock falls by 100 N*m*s/rad"
     assert told[1:] == ["1.5 times", "2", "it bears 50 ms, 0 ms asked"]
     for one in result.candidates:
-        assert all(detail(one, criterion) for criterion in one.criteria)
+        assert all(criterion.detail for criterion in one.criteria)
 
 
-def test_a_rock_that_does_not_fall_is_no_number_of_times(result):
-    one = result.recommended
-    reserve = next(c for c in one.criteria if c.name == "slope_reserve")
-    assert detail(one, replace(reserve, value=math.inf)) == "the rock does not fall"
-    assert "times" in detail(one, reserve)
+@pytest.mark.parametrize(("slope", "told"), [(0.0, "the rock does not fall"), (100.0, "1.5 times")])
+def test_a_rock_that_does_not_fall_is_no_number_of_times(slope, told):
+    design = drillctl.load("monteiro-trindade-140kn")
+    kept = loop_criteria(design, figures(slope=slope), design.tables.recommend)
+    assert {one.name: one.detail for one in kept}["slope_reserve"] == told
 
 
 def test_a_report_asks_for_the_margins_too():

@@ -182,10 +182,8 @@ def remarks(result: Recommendation, system: units.System) -> Iterator[str]:
 
 def checks(result: Recommendation) -> Iterator[Check]:
     """What the recommended setting keeps."""
-    from drillctl.studies.recommend.words import detail, question
-
     for one in result.recommended.criteria:
-        yield Check(question(result.recommended, one), one.kept, detail(result.recommended, one))
+        yield Check(one.question, one.kept, one.detail)
 
 
 def notes(result: Recommendation) -> Iterator[str]:

@@ -13,7 +13,7 @@ from drillctl import units
 from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.design.paths import USUAL_NAMES
-from drillctl.ensemble.cases import Interval, share_interval
+from drillctl.ensemble.cases import Interval, share_interval, share_of
 from drillctl.progress import SILENT
 from drillctl.simulation import simulate
 from drillctl.store.codec import label
@@ -123,15 +123,14 @@ def assessed(one: c.Candidate, design: Design) -> Assessed:
     nominal = {key: _number(getattr(run.measures, key)) for key in NOMINAL}
     j1, limited = drawn(design)
     figures = loop_figures(design, asked.slope_share)
-    hits = int(np.count_nonzero(j1 <= table.level))
-    share, interval = hits / len(j1), share_interval(hits, len(j1))
+    share = share_of(j1 <= table.level)
     criteria = (
         *loop_criteria(design, figures, asked),
-        *run_criteria(nominal["j1"], run.status, table.level, share, interval, table.probability),
+        *run_criteria(nominal["j1"], run.status, table.level, share, table.probability),
         limit_criterion(limited, asked.time_at_limit),
     )
     where = window(design)
-    drift = _tolerances(design, share) if interval[0] >= table.probability else ()
+    drift = _tolerances(design, share.value) if share.interval[0] >= table.probability else ()
     result = Assessed(
         name=one.name,
         law=one.law or design.tables.controller.law,

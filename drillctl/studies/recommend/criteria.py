@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from drillctl import units
 from drillctl.arrays import finite
 from drillctl.design import Design, parts
-from drillctl.ensemble.cases import Interval
+from drillctl.ensemble.cases import Share
 from drillctl.errors import InputError
 from drillctl.linear.ends import bit_side, ends_of
 from drillctl.linear.loop_analysis import tolerated_slope
@@ -133,102 +133,158 @@ def mode_at(design: Design, hertz: float) -> str:
 
 @dataclass(frozen=True)
 class Criterion:
-    """One thing that must be kept."""
+    """One thing that must be kept, with all that is said of it; quantities in full."""
 
     name: str  # key of the settings, or what is asked
     kept: bool
     value: float | None  # None where undefined
     limit: float
     miss: float  # by how much it is missed, over the limit; 0 if kept, 1 if there is no value
-    said: str  # what is missed, with numbers in full; empty if kept
+    said: str  # what is missed; empty if kept
+    question: str  # what is asked
+    detail: str  # what is missed, else the number beside its limit
+    limiting: str  # the same, of what a setting that passes comes nearest to missing
+    room: float  # how near that is, over the limit; infinite where no number says so
 
     def summary(self) -> dict[str, Any]:
         """Strict JSON values, SI."""
         return dict(strict(picked(self, "name", "kept", "value", "limit", "miss", "said")))
 
+    def but(self, miss: float, said: str) -> Criterion:
+        """The same, missed for another reason than its number."""
+        return replace(self, kept=False, miss=miss, said=said, detail=said)
+
 
 def _criterion(
-    name: str, value: float | None, limit: float, at_least: bool, said: str
-) -> Criterion:
-    """`value` against `limit`, kept at the limit itself."""
-    if value is None or math.isnan(value):
-        return Criterion(name, False, None, limit, 1.0, said)
-    kept = value >= limit if at_least else value <= limit
+    name: str, value: float, limit: float, at_least: bool, question: str, missed: str, kept: str,
+    limiting: str,
+) -> Criterion:  # fmt: skip
+    """`value` against `limit`, kept at the limit itself; NaN is missed altogether."""
+    words = question, missed, limiting
+    if math.isnan(value):
+        return Criterion(name, False, None, limit, 1.0, missed, *words, math.inf)
+    keeps = value >= limit if at_least else value <= limit
     away = limit - value if at_least else value - limit
-    miss = 0.0 if kept else min(1.0, away / limit if limit > 0.0 else 1.0)
-    return Criterion(name, kept, value, limit, miss, "" if kept else said)
+    miss = 0.0 if keeps else min(1.0, away / limit if limit > 0.0 else 1.0)
+    room = -away / limit if limit > 0.0 and math.isfinite(value) else math.inf
+    if keeps:
+        return Criterion(name, True, value, limit, miss, "", question, kept, limiting, room)
+    return Criterion(name, False, value, limit, miss, missed, *words, room)
 
 
 def loop_criteria(design: Design, one: LoopFigures, asked: Settings) -> list[Criterion]:
     """What the linear loop must keep."""
     mode = mode_at(design, one.deciding_hz)
-    needed = asked.slope_reserve * max(one.slope, 0.0)
-    no_slope = math.isnan(one.slope_margin)
-    ratio = math.nan if no_slope else math.copysign(math.inf, one.slope_margin or -1.0)
+    return [_stable(one, mode), _reserve(one, mode, asked), _peak(design, one, asked),
+            _late(design, one, asked)]  # fmt: skip
+
+
+def _slopes(*slopes: float) -> tuple[str, ...]:
+    return tuple(units.full(slope, "N*m*s/rad", 4) for slope in slopes)
+
+
+def _ratio(one: LoopFigures) -> float:
+    """Slope margin over the slope of the rock; infinite where that does not fall."""
     if one.slope > 0.0 or (one.slope < 0.0 and one.slope_margin <= 0.0):
-        ratio = one.slope_margin / one.slope
-    without = one.problem or f"unstable even without falling friction, in {mode}"
-    own = own_delay(drive_of(design)) if asked.delay is None else asked.delay
-    delay = None if one.whole is None else one.whole.delay
-    peak = None if one.part is None else one.part.peak_sensitivity
-    peak_at = None if one.part is None else one.part.peak_sensitivity_hz
-    unstable = without if no_slope else (
-        f"unstable in {mode}: the rock falls by {units.full(one.slope, 'N*m*s/rad', 4)}, the loop "
-        f"bears {units.full(one.slope_margin, 'N*m*s/rad', 4)}"
-    )  # fmt: skip
-    small = (
-        "no slope margin"
-        if no_slope
-        else (
-            f"slope margin {ratio:.2f} times that of the rock, {asked.slope_reserve:.2f} asked "
-            f"({mode} decides: {units.full(one.slope_margin, 'N*m*s/rad', 4)}, "
-            f"{units.full(needed, 'N*m*s/rad', 4)} needed)"
+        return one.slope_margin / one.slope
+    if math.isnan(one.slope_margin):
+        return math.nan
+    return math.copysign(math.inf, one.slope_margin or -1.0)
+
+
+def _stable(one: LoopFigures, mode: str) -> Criterion:
+    question = "Is steady drilling stable to small disturbances?"
+    rest = question, "", "stable", math.inf
+    stable = Criterion("stable", one.stable, finite(one.slope_margin), one.slope, 0.0, "", *rest)
+    if math.isnan(one.slope_margin):
+        return stable.but(1.0, one.problem or f"unstable even without falling friction, in {mode}")
+    falls, bears = _slopes(one.slope, one.slope_margin)
+    if one.stable:
+        detail = f"the loop bears {bears}, the rock falls by {falls}"
+        return replace(stable, value=one.slope_margin, detail=detail)
+    said = f"unstable in {mode}: the rock falls by {falls}, the loop bears {bears}"
+    return stable.but(min(1.0, 1.0 - _ratio(one)), said)
+
+
+def _reserve(one: LoopFigures, mode: str, asked: Settings) -> Criterion:
+    ratio, least, missed = _ratio(one), asked.slope_reserve, "no slope margin"
+    if not math.isnan(one.slope_margin):
+        margin, needed = _slopes(one.slope_margin, least * max(one.slope, 0.0))
+        missed = (
+            f"slope margin {ratio:.2f} times that of the rock, {least:.2f} asked "
+            f"({mode} decides: {margin}, {needed} needed)"
         )
-    )
-    late = (
-        "no delay margin: the loop is not stable"
-        if delay is None
-        else f"bears {1e3 * delay:.3g} ms more delay, the drive has {1e3 * own:.3g} ms"
-    )
-    high = (
-        f"no sensitivity: not stable with {asked.slope_share:g} of the slope"
-        if peak is None
-        else f"peak sensitivity {peak:.3g} with {asked.slope_share:g} of the slope, "
-        f"{asked.peak_sensitivity:g} allowed, at {mode_at(design, peak_at or math.nan)}"
-    )
-    stable = Criterion("stable", one.stable, one.slope_margin, one.slope, 0.0, "")
-    if not one.stable:
-        miss = 1.0 if no_slope else min(1.0, 1.0 - ratio)
-        stable = Criterion("stable", False, finite(one.slope_margin), one.slope, miss, unstable)
-    later = _criterion("delay", delay, own, True, late)
-    if own == 0.0 and delay == 0.0:
-        later = Criterion("delay", False, 0.0, 0.0, 1.0, late)
-    return [
-        stable,
-        _criterion("slope_reserve", ratio, asked.slope_reserve, True, small),
-        _criterion("peak_sensitivity", peak, asked.peak_sensitivity, False, high),
-        later,
-    ]
+    return _criterion(
+        "slope_reserve", ratio, least, True,
+        f"Is the slope margin at least {least:g} times the rock's slope?", missed,
+        f"{ratio:.3g} times" if math.isfinite(ratio) else "the rock does not fall",
+        f"the slope margin, {ratio:.2f} times the slope of the rock, {least:.2f} asked; {mode} "
+        "decides it",
+    )  # fmt: skip
+
+
+def _peak(design: Design, one: LoopFigures, asked: Settings) -> Criterion:
+    part, share, most = one.part, asked.slope_share, asked.peak_sensitivity
+    peak, missed = math.nan, f"no sensitivity: not stable with {share:g} of the slope"
+    where = ""
+    if part is not None:
+        peak, hertz = part.peak_sensitivity, part.peak_sensitivity_hz
+        at = mode_at(design, hertz or math.nan)
+        where = "" if hertz is None else f", at {at}"
+        missed = (
+            f"peak sensitivity {peak:.3g} with {share:g} of the slope, {most:g} allowed, at {at}"
+        )
+    return _criterion(
+        "peak_sensitivity", peak, most, False,
+        f"Is the peak sensitivity at {share:g} of that slope at most {most:g}?", missed,
+        f"{peak:.3g}", f"the peak sensitivity, {peak:.3g} of {most:g}{where}",
+    )  # fmt: skip
+
+
+def _late(design: Design, one: LoopFigures, asked: Settings) -> Criterion:
+    own = own_delay(drive_of(design)) if asked.delay is None else asked.delay
+    delay = math.nan if one.whole is None else one.whole.delay
+    bears, drive = f"{1e3 * delay:.3g} ms", f"{1e3 * own:.3g} ms"
+    missed = f"bears {bears} more delay, the drive has {drive}"
+    later = _criterion(
+        "delay", delay, own, True, "Does the loop bear the further delay that is asked of it?",
+        "no delay margin: the loop is not stable" if one.whole is None else missed,
+        f"it bears {bears}, {drive} asked",
+        f"the delay that it bears, {bears}, with {drive} in the drive",
+    )  # fmt: skip
+    return later.but(1.0, missed) if own == delay == 0.0 else later
 
 
 def run_criteria(
-    j1: float, status: str, level: float, share: float, interval: Interval, required: float
+    j1: float, status: str, level: float, share: Share, required: float
 ) -> list[Criterion]:
     """What the runs must keep: J1 without sticking at the end, and its probability."""
     sticks = status in ("sticking", "stalled", "failed")
     end = " and the bit sticks at the end" if sticks else ""
-    nominal = _criterion("j1", j1, level, False, f"J1 {j1:.3g} s, {level:g} s allowed{end}")
+    nominal = _criterion(
+        "j1", j1, level, False,
+        f"Is J1 ≤ {level:g} s at nominal rock, without sticking at the end?",
+        f"J1 {j1:.3g} s, {level:g} s allowed{end}", f"J1 {units.full(j1, 's', 3)}",
+        f"J1, {j1:.3g} s of {level:g} s",
+    )  # fmt: skip
     if sticks and nominal.kept:
-        said = f"the bit is {status} in the last 20 s, with J1 {j1:.3g} s"
-        nominal = Criterion("j1", False, j1, level, 0.1, said)
-    low, high = interval
+        nominal = nominal.but(0.1, f"the bit is {status} in the last 20 s, with J1 {j1:.3g} s")
+    (low, high), told = share.interval, chance(share.value, share.interval)
     asked = f"{percent(required)} {'required' if high < required else 'is not shown'}"
-    shown = f"P(J1 <= {level:g} s) is {chance(share, interval)}, {asked}"
-    probable = _criterion("probability", low, required, True, shown)
-    return [nominal, probable]
+    probable = _criterion(
+        "probability", low, required, True,
+        f"Is P(J1 ≤ {level:g} s) shown to be at least {percent(required)}?",
+        f"P(J1 <= {level:g} s) is {told}, {asked}", f"it is {told} of {share.total} draws",
+        f"the probability, shown to be {low:.3f} at least, {required:g} required",
+    )  # fmt: skip
+    return [nominal, replace(probable, room=(low - required) / max(1.0 - required, 1e-9))]
 
 
 def limit_criterion(share: float, allowed: float) -> Criterion:
     """Share of the time at the drive's limits."""
-    said = f"at the limit of the drive for {100 * share:.2g} % of the time"
-    return _criterion("time_at_limit", share, allowed, False, said)
+    return _criterion(
+        "time_at_limit", share, allowed, False,
+        f"Is the drive at its limit less than {percent(allowed)} of the time?",
+        f"at the limit of the drive for {100 * share:.2g} % of the time", percent(share),
+        f"the limit of the drive, at which it is {100 * share:.2g} % of the time",
+    )  # fmt: skip

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from drillctl import units
 from drillctl.design import Design, parameter
 from drillctl.design.paths import SI_OF, USUAL_NAMES
-from drillctl.store.tables import chance, percent
+from drillctl.store.tables import percent
 from drillctl.studies.recommend.assess import FAILS, FRAGILE, Assessed
 from drillctl.studies.recommend.candidates import NAMES, PRESENT
-from drillctl.studies.recommend.criteria import Criterion, drive_of, mode_at
+from drillctl.studies.recommend.criteria import Criterion, drive_of
 from drillctl.studies.recommend.deeper import depth_of
 
 if TYPE_CHECKING:
@@ -53,48 +52,10 @@ def in_drive_units(one: Assessed) -> dict[str, Any]:
     return results
 
 
-def tightest(one: Assessed) -> Criterion:
-    """The criterion that a passing setting comes nearest to missing."""
-
-    def room(criterion: Criterion) -> float:
-        value, limit = criterion.value, criterion.limit
-        if value is None or not math.isfinite(value):
-            return math.inf
-        if criterion.name == "probability":
-            return (value - limit) / max(1.0 - limit, 1e-9)
-        if criterion.name == "stable":  # the slope margin has its own
-            return math.inf
-        if criterion.name in ("slope_reserve", "delay"):
-            return value / limit - 1.0 if limit > 0.0 else math.inf
-        return 1.0 - value / limit if limit > 0.0 else math.inf
-
-    return min(one.criteria, key=room)
-
-
 def limits_of(one: Assessed) -> tuple[str, ...]:
     """What limits a setting: what it misses, else what it comes nearest to."""
-    if one.missed:
-        return tuple(criterion.said for criterion in one.missed)
-    criterion = tightest(one)
-    figures, value, limit = one.loop, criterion.value or 0.0, criterion.limit
-    said = {
-        "slope_reserve": f"the slope margin, {value:.2f} times the slope of the rock, "
-        f"{limit:.2f} asked; {mode_at(one.design, figures.deciding_hz)} decides it",
-        "peak_sensitivity": f"the peak sensitivity, {value:.3g} of {limit:g}" + _peak_mode(one),
-        "delay": f"the delay that it bears, {1e3 * value:.3g} ms, with {1e3 * limit:.3g} ms in "
-        "the drive",
-        "j1": f"J1, {value:.3g} s of {limit:g} s",
-        "probability": f"the probability, shown to be {value:.3f} at least, {limit:g} required",
-        "time_at_limit": f"the limit of the drive, at which it is {100 * value:.2g} % of the time",
-    }
-    return (said.get(criterion.name, criterion.name),)
-
-
-def _peak_mode(one: Assessed) -> str:
-    part = one.loop.part
-    if part is None or part.peak_sensitivity_hz is None:
-        return ""
-    return f", at {mode_at(one.design, part.peak_sensitivity_hz)}"
+    missed = tuple(criterion.said for criterion in one.missed)
+    return missed or (min(one.criteria, key=lambda criterion: criterion.room).limiting,)
 
 
 def sentence(result: Recommendation) -> str:
@@ -163,42 +124,3 @@ def others(result: Recommendation) -> list[str]:
             compared = f"{objective} {one.objective:.3g} s, {best.objective:.3g} s recommended"
             texts.append(f"{name}: passes too{words}; {compared}")
     return texts
-
-
-def question(one: Assessed, criterion: Criterion) -> str:
-    """What a criterion asks, for a report."""
-    asked, table = one.design.tables.recommend, one.design.tables.tune
-    return {
-        "stable": "Is steady drilling stable to small disturbances?",
-        "slope_reserve": f"Is the slope margin at least {asked.slope_reserve:g} times the rock's "
-        "slope?",
-        "peak_sensitivity": f"Is the peak sensitivity at {asked.slope_share:g} of that slope at "
-        f"most {asked.peak_sensitivity:g}?",
-        "delay": "Does the loop bear the further delay that is asked of it?",
-        "j1": f"Is J1 ≤ {table.level:g} s at nominal rock, without sticking at the end?",
-        "probability": f"Is P(J1 ≤ {table.level:g} s) shown to be at least "
-        f"{percent(table.probability)}?",
-        "time_at_limit": f"Is the drive at its limit less than {percent(asked.time_at_limit)} of "
-        "the time?",
-    }[criterion.name]
-
-
-def detail(one: Assessed, criterion: Criterion) -> str:
-    """What a criterion comes to, in full: what is missed, else its number beside its limit."""
-    value, limit = criterion.value, criterion.limit
-    if criterion.said or value is None:
-        return criterion.said
-    if criterion.name == "stable":
-        return (
-            f"the loop bears {units.full(value, 'N*m*s/rad', 4)}, the rock falls by "
-            f"{units.full(limit, 'N*m*s/rad', 4)}"
-        )
-    if criterion.name == "probability":
-        return f"it is {chance(one.probability, one.interval)} of {len(one.j1)} draws"
-    return {
-        "slope_reserve": f"{value:.3g} times" if math.isfinite(value) else "the rock does not fall",
-        "peak_sensitivity": f"{value:.3g}",
-        "delay": f"it bears {1e3 * value:.3g} ms, {1e3 * limit:.3g} ms asked",
-        "j1": f"J1 {units.full(value, 's', 3)}",
-        "time_at_limit": percent(value),
-    }[criterion.name]
