@@ -191,7 +191,10 @@ def shape_of(axes: tuple[Axis, ...]) -> tuple[int, ...]:
 
 def divisions(design: Design, axes: tuple[Axis, ...]) -> list[tuple[slice, ...]]:
     """How a grid falls into groups: the piece of each axis that every group takes."""
-    slices = [_singly(a) if a.shared else _by_kind(design, axes, a) for a in axes]
+    slices = [
+        [slice(k, k + 1) for k in range(len(a))] if a.shared else _by_kind(design, axes, a)
+        for a in axes
+    ]
     return list(itertools.product(*slices))
 
 
@@ -211,10 +214,6 @@ def groups(design: Design, axes: tuple[Axis, ...]) -> Iterator[Group]:
     """The cells of a grid, group by group."""
     for pieces in divisions(design, axes):
         yield group_of(design, axes, pieces)
-
-
-def _singly(a: Axis) -> list[slice]:
-    return [slice(k, k + 1) for k in range(len(a))]
 
 
 def _by_kind(design: Design, axes: tuple[Axis, ...], a: Axis) -> list[slice]:

@@ -19,7 +19,7 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -378,19 +378,17 @@ def _read(design: Design, path: str, table: DistributionTable) -> Uncertain:
         if target.value is None:
             raise InputError("the design gives it no value of its own: give a mean", "mean")
         mean = target.value
-    _refuse_impossible(table, mean, low, high, mode)
-    if table.distribution in _SYMMETRIC and table.cov is not None:
-        half = _SYMMETRIC[table.distribution] * table.cov * abs(mean or 0.0)
-        low, high = (mean or 0.0) - half, (mean or 0.0) + half
-    if table.distribution == "triangular" and mode is None:
-        mode = 0.5 * (low + high)  # type: ignore[operator]
-    if table.distribution == "normal":
-        low, high = _limits(target, mean or 0.0, low, high)
-    _refuse_ends(target, table, low, high, mean, samples)
-    return Uncertain(
+    one = Uncertain(
         path, target.si_unit, table.distribution, mean, table.cov, low, high, mode, own, samples,
         bool(table.joint),
     )  # fmt: skip
+    _refuse_impossible(table, one)
+    low, high = _limits(target, one)
+    if table.distribution == "triangular" and mode is None:
+        mode = 0.5 * (low + high)  # type: ignore[operator]
+    one = replace(one, low=low, high=high, mode=mode)
+    _refuse_ends(target, table, one)
+    return one
 
 
 _NUMBERS = ("mean", "min", "max", "mode")
@@ -413,26 +411,23 @@ def _sample(target: Parameter, written: object) -> float:
     return result or 0.0
 
 
-def _limits(
-    target: Parameter, mean: float, low: float | None, high: float | None
-) -> tuple[float | None, float | None]:
-    """Limits of a normal distribution: those given, else those of what its key allows."""
-    just = 1e-6 * abs(mean)
-    if low is None and target.refusal(-just):
-        low = 0.0
-    if high is None and not target.refusal(1.0) and target.refusal(1.0 + 1e-6):
-        high = 1.0
+def _limits(target: Parameter, one: Uncertain) -> tuple[float | None, float | None]:
+    """Limits: those given, else by mean and deviation, of a normal law by what its key allows."""
+    mean, low, high = one.mean or 0.0, one.low, one.high
+    if one.distribution in _SYMMETRIC and one.cov is not None:
+        half = _SYMMETRIC[one.distribution] * one.cov * abs(mean)
+        return mean - half, mean + half
+    if one.distribution == "normal":
+        if low is None and target.refusal(-1e-6 * abs(mean)):
+            low = 0.0
+        if high is None and not target.refusal(1.0) and target.refusal(1.0 + 1e-6):
+            high = 1.0
     return low, high
 
 
-def _refuse_impossible(
-    table: DistributionTable,
-    mean: float | None,
-    low: float | None,
-    high: float | None,
-    mode: float | None,
-) -> None:
+def _refuse_impossible(table: DistributionTable, one: Uncertain) -> None:
     """Refuse numbers (SI) that no distribution has."""
+    mean, low, high, mode = one.mean, one.low, one.high, one.mode
     if mean is not None and table.distribution == "lognormal" and not mean > 0.0:
         raise InputError(f"{mean:g} is impossible: a lognormal mean is greater than 0", "mean")
     if mean is not None and mean == 0.0:
@@ -457,15 +452,9 @@ def _refuse_impossible_beta(mean: float, cov: float, low: float, high: float) ->
         )
 
 
-def _refuse_ends(
-    target: Parameter,
-    table: DistributionTable,
-    low: float | None,
-    high: float | None,
-    mean: float | None,
-    samples: tuple[float, ...],
-) -> None:
+def _refuse_ends(target: Parameter, table: DistributionTable, one: Uncertain) -> None:
     """Refuse a distribution that reaches values which its key does not allow."""
+    mean, low, high = one.mean, one.low, one.high
     if table.distribution == "normal":
         assert mean is not None
         inside = (low is None or low <= mean) and (high is None or mean <= high)

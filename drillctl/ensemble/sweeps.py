@@ -289,9 +289,7 @@ def sweep(
     )
 
 
-STRAINED = (
-    3  # cells of the largest torque of the uppermost pipe, whose other sections are looked at
-)
+STRAINED = 3  # cells of the largest torque of the uppermost pipe: other sections are looked at
 
 
 def _section_torque(

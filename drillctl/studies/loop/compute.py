@@ -112,12 +112,8 @@ def loop_pictures(result: LoopAnalysis) -> Iterator[Picture]:
         )  # fmt: skip
 
 
+@np.errstate(all="ignore")  # an undamped string has no finite response at resonance
 def _mobility(design: Design, system: units.System) -> Figure:
-    with np.errstate(all="ignore"):  # an undamped string has no finite response at resonance
-        return _mobility_of(design, system)
-
-
-def _mobility_of(design: Design, system: units.System) -> Figure:
     frequencies = telling_frequencies(design.sliding_string)
     strings = [frequency_response(design, frequencies)]
     if design.string.parts.modal_damping == 0.0:

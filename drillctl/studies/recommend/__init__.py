@@ -211,11 +211,6 @@ def check(design: Design) -> None:
         _ = present(design).top_drive
 
 
-def not_applicable(request: Requested) -> str:
-    """Why a report recommends nothing."""
-    return in_batch(request)
-
-
 QUICK = {
     "tune.realizations": 300, "tune.starts": 1, "tune.certificate.realizations": 500,
 }  # fmt: skip
@@ -245,6 +240,6 @@ STUDY = Study(
         ),
     ),
     python="recommend",
-    recipes=(Recipe("recommend", "the recommendation", not_applicable, for_report, order=5),),
+    recipes=(Recipe("recommend", "the recommendation", in_batch, for_report, order=5),),
     sections=(Section("recommend", "What to set", ("recommend",), order=-10),),
 )

@@ -73,8 +73,8 @@ def gains_of(design: Design) -> dict[str, float]:
     results = {}
     for key in law.tuned:
         value = getattr(table, key)
-        if value is None:  # by a rule of the law
-            value = _by_rule(design, key)
+        if value is None:  # by a rule of the law, as for `damper` and `spring`
+            value = getattr(string_numbers(design.string), f"drive_{key}")
         results[f"controller.{key}"] = float(value)
     return results
 
@@ -89,11 +89,6 @@ def controller_numbers(design: Design) -> dict[str, float]:
             key: float(getattr(drive, key)) for key in ("mobility", "sensed_inertia", "corner")
         }
     return results
-
-
-def _by_rule(design: Design, key: str) -> float:
-    numbers = string_numbers(design.string)
-    return float({"damper": numbers.drive_damper, "spring": numbers.drive_spring}[key])
 
 
 def present(design: Design) -> Design:
@@ -218,12 +213,9 @@ def _slopes_kept(design: Design, tuned: tuple[Tuned, ...], grid: Array) -> Any:
     if design.simple_loop and [t.path for t in tuned] == ["controller.kp", "controller.ki"]:
         margin = slope_margins(ends_of(design.sliding_string), grid[:, 0], grid[:, 1]).slope
     else:
-        margin = np.array([_tolerated(put(design, tuned, one)) for one in grid])
+        made = (put(design, tuned, one) for one in grid)
+        margin = np.array([slope_margin_of(one, one.speed)[0] for one in made])
     return np.nan_to_num(margin) >= asked * slope
-
-
-def _tolerated(design: Design) -> float:
-    return slope_margin_of(design, design.speed)[0]
 
 
 def _loop_kept(design: Design) -> bool:

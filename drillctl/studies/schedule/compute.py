@@ -11,7 +11,7 @@ import numpy as np
 
 from drillctl import units
 from drillctl.arrays import Array
-from drillctl.design import Design, parameter, tuned_ranges
+from drillctl.design import Design
 from drillctl.ensemble.cases import Interval, share_interval
 from drillctl.errors import InputError
 from drillctl.linear.tuning import drive_impedance
@@ -25,7 +25,7 @@ from drillctl.studies.recommend.candidates import gains_of
 from drillctl.studies.recommend.window import window
 from drillctl.studies.schedule.strings import Along
 from drillctl.studies.tune.search import optimum, polished, search_problem
-from drillctl.studies.tune.tuned import Tuned, put
+from drillctl.studies.tune.tuned import default_ranges, put
 
 STAYS = 1.1
 """Merit, over that of a search from nowhere, up to which gains stay in the valley of the depth
@@ -248,10 +248,7 @@ def searched(design: Design, before: dict[str, float] | None) -> dict[str, float
     """Gains of the least objective at a depth, from those of the depth before."""
     few = min(design.tables.schedule.realizations, design.tables.tune.realizations)
     design = design.replace({"tune.realizations": few})
-    tuned = tuple(
-        Tuned(path, parameter(design, path).si_unit, low, high)
-        for path, (low, high) in tuned_ranges(design).items()
-    )
+    tuned = default_ranges(design)
     problem = search_problem(design, tuned)
     best = optimum(problem, ends=1)
     if before is not None:

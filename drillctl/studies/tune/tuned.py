@@ -48,7 +48,7 @@ def tuned_parameters(design: Design) -> tuple[Tuned, ...]:
     if table.parameters:
         result = tuple(_named(design, path, entry) for path, entry in table.parameters.items())
     else:
-        result = _defaults(design)
+        result = default_ranges(design)
     for path in (t.path for t in result if t.path in design.tables.uncertain):
         raise InputError(
             "is drawn in [uncertain], and cannot be tuned as well",
@@ -83,7 +83,8 @@ def _read(design: Design, path: str, entry: RangeTable) -> Tuned:
     return Tuned(path, target.si_unit, low, high)
 
 
-def _defaults(design: Design) -> tuple[Tuned, ...]:
+def default_ranges(design: Design) -> tuple[Tuned, ...]:
+    """The numbers of its controller, within what fits the rig."""
     return tuple(
         Tuned(path, parameter(design, path).si_unit, low, high)
         for path, (low, high) in tuned_ranges(design).items()
