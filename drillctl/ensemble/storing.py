@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -22,11 +23,9 @@ from drillctl.arrays import Array
 from drillctl.ensemble.running import Block, Blocks, Job, Make, Measured, Pieces, Run, Scheme, kept
 from drillctl.errors import StoreError
 from drillctl.simulation.batch import Prepared
-from drillctl.simulation.propagator import StringStep
-from drillctl.simulation.scheme import Scheme as StringScheme
+from drillctl.store.codec import decoded, encoded, stored_name
 from drillctl.store.folder import finished_data
 from drillctl.store.journal import Journal, reading
-from drillctl.store.json_files import picked
 
 LOG = logging.getLogger("drillctl")
 
@@ -78,7 +77,7 @@ def kept_in(path: Path | None) -> AbstractContextManager[None]:
 
 
 class Files:
-    """Arrays in files of a folder that its journal knows."""
+    """Blocks, strings and steps in files of a folder that its journal knows."""
 
     def __init__(self, path: Path, journal: Journal, folder: str) -> None:
         self._path, self._journal, self._folder = path, journal, folder
@@ -89,21 +88,23 @@ class Files:
         names = [n for n in self._journal.held if n.startswith(f"{self._folder}/")]
         return sorted(int(stem) for n in names if (stem := Path(n).stem).isdigit())
 
-    def write(self, name: str, arrays: dict[str, Any]) -> None:
-        """Write arrays."""
+    def write(self, name: str, value: Any) -> None:
+        """Write anything that the codec of results takes."""
+        tree, variables = encoded(value)
+        arrays: dict[str, Any] = {stored_name(k): one.values for k, one in variables.items()}
         content = io.BytesIO()
-        np.savez(content, **arrays)
+        np.savez(content, **arrays, tree=json.dumps(tree))
         self._journal.write(f"{self._folder}/{name}.npz", content.getvalue())
 
-    def read(self, name: str) -> dict[str, Any] | None:
-        """Arrays as they were written; None if there are none, or a note if they are damaged."""
+    def read(self, name: str) -> Any:
+        """The same again; None if there is none, or a note if it is damaged."""
         place = f"{self._folder}/{name}.npz"
         if place not in self._journal.held:
             return None
         try:
             content = self._journal.read(place)
             with reading(self._path / place), np.load(io.BytesIO(content)) as held:
-                return dict(held)
+                return decoded(json.loads(str(held["tree"])), held)
         except StoreError as error:
             LOG.warning("%s; computed again", error)
             return None
@@ -169,32 +170,21 @@ class FileBlocks(MemoryBlocks):
         self._files = files
         for first in files.numbers():
             if (held := files.read(f"{first:06d}")) is not None:
-                super().keep(self._read(first, held))
+                super().keep(held)
 
     def prepared(self, number: int, make: Make) -> Prepared:
         """The string of a number, read back if it was prepared before."""
         name = f"string-{number:06d}"
-        if (held := self._files.read(name)) is not None:
-            return _string_from(held)
-        made = make()
-        self._files.write(name, _string_arrays(made))
-        return made
+        held: Prepared | None = self._files.read(name)
+        if held is None:
+            held = make()
+            self._files.write(name, held)
+        return held
 
     def keep(self, block: Block) -> None:
         """Write a finished block."""
-        measures = np.stack([block.measures[name] for name in self._job.measures])
-        used = np.array(sorted(block.schemes))
-        arrays = {"measures": measures, "status": block.status, "schemes": used}
-        self._files.write(f"{block.first:06d}", arrays)
+        self._files.write(f"{block.first:06d}", block)
         super().keep(block)
-
-    def _read(self, first: int, held: dict[str, Any]) -> Block:
-        measures = dict(zip(self._job.measures, held["measures"], strict=True))
-        return Block(first, measures, held["status"], _schemes(held["schemes"]))
-
-
-def _schemes(pairs: Any) -> frozenset[Scheme]:
-    return frozenset((float(step), int(modes)) for step, modes in pairs)
 
 
 class Steps:
@@ -210,18 +200,11 @@ class Steps:
         name = f"{self._number:06d}"
         self._number += 1
         key = _key(runs, names, give_up)
-        held = self._files.read(name)
-        if held is not None and str(held["key"]) == key:
-            measures = dict(zip(names, held["measures"], strict=True))
-            seconds = float(held["seconds"])
-            return Measured(measures, held["status"], _schemes(held["schemes"]), seconds)
-        result = run()
-        self._files.write(name, {
-            "key": key, "measures": np.stack([result.measures[one] for one in names]),
-            "status": result.status, "schemes": np.array(sorted(result.schemes)),
-            "seconds": result.seconds,
-        })  # fmt: skip
-        return result
+        held: tuple[str, Measured] | None = self._files.read(name)
+        if held is None or held[0] != key:
+            held = key, run()
+            self._files.write(name, held)
+        return held[1]
 
 
 def _key(runs: list[Run], names: tuple[str, ...], give_up: float) -> str:
@@ -235,33 +218,3 @@ def _key(runs: list[Run], names: tuple[str, ...], give_up: float) -> str:
         for column in (*own, *(c for law in laws for c in law)):
             result.update(np.asarray(column).tobytes())
     return result.hexdigest()
-
-
-def _string_arrays(prepared: Prepared) -> dict[str, Any]:
-    stepper = prepared.stepper
-    fields = {f"kernel.{k}": v for k, v in stepper.string._asdict().items()}
-    return fields | {
-        "kind": type(stepper.string).__name__,
-        **picked(stepper, "angle_to_state", "speed_to_state", "rest"),
-        **picked(prepared.scheme, "step", "steps", "modes", "sampling"),
-        **picked(prepared, "duration", "j1_from"),
-    }
-
-
-def _string_from(held: dict[str, Any]) -> Prepared:
-    from drillctl.simulation.kernels import string_step as s
-
-    forms = (s.UndampedString, s.BlockString, s.DenseString, s.WallString, s.DriftString)
-    kinds = {kind.__name__: kind for kind in forms}
-    kind = kinds[str(held["kind"])]
-    string = kind(**{name: _number(held[f"kernel.{name}"]) for name in kind._fields})
-    scheme = StringScheme(
-        float(held["step"]), int(held["steps"]), int(held["modes"]), int(held["sampling"])
-    )
-    to_state = held["angle_to_state"], held["speed_to_state"]
-    stepper = StringStep(string, *to_state, held["rest"], scheme.modes, scheme.step)
-    return Prepared(stepper, scheme, float(held["duration"]), float(held["j1_from"]))
-
-
-def _number(array: Any) -> Any:
-    return float(array) if array.ndim == 0 else array

@@ -5,7 +5,7 @@ A result is a frozen dataclass. Its arrays are labelled where they are declared:
     axes: tuple[Axis, ...]
     j1: Array = label("axes", unit="s", means="J1; NaN where the run failed")
 
-One codec for every result: a tree of frozen dataclasses, named tuples, tuples, lists,
+One codec for every result: a tree of frozen dataclasses, named tuples, tuples, lists, sets,
 dictionaries, numbers, text, designs and arrays. `result.json` names the class of each object and,
 in place of an array, the variable that holds it. Classes are looked up in this package only, and
 only dataclasses and named tuples are made: reading a folder runs no code of its own.
@@ -158,6 +158,8 @@ class _Encoder:
         if isinstance(value, (tuple, list)):
             parts = self._parts(value, name, label, owner)
             return parts if isinstance(value, list) else {MARK: "tuple", "is": parts}
+        if isinstance(value, frozenset):
+            return {MARK: "set", "is": self._parts(sorted(value), name, label, owner)}
         raise TypeError(f"{type(value).__name__} ({name}) cannot be stored in a result")
 
     def _object(self, value: Any, prefix: str, owner: Any) -> Any:
@@ -421,8 +423,8 @@ def decoded(tree: Any, data: Mapping[str, NDArray[Any]]) -> Any:
         return _design(tree)
     if kind == "dict":
         return {key: decoded(one, data) for key, one in inside}
-    if kind == "tuple":
-        return tuple(decoded(one, data) for one in inside)
+    if kind in ("tuple", "set"):
+        return {"tuple": tuple, "set": frozenset}[kind](decoded(one, data) for one in inside)
     cls = _class(tree["of"])
     return cls(**{name: decoded(one, data) for name, one in inside.items()})
 
