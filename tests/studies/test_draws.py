@@ -119,18 +119,6 @@ def test_every_friction_law_says_what_is_uncertain_by_default_or_refuses():
 # --- a draw is a function of seed, parameter and number alone ----------------------------------
 
 
-def test_more_realizations_begin_with_the_same_ones():
-    design = drillctl.load(PAPER)
-    few, many = draw(design, 50, seed=7), draw(design, 1000, seed=7)
-    for path, values in few.values.items():
-        assert values.tobytes() == many.values[path][:50].tobytes()
-
-
-@pytest.mark.parametrize("first", [1, 2, 3, 4, 5, 39])
-def test_blocks_are_pieces_of_one_sequence(first):
-    assert (probabilities(3, A1, 40)[first:] == probabilities(3, A1, 40 - first, first)).all()
-
-
 def test_what_else_is_uncertain_changes_no_draw():
     law = {"distribution": "lognormal", "cov": 0.1}
     alone = draw(uncertain(a1=law), 20, seed=5).values[A1]

@@ -37,7 +37,7 @@ def table(points):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("first", "count"), [(0, 1), (5, 11), (8, 8), (63, 2), (200, 56)])
+@pytest.mark.parametrize(("first", "count"), [(0, 1), (2, 9), (5, 11), (8, 8), (63, 2)])
 def test_pieces_are_of_one_sequence(kind, first, count):
     whole = table(sampling(kind).points(PATHS, 256))
     piece = table(sampling(kind).points(PATHS, count, first))
