@@ -48,6 +48,9 @@ def without_place(where: str, origin: str) -> str:
     return where
 
 
+ALTERNATIVES = ("literal[", "function-before[")  # how pydantic calls those of a value
+
+
 def dotted(words: Words, tree: Any) -> str:
     """A path as a user writes it: entries of lists by name if they have one, no union tags."""
     texts: list[str] = []
@@ -56,12 +59,19 @@ def dotted(words: Words, tree: Any) -> str:
         if isinstance(step, int):
             here = here[step] if isinstance(here, list) and step < len(here) else None
             texts.append(_entry(step, here))
-        elif isinstance(here, dict) and here.get("law") == step and step not in here:
+        elif _is_tag(step, here):
             continue
         else:
             here = here.get(step) if isinstance(here, dict) else None
             texts.append(_printed(step))
     return ".".join(texts)
+
+
+def _is_tag(step: str, here: Any) -> bool:
+    """Whether a word of a path is the name of an alternative, and no key."""
+    if isinstance(here, dict):
+        return here.get("law") == step and step not in here
+    return step.startswith(ALTERNATIVES)
 
 
 @lru_cache(maxsize=1024)

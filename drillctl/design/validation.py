@@ -10,7 +10,7 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from drillctl.design.lines import dotted, place
+from drillctl.design.lines import ALTERNATIVES, dotted, place
 from drillctl.design.merging import Tree
 from drillctl.design.tables import DesignTables
 from drillctl.errors import InputError, MultipleInputError, nearest, shown
@@ -116,9 +116,15 @@ def _refuse_impossible_drive(tables: DesignTables) -> None:
 
 
 def _telling(problems: list[Any]) -> list[Any]:
-    """All errors but missing keys of a table with an unknown one, probably misspelt."""
+    """All errors but missing keys of a table with an unknown one, probably misspelt.
+
+    Nor that a quantity is not the word that may stand for it.
+    """
     misspelt = {one["loc"][:-1] for one in problems if one["type"] == "extra_forbidden"}
-    return [one for one in problems if one["type"] != "missing" or one["loc"][:-1] not in misspelt]
+    quantity = ALTERNATIVES[1]
+    words = {one["loc"][:-1] for one in problems if str(*one["loc"][-1:]).startswith(quantity)}
+    but = {"missing": misspelt, "literal_error": words}
+    return [one for one in problems if one["loc"][:-1] not in but.get(one["type"], ())]
 
 
 _RATED = "power|rated|rating|rpm|speed|hp|kw"

@@ -253,6 +253,18 @@ def test_wrong_path_or_value_set_after_the_file(change, path, value, problem):
     assert problem in str(caught.value)
 
 
+@pytest.mark.parametrize("path", ["scenario.speed.points", "scenario.speed"])
+def test_a_point_that_is_neither_quantity_nor_word_is_told_once_and_by_its_place(path):
+    points = [["0 s", "60 furlong"], ["1 s", "set"]]
+    with pytest.raises(InputError) as caught:
+        drillctl.load("monteiro-trindade-140kn", **{path: points})
+    assert str(caught.value).endswith(
+        "scenario.speed.points.1.2: '60 furlong': a speed is given in rpm, rev/min, rad/s or "
+        "deg/s, not in 'furlong'"
+    )
+    assert "\n" not in str(caught.value)
+
+
 def test_a_path_that_goes_on_below_a_number():
     with pytest.raises(InputError, match=r"controller\.kp: a table is not a gain"):
         drillctl.load(PAPER, **{"controller.kp.x": 1})
