@@ -22,6 +22,8 @@ LEAST_SAMPLES = 30  # a period of the string
 SHORTEST = 20.0  # of a window (s), or
 SHORT_CYCLES = 8  # of a quick string
 LONGEST = 90.0
+MOVED = 0.2  # change of the weight from cycle to cycle, of its mean, that is no steady drilling
+LIGHT = 0.2  # of the largest weight, below which the bit is off bottom
 LEAST_SPEED = 0.5  # mean speed (rad/s) of a window: turning
 STILL, MOMENT = 0.05, 3.0  # speed (rad/s) and time (s) of a top that stands still
 POORLY = 0.7  # share of the returning wave that a model explains, below which it is none
@@ -34,6 +36,9 @@ SLOW_FALL = 0.2  # decay times the range of speeds below which a fall is straigh
 POINTS_OF_CURVE = 41
 FINE = 0.06  # time between samples (s), less of a quick string, from which
 FINE_FLOOR = 0.6  # of the floor is enough
+
+
+Place = tuple[float, float, float, slice]  # tonal share, begin, end, run
 
 
 def tracks_of(
@@ -54,7 +59,7 @@ def tracks_of(
     places = runs_of(log, 0.5 * shortest)
     cycle = _cycle(log, places, period)
     own = length or min(max(CYCLES * cycle, CYCLES * period, shortest), max(LONGEST, 3.2 * period))
-    found: list[tuple[float, float, float, slice]] = []  # tonal share, begin, end, run
+    found: list[Place] = []
     for part in places:
         time = log.time[part]
         first, last = float(time[0]) + lag, float(time[-1]) - 3.0 * log.spacing
@@ -67,23 +72,41 @@ def tracks_of(
             # The whole stretch is used: what is left over is divided among its windows.
             wide = (last - first) / count
             begin, end = first + k * wide, first + (k + 1) * wide
-            rows = part.start + np.searchsorted(time, (begin, end))
-            inside = slice(int(rows[0]), int(rows[1]))
+            inside = slice(*np.searchsorted(log.time, (begin, end)).tolist())
             share, _ = tonal_share(
                 log.time[inside], log.signal("top_torque", inside), (0.25 / period, 2.0 / period)
             )
             found.append((share, begin, end, part))
-    chosen = sorted(found, key=lambda one: -one[0])[:most]
+    chosen = sorted(_steady(log, found, period), key=lambda one: -one[0])[:most]
     chosen = sorted(chosen, key=lambda one: one[1])
     return [_window(log, begin, end, lag, lags, part, period) for _, begin, end, part in chosen]
 
 
+def _steady(log: Log, found: list[Place], period: float) -> list[Place]:
+    """Windows whose logged weight holds: a fit takes one weight a window. All if none does."""
+    if "weight_on_bit" not in log.signals:
+        return found
+    results = []
+    for one in found:
+        rows = slice(*np.searchsorted(log.time, one[1:3]).tolist())
+        count = max(CYCLES, round((one[2] - one[1]) / period))
+        cycles = np.array_split(log.signal("weight_on_bit", rows), count)
+        means = [float(cycle.mean()) for cycle in cycles]
+        if np.ptp(means) < MOVED * np.mean(means):
+            results.append(one)
+    return results or found
+
+
 def runs_of(log: Log, least: float) -> list[slice]:
-    """Runs of rows, `least` (s) long, without gaps and faults where the string turns."""
+    """Runs of rows, `least` (s) long, without gaps and faults where the string turns on bottom."""
     torque, speed = log.signals["top_torque"], log.signals["top_speed"]
     good = log.usable & np.isfinite(torque) & np.isfinite(speed)
     # A soft drive is stopped by the bit for a moment; what lasts is no drilling.
     still = np.abs(speed) < STILL
+    if "weight_on_bit" in log.signals:
+        weight = log.signals["weight_on_bit"]
+        heavy = float(np.nanquantile(weight, 0.95))
+        still = still | ((weight < LIGHT * heavy) & (heavy > 0.0))
     moments = runs(still)
     for first, last in moments[np.ptp(moments, axis=1) * log.spacing > MOMENT]:
         good[first:last] = False

@@ -59,7 +59,7 @@ QUANTITIES = {
     one.name: one
     for one in (
         Quantity("time", "time", "s",
-                 rf"(elapsed )?(time|t|etim|date ?time|time ?stamp){_MEAN}", _TIME),
+                 rf"(elapsed )?(time|t|etim|date ?time|time ?stamp|hh ?mm ?ss){_MEAN}", _TIME),
         Quantity("bit_speed", "downhole speed", "rad/s",
                  rf"{_DOWN} (rot(ary|ation(al)?)? )?(speed|rpm|velocity){_MEAN}|(speed|rpm) {_DOWN}"
                  r"|dhrpm|drpm|w b", _SPEED),

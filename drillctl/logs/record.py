@@ -22,6 +22,7 @@ from drillctl.progress import SILENT, Progress
 GAP = 2.5  # spacing of two samples, over the usual one, that counts as a gap
 IRREGULAR = 0.1  # standard deviation of the spacing over the usual one that is told
 FEWEST_ROWS = 32
+DAY = 86400.0  # (s)
 LARGEST = 1e15  # SI: whatever exceeds it was not measured; its square is a number as well
 CLIPPED = 0.002  # share of rotating time at the very largest value that counts as clipping
 STUCK_TIME = 20.0  # time (s) of one and the same torque under rotation: a sensor that is stuck
@@ -225,6 +226,9 @@ def _in_order(
         time, columns = time[keep], {name: values[keep] for name, values in columns.items()}
     if len(time) < FEWEST_ROWS:
         raise InputError(f"holds {len(time)} rows; at least {FEWEST_ROWS} are needed", file)
+    # A clock that shows the time of day begins again at midnight.
+    steps = np.diff(time, prepend=time[0])
+    time = time + DAY * np.cumsum((steps < -0.5 * DAY) & (steps >= -DAY))
     highest = np.maximum.accumulate(time)
     back = time < highest
     new = np.concatenate(([True], time[1:] > highest[:-1]))

@@ -56,6 +56,16 @@ def test_a_log_without_noise_gives_the_curve_and_the_string(clean):
     assert not result.findings
 
 
+def test_windows_off_bottom_or_of_a_moving_weight_are_not_fitted(motion, tmp_path):
+    time, torque, speed, bit = sampled(motion, 20.0, 60.0, 240.0)
+    off, less = (time > 60.0) & (time < 80.0), (time > 150.0) & (time < 158.0)
+    weight = WEIGHT * np.select([off, less], [0.0, 0.5], 1.0)
+    log = (time, np.select([off, less], [500.0, 0.7 * torque], torque), speed, bit)
+    result = identify(design(), [write(tmp_path / "a.csv", log, weight=weight)])
+    assert result.fitted.torque == pytest.approx(Rig().curve(result.fitted.speed), rel=5e-3)
+    assert result.weight == pytest.approx(WEIGHT)
+
+
 @pytest.fixture(scope="module")
 def identified(noisy):
     return identify(design(), [noisy])

@@ -123,6 +123,16 @@ def test_dates_with_dots_are_of_the_day_first_and_any_column_may_hold_them(tmp_p
     assert log.signals["top_torque"][3] == pytest.approx(3500.0)
 
 
+def test_a_clock_begins_again_at_midnight(tmp_path):
+    seconds = [int(86380 + k) % 86400 for k in range(40)]
+    rows = [f"2024/03/01,{k // 3600:02}:{k // 60 % 60:02}:{k % 60:02},{k % 7},100" for k in seconds]
+    path = tmp_path / "a.csv"
+    path.write_text("YYYY/MM/DD,HH:MM:SS,Torque (kN m),RPM\n" + "\n".join(rows))
+    log = read_log(path)
+    assert log.time == pytest.approx(np.arange(40.0))
+    assert not log.faults
+
+
 def rows(torque="8000", speed="100", time=lambda k: k / 10, end=""):
     lines = [f"{time(k)!r},{torque},{speed}{end}" for k in range(1600)]
     return "\n".join(["time_s,torque_Nm,speed_rpm" + (",wob_kN,dhrpm_rpm" if end else ""), *lines])
