@@ -10,12 +10,13 @@ import numpy as np
 from drillctl.arrays import Array
 from drillctl.design import Design
 from drillctl.errors import InputError
-from drillctl.linear.loop_model import closed_loop, with_slope
+from drillctl.linear.ends import bit_side
+from drillctl.linear.loop_model import closed_at, closed_loop
 from drillctl.linear.operating_point import operating_point
 from drillctl.linear.state_space import (
     LOOP_OUTPUTS,
-    StateMatrices,
     open_loop,
+    plant,
     plant_matrices,
     state_names,
 )
@@ -105,13 +106,15 @@ def write_matrices(design: Design, path: str | Path) -> Path:
 
 def _content(design: Design) -> dict[str, Any]:
     string = design.sliding_string
-    slope = operating_point(design).slope
-    systems = {"plant": _system(design.plant()), "closed_loop": _system(closed_loop(design))}
+    point = operating_point(design)
+    bit = bit_side(design, point.slope, point.speed)
+    systems = {
+        "plant": _system(plant(string)),
+        "closed_loop": _system(closed_loop(design)),
+        "closed_loop_with_slope": _system(closed_at(design, bit)),
+    }
     if design.simple_drive:  # else it is not cut open
         systems["open_loop"] = _system(open_loop(design))
-    closed = systems["closed_loop"]
-    matrices = with_slope(StateMatrices(*(closed[name] for name in "ABCD")), slope)
-    systems["closed_loop_with_slope"] = closed | {"A": matrices.a}
     string_matrices = {
         "M": string.mass.toarray(),
         "C": string.damping.toarray(),
@@ -120,7 +123,7 @@ def _content(design: Design) -> dict[str, Any]:
     return {
         **systems,
         "string": string_matrices,
-        "slope": slope,
+        "slope": point.slope,
         "kp": float(design.linear_drive.gains()[0]),
         "ki": float(design.linear_drive.gains()[1]),
         "design": design.name,

@@ -220,18 +220,19 @@ def closed_loop(design: Design) -> control.StateSpace:
         plant and `top_torque` (N m). States of the plant and, with integral action, `integral`
         (rad, of the speed error).
     """
-    if not design.simple_drive:
-        return _whole_loop(design)
-    kp, ki = design.linear_drive.gains()
-    matrices = closed_loop_matrices(design.sliding_string, kp, ki)
-    return named(matrices, "closed_loop", state_names(design.string.nodes, ki))
+    return closed_at(design, BitSide(0.0))
 
 
-def _whole_loop(design: Design) -> control.StateSpace:
-    """The loop of a drive with filters and lags; its states beyond the string are numbered."""
-    matrices = loop_model(design, BitSide(0.0))
+def closed_at(design: Design, bit: BitSide) -> control.StateSpace:
+    """The same with the bit closed; the states of a memory, beyond the string, are numbered."""
+    if design.simple_drive and bit.path is None:
+        kp, ki = design.linear_drive.gains()
+        matrices = with_slope(closed_loop_matrices(design.sliding_string, kp, ki), bit.slope)
+        return named(matrices, "closed_loop", state_names(design.string.nodes, ki))
+    matrices = loop_model(design, bit)
     strings = string_states(design.string.nodes)
-    others = [f"drive_{i}" for i in range(1, len(matrices.a) - len(strings) + 1)]
+    of = "drive" if bit.path is None else "memory"
+    others = [f"{of}_{i}" for i in range(1, len(matrices.a) - len(strings) + 1)]
     return named(matrices, "closed_loop", [*strings, *others])
 
 

@@ -10,6 +10,7 @@ import scipy.io
 import drillctl
 from drillctl.errors import InputError
 from drillctl.linear.export import nonlinear_system, write_matrices
+from drillctl.linear.state_space import plant_matrices
 
 HOLDS = {
     "exported models": "the models themselves; linearisation and motion of the regularised loop",
@@ -90,6 +91,32 @@ def test_matrices_on_disk_are_the_models(tmp_path, suffix):
     poles = np.linalg.eigvals(read["closed_loop_with_slope.A"])
     assert poles.real.max() == pytest.approx(drillctl.loop(design).spectral_abscissa, rel=1e-6)
     np.testing.assert_array_equal(read["string.K"], design.string.stiffness.toarray())
+
+
+LATE = {
+    "weight_on_bit": {
+        "law": "navarro-lopez-suarez",
+        "gain": "4 kN*s/rad",
+        "path": {"delay": "0.2 s", "hoist_lag": "0.5 s"},
+    },
+}
+
+
+@pytest.mark.parametrize("values", [LATE, {"controller.drive.lag": "20 ms"}, {}])
+def test_the_loop_on_disk_has_the_poles_of_the_analysis(tmp_path, values):
+    design = drillctl.load(DESIGN, **values)
+    read = np.load(write_matrices(design, tmp_path / "model.npz"))
+    poles = np.linalg.eigvals(read["closed_loop_with_slope.A"])
+    expected = drillctl.loop(design).poles
+    assert np.abs(poles[:, None] - expected[None, :]).min(axis=0).max() < 1e-7
+    assert len(read["closed_loop_with_slope.states"]) == len(expected)
+
+
+def test_a_wall_that_the_string_slides_along_is_in_the_plant_on_disk(tmp_path):
+    design = drillctl.load("well-a-off-bottom", **{"well.axial_speed": "0.1 m/s"})
+    assert design.sliding_string is not design.string
+    read = np.load(write_matrices(design, tmp_path / "model.npz"))
+    np.testing.assert_array_equal(read["plant.A"], plant_matrices(design.sliding_string).a)
 
 
 def test_other_endings_are_refused(tmp_path):
