@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from drillctl.arrays import Array
+from drillctl.errors import InputError
 from drillctl.logs.record import Log
 from drillctl.progress import SILENT, Progress
 
@@ -78,6 +79,11 @@ def windows_of(
     progress: Progress = SILENT,
 ) -> Windows:
     """Every window of some logs, each half over the next."""
+    if length is not None and length * band[1] < 2.0:
+        raise InputError(
+            f"{length:g} s is less than two of the shortest period looked for, {1 / band[1]:.3g} s",
+            "log.window",
+        )
     from_bit = all("bit_speed" in log.signals for log in logs)
     rows: list[tuple[float, ...]] = []
     for number, log in enumerate(logs):

@@ -224,6 +224,9 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     assert run(["log", "a.csv", "--json"]) == 2
     assert "names no unit of time" in capsys.readouterr().err
     sets = ["--set", "log.time.unit=s", "--set", "log.top_torque.unit=kN*m"]
+    assert run(["log", "a.csv", *sets, "--set", "log.window=0.5 s"]) == 2  # a period of nan
+    told = "log.window: 0.5 s is less than two of the shortest period looked for, 3 s"
+    assert told in capsys.readouterr().err
     assert run(["log", "a.csv", "--json", "--out", "o", *sets, "--set", "log.window=100 s"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["rows"] == len(TIME)
