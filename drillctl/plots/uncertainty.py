@@ -231,9 +231,9 @@ def probability_map(
         style.cells(panel, x, y, probability, cmap=scale.cmap, norm=share)
         shown = [v for v in (OUTER, MEDIAN, INNER) if probability.min() < v < probability.max()]
         if shown:
-            at = [border(v, result.realizations) for v in shown]
+            names = {border(v, result.realizations): v for v in shown}  # of few draws one for two
+            at = list(names)
             lines = panel.contour(x, y, probability.T, levels=at, colors="white", linewidths=1.0)
-            names = dict(zip(at, shown, strict=True))
             panel.clabel(lines, fmt=lambda v, names=names: f"{names[v]:.0%}", fontsize=style.SMALL)
     style.colour_bar(figure, scale, panels, "probability that J1 is at or under the level")
     _finish(figure, result, "Probability of each level", [], "variability, not error")

@@ -29,6 +29,13 @@ def result():
     return uncertainty(design, realizations=40)
 
 
+def test_of_two_draws_two_contours_are_one(result):
+    few = uncertainty(result.design, realizations=2)
+    few.maps[few.levels[0]].counts[...] = np.arange(20).reshape(5, 4) // 7
+    (lines,) = (x for x in plots.probability_map(few).axes[0].collections if hasattr(x, "levels"))
+    assert lines.levels.tolist() == [0.25, 0.75]
+
+
 PICTURES = [
     plots.uncertain_regions, plots.probability_map, plots.region_error, plots.area_convergence,
     plots.cell_distributions, plots.sensitivity_bars,
