@@ -44,7 +44,7 @@ def made(design, j1, axes=(KP, WEIGHT), audit=NOBODY, levels=LEVELS):
     j1 = np.asarray(j1, dtype=float)
     measures = {name: j1.copy() for name in BATCH_MEASURES}
     status = np.where(np.isnan(j1), FAILED, OK).astype(np.int8)
-    return Sweep(design, axes, levels, measures, status, audit, 0.02, 16, 0.1, 0.2, {})
+    return Sweep(design, axes, levels, measures, status, audit, 0.02, 16, 0.1, {})
 
 
 @pytest.fixture
