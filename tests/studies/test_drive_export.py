@@ -389,3 +389,16 @@ def test_off_bottom_a_kilonewton_metre_is_one_per_unit():
 def test_an_unknown_format_is_refused():
     with pytest.raises(InputError, match="structured-text, plcopen"):
         export(rig(), "ladder")
+
+
+@pytest.mark.parametrize("form", ["structured-text", "plcopen", "c"])
+def test_a_drive_without_torque_is_written_too(form, tmp_path):
+    from drillctl.cli import run
+
+    law = ["controller.law=constant-torque", "controller.torque=0 N*m"]
+    sets = [word for text in law for word in ("--set", text)]
+    out = tmp_path / "o"
+    assert (
+        run(["export", "monteiro-trindade-140kn", *sets, "--format", form, "--out", str(out)]) == 0
+    )
+    assert list(out.glob("drive.*"))

@@ -86,7 +86,7 @@ def header(of: Written) -> Iterator[str]:
         yield ""
         yield from textwrap.wrap(note, WIDTH)
     yield ""
-    width = max(len(symbol.name) for symbol, *_ in of.rows)
+    width = max((len(symbol.name) for symbol, *_ in of.rows), default=0)  # no torque, no numbers
     yield f"{'symbol':{width}}  {'value':12} {'unit':16}  {'per unit':12} meaning"
     for symbol, value, _, share in of.rows:
         unit = of.law.base.unit(symbol.dimension)
