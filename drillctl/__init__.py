@@ -4,11 +4,11 @@ A design flows one way: file -> `Design` -> plant -> simulation -> map -> region
 
 ======================  ==========================================================
 `design`, `catalog`     TOML files in, validated frozen `Design` out; shipped files
-`drillstring`           sections, API pipes, finite-element assembly
-`bit_rock`              friction laws of the bit, set-valued at rest
-`top_drive`             control laws of the top drive
-`weight_on_bit`         laws of the weight on bit
-`program`               what changes by the clock in a run
+`rig.drillstring`       sections, API pipes, finite-element assembly
+`rig.bit_rock`          friction laws of the bit, set-valued at rest
+`rig.top_drive`         control laws of the top drive
+`rig.weight_on_bit`     laws of the weight on bit
+`rig.program`           what changes by the clock in a run
 `linear`                plant and loop as `control.StateSpace`, modes, margins, boundaries
 `simulation`            reference solver (located events) and batch engine (lanes)
 `studies`               sweeps, regions, comparisons, audits
@@ -59,7 +59,6 @@ _HOME = {
     "sweep": "drillctl.studies",
     "open": "drillctl.store",
     "report": "drillctl.reporting.making",
-    "plots": "drillctl",
 }
 
 
@@ -70,23 +69,30 @@ def _studies() -> dict[str, str]:
 
 
 def _is_module(name: str) -> bool:
-    """Whether a name is that of a module, which the import system locates itself."""
+    """Whether a name is that of a module below."""
     here = Path(__file__).parent
-    return (here / name).is_dir() or (here / f"{name}.py").is_file()
+    return (here / name / "__init__.py").is_file() or (here / f"{name}.py").is_file()
 
 
 def __getattr__(name: str) -> Any:
     # Scientific imports cost a second: each comes with the first use of what needs it.
     if name == "__all__":
-        return [*_HOME, *_studies(), "__version__"]
-    if name == "plots":
-        return import_module("drillctl.plots")
+        return [*_HOME, *_studies(), "plots", "__version__"]
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
-    if not (name.startswith("_") or _is_module(name)) and (place := _studies().get(name)):
-        module, _, function = place.partition(":")
-        return getattr(import_module(module), function)
-    raise AttributeError(f"module 'drillctl' has no attribute {name!r}")
+    if not name.startswith("_"):
+        if _is_module(name):
+            return import_module(f"drillctl.{name}")
+        if place := _studies().get(name):
+            module, _, function = place.partition(":")
+            return getattr(import_module(module), function)
+    raise AttributeError(f"module 'drillctl' has no attribute {name!r}{_called(name)}")
+
+
+def _called(command: str) -> str:
+    """How a command is called in Python, if by another name."""
+    study = import_module("drillctl.studies.base").studies().get(command)
+    return f"; in Python it is drillctl.{study.python}" if study and study.python else ""
 
 
 def __dir__() -> list[str]:

@@ -89,6 +89,13 @@ def test_modules_are_documented_and_their_names_resolve():
 def test_unknown_names_are_attribute_errors():
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         drillctl.simulat  # noqa: B018
+    with pytest.raises(AttributeError, match=r"'cycle'; in Python it is drillctl\.limit_cycle"):
+        drillctl.cycle  # noqa: B018
+
+
+def test_modules_load_at_the_first_use_of_their_name():
+    assert loaded_by("import drillctl\ndrillctl.rig, drillctl.catalog, drillctl.units") == []
+    assert drillctl.linear.root_locus
 
 
 # --- numpydoc --------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from drillctl import registry
+from drillctl import registry, units
 from drillctl.design import parts, well
 from drillctl.design.lines import place, without_place
 from drillctl.design.merging import Tree, with_values
@@ -54,6 +54,13 @@ class Design:
     tables: DesignTables
     tree: Tree = field(compare=False, repr=False)
     origin: str = field(compare=False, default="")
+
+    def __repr__(self) -> str:
+        law, point = self.tables.controller.law, self.tables.operating_point
+        return (
+            f"Design {self.name!r}: {self.tables.title}; {law}, {point.speed / units.RPM:.4g} rpm, "
+            f"{point.weight_on_bit / 1e3:.4g} kN; every key in .tables"
+        )
 
     def __hash__(self) -> int:
         return hash(self.tables.model_dump_json())

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -182,6 +182,22 @@ def axes_of(
     tables = axis_tables(design) if tables is None else tables
     refuse_too_large([table.points for table in tables], kept=kept)
     return tuple(axis(design, table) for table in tables)
+
+
+def checked(design: Design, axes: Iterable[object]) -> tuple[Axis, ...]:
+    """Axes that somebody wrote; refused (`InputError`) in units other than SI."""
+    results = []
+    for one in axes:
+        if not isinstance(one, Axis):
+            raise InputError(
+                f"{one!r} is no axis; write drillctl.studies.Axis(path, unit, SI values)",
+                "axes",
+            )
+        kind = parameter(design, one.path).kind
+        if kind and one.unit and units.factor(one.unit, kind) != 1.0:
+            raise InputError(f"values are SI, in {kind.si} and not in {one.unit}", one.path)
+        results.append(Axis(one.path, one.unit, np.asarray(one.values, float)))
+    return tuple(results)
 
 
 def shape_of(axes: tuple[Axis, ...]) -> tuple[int, ...]:

@@ -22,6 +22,7 @@ from drillctl.ensemble.grid import (
     Group,
     axes_of,
     cell_design,
+    checked,
     divisions,
     group_of,
     other_axes,
@@ -264,7 +265,7 @@ def sweep(
         the memory.
     """
     table, kept = design.tables.map, kept_measures(measures)
-    axes = axes_of(design, kept=len(kept)) if axes is None else axes
+    axes = axes_of(design, kept=len(kept)) if axes is None else checked(design, axes)
     refuse_too_large(shape_of(axes), kept=len(kept))
     job = Cells(design, axes, kept)
     blocks = (store or in_memory)("map", job)

@@ -102,6 +102,12 @@ def test_resolved_design_reads_back_equal(name, tmp_path):
     assert to_toml(again) == to_toml(design)
 
 
+def test_a_design_is_shown_in_a_line():
+    shown = repr(drillctl.load("monteiro-trindade-140kn"))
+    assert "pi, 100 rpm, 140 kN" in shown
+    assert len(shown) < 200
+
+
 def test_an_empty_list_in_the_place_of_a_default_reads_back_empty(tmp_path):
     design = drillctl.load("monteiro-trindade-140kn", **{"recommend.laws": []})
     assert read_back(design, tmp_path / "resolved.toml").tables.recommend.laws == ()

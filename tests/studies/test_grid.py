@@ -115,6 +115,21 @@ def test_what_lanes_share(paper, path, shared):
     assert Axis(path, "", np.zeros(2)).shared is shared
 
 
+def test_axes_of_other_units_or_none_at_all_are_refused(paper):
+    from drillctl.studies import Axis
+
+    with pytest.raises(
+        InputError, match=r"operating_point\.speed: values are SI, in rad/s and not"
+    ):
+        sweep(paper, (Axis("operating_point.speed", "rpm", np.array([60.0, 120.0])),))
+    with pytest.raises(
+        InputError, match=r"'controller\.kp' is no axis; write drillctl\.studies\.Axis"
+    ):
+        sweep(paper, {"controller.kp": [200.0, 300.0]})
+    listed = sweep(paper, (Axis("controller.kp", "N m s", [500.0, 600.0]),), audit_cells=0)
+    assert listed.regions
+
+
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
