@@ -27,6 +27,7 @@ LIGHT = 0.2  # of the largest weight, below which the bit is off bottom
 LEAST_SPEED = 0.5  # mean speed (rad/s) of a window: turning
 STILL, MOMENT = 0.05, 3.0  # speed (rad/s) and time (s) of a top that stands still
 POORLY = 0.7  # share of the returning wave that a model explains, below which it is none
+PARTLY = 0.9  # and below which its coefficients are not those of the rock
 OFF = 0.1  # relative difference of a number of the rig that is told
 FLAT = 0.03  # fall of the torque over the speeds seen, of itself, that is none
 TELLING = 30.0  # variance over that of noise from which the string can be checked

@@ -442,6 +442,13 @@ def _findings(
             "the log holds hardly more than its noise: what is seen is the mean torque at the mean "
             "speed, and no string, slope or decay"
         )
+    elif law.explained < ident.PARTLY:
+        said |= dict.fromkeys(said, False)
+        findings.append(
+            f"rig and law explain {law.explained:.0%} of what returns to the top beyond the noise: "
+            "something in this log is not in the design, such as a sensor that stood still, drag "
+            "at the wall or another string; no coefficient is identified"
+        )
     rpm = units.RPM
     slow, fast = max(main.slowest, 0.0), main.fastest
     if not sticks:
