@@ -346,6 +346,19 @@ def doubted(audit: Audit) -> Iterator[str]:
         yield f"audit: check: {'; '.join(reasons)}"
 
 
+def told_by_nothing(design: Design, levels: Iterable[float]) -> Iterator[str]:
+    """Levels of J1 that runs as short as those of a design keep in any case."""
+    table = design.tables.simulation
+    longest = table.duration - table.j1_from
+    empty = [f"{level:g}" for level in levels if level >= longest]
+    if empty:
+        yield (
+            f"warning: a bit that never turns has a J1 of {longest:g} s in these runs, so that J1 "
+            f"under {', '.join(empty)} s says nothing; lengthen simulation.duration or lower the "
+            "level"
+        )
+
+
 def audit_tables(
     audit: Audit, place: Callable[[int], str], ending: str = "", of: str = ""
 ) -> Iterator[Table]:

@@ -25,6 +25,7 @@ HOLDS = {
 DESIGN = "monteiro-trindade-140kn"
 BISTABLE = "navarro-lopez-2dof-bistable"
 SHORT = ["--set", "simulation.duration=10 s"]
+LOW = ["--set", "map.levels=[3]"]  # below J1 of a bit that never turns in a short run
 GAINS = ["--axis", "controller.kp=0:1000:5", "--axis", "controller.ki=0:500:4"]
 SMALL = [*GAINS, "--audit", "0", *SHORT]
 
@@ -272,7 +273,7 @@ def verbs_on(name):
         axes += ["--axis", f"{axis.path}={axis.min}:{axis.max}:3"]
     # A program of the start-up must have ended before the run does.
     duration = "160 s" if name == "start-up-140kn" else "5 s"
-    short = ["--set", f"simulation.duration={duration}"]
+    short = ["--set", f"simulation.duration={duration}", *LOW]
     verbs = {"modes": [], "loop": axes, "simulate": short}
     verbs |= {"compare": [*short, "--realizations", "3"]}
     few = ["--realizations", "8"]
@@ -340,6 +341,13 @@ def test_a_run_that_breaks_down_is_a_status(call):
     assert found["measures"]["j1"] is None
 
 
+def test_a_level_that_a_short_run_keeps_in_any_case_is_named(call):
+    map_of = ["map", DESIGN, *GAINS[:2], "--audit", "0", *SHORT, "--set"]
+    assert call(*map_of, "map.levels=[9.9]", "--out", "one")[2] == ""
+    err = call(*map_of, "map.levels=[9, 10, 30]", "--out", "two")[2]
+    assert "never turns has a J1 of 10 s in these runs, so that J1 under 10, 30 s says" in err
+
+
 def test_units_of_tables(call):
     axes = ["--axis", "operating_point.weight_on_bit=100 kN:120 kN:2", "--audit", "0", *SHORT]
     assert re.search(r"\b100 [│|]\s+120\b", call("map", DESIGN, *axes)[1])
@@ -402,7 +410,7 @@ def test_new_writes_a_valid_design_once(call):
 def test_names_and_titles_of_any_characters(call, stem):
     text = f'schema = 1\nmodel = "{DESIGN}"\ntitle = "{stem} [/bold]"\n'
     Path(f"{stem}.toml").write_text(text, encoding="utf-8")
-    code, out, err = call("map", f"./{stem}.toml", GAINS[0], GAINS[1], "--audit", "0", *SHORT)
+    code, out, err = call("map", f"./{stem}.toml", *GAINS[:2], "--audit", "0", *SHORT, *LOW)
     assert code == 0
     assert err == ""
     assert f"{stem} [/bold]" in out
@@ -416,7 +424,9 @@ def test_sections_of_any_name(call):
         f'schema = 1\nmodel = "{BISTABLE}"\n[[drillstring.sections]]\n{section}'
     )
     axis = "drillstring.sections.a/b [c].length=500 m:900 m:2"
-    code, _, err = call("map", "rig.toml", "--axis", axis, "--audit", "0", *SHORT, "--out", "m")
+    code, _, err = call(
+        "map", "rig.toml", "--axis", axis, "--audit", "0", *SHORT, *LOW, "--out", "m"
+    )
     assert (code, err) == (0, "")
     np.testing.assert_array_equal(drillctl.open("m").axes[0].values, [500.0, 900.0])
 

@@ -20,6 +20,7 @@ from drillctl.studies.base import (
     audited,
     doubted,
     mapped_in_batch,
+    told_by_nothing,
 )
 
 if TYPE_CHECKING:
@@ -127,6 +128,7 @@ def notes(result: Sweep) -> Iterator[str]:
     """What deserves attention."""
     if result.minimum is None:
         yield "warning: no cell gives a finite answer; see the statuses"
+    yield from told_by_nothing(result.design, result.levels)
     yield from doubted(result.audit)
 
 

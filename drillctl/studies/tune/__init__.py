@@ -54,6 +54,7 @@ from drillctl.studies.base import (
     audited,
     doubted,
     in_batch,
+    told_by_nothing,
 )
 
 if TYPE_CHECKING:
@@ -216,6 +217,7 @@ def checks(result: Tune) -> Iterator[Check]:
 def notes(result: Tune) -> Iterator[str]:
     """Gains at an end of their range; where the two engines disagree."""
     yield from result.on_bounds
+    yield from told_by_nothing(result.design, [result.design.tables.tune.level])
     yield from doubted(result.certificate.audit)
 
 

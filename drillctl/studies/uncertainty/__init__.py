@@ -41,6 +41,7 @@ from drillctl.studies.base import (
     doubted,
     in_batch,
     mapped_in_batch,
+    told_by_nothing,
 )
 
 if TYPE_CHECKING:
@@ -253,6 +254,7 @@ def checks(result: Uncertainty) -> Iterator[Check]:
 
 def notes(result: Uncertainty) -> Iterator[str]:
     """What deserves attention."""
+    yield from told_by_nothing(result.design, result.levels)
     yield from doubted(result.audit)
 
 
