@@ -147,7 +147,7 @@ class Result:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Timed(Result):
-    """Base class of results that take their time, made by functions that are `timed`."""
+    """Base class of results that record how long they took, made by functions that are `timed`."""
 
     total_seconds: float = label(unit="s", means="from call to return", default=math.nan)
     provenance: dict[str, str] = label(
@@ -160,7 +160,7 @@ Made = TypeVar("Made", bound=Timed)
 
 
 def timed(study: Callable[Asked, Made]) -> Callable[Asked, Made]:
-    """A function of a study whose result knows how long it took; numpy warns as it is usual."""
+    """A function of a study whose result records how long it took; numpy warns our way."""
 
     @wraps(study)
     def computed(*given: Asked.args, **named: Asked.kwargs) -> Made:

@@ -257,8 +257,8 @@ class Study:
             return self.compute(design, run)
         function = registry.resolve(self.call)
         own = {x.name: run.options[x.name] for x in self.options if not (x.sets or x.how)}
-        told = {"progress": run.progress, "verbose": run.verbose}
-        own |= {name: told[name] for name in signature(function).parameters if name in told}
+        passed = {"progress": run.progress, "verbose": run.verbose}
+        own |= {name: passed[name] for name in signature(function).parameters if name in passed}
         if "progress" not in own:
             run.progress.begin(f"computing {self.name}", 1)
         with self._kept(run.folder):
@@ -346,8 +346,8 @@ def doubted(audit: Audit) -> Iterator[str]:
         yield f"audit: check: {'; '.join(reasons)}"
 
 
-def told_by_nothing(design: Design, levels: Iterable[float]) -> Iterator[str]:
-    """Levels of J1 that runs as short as those of a design keep in any case."""
+def levels_any_run_keeps(design: Design, levels: Iterable[float]) -> Iterator[str]:
+    """A warning of levels of J1 that even a bit at rest keeps, as the runs are so short."""
     table = design.tables.simulation
     longest = table.duration - table.j1_from
     empty = [f"{level:g}" for level in levels if level >= longest]

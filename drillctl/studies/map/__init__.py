@@ -19,8 +19,8 @@ from drillctl.studies.base import (
     audit_tables,
     audited,
     doubted,
+    levels_any_run_keeps,
     mapped_in_batch,
-    told_by_nothing,
 )
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def notes(result: Sweep) -> Iterator[str]:
     """What deserves attention."""
     if result.minimum is None:
         yield "warning: no cell gives a finite answer; see the statuses"
-    yield from told_by_nothing(result.design, result.levels)
+    yield from levels_any_run_keeps(result.design, result.levels)
     yield from doubted(result.audit)
 
 

@@ -54,7 +54,7 @@ from drillctl.studies.base import (
     audited,
     doubted,
     in_batch,
-    told_by_nothing,
+    levels_any_run_keeps,
 )
 
 if TYPE_CHECKING:
@@ -217,7 +217,7 @@ def checks(result: Tune) -> Iterator[Check]:
 def notes(result: Tune) -> Iterator[str]:
     """Gains at an end of their range; where the two engines disagree."""
     yield from result.on_bounds
-    yield from told_by_nothing(result.design, [result.design.tables.tune.level])
+    yield from levels_any_run_keeps(result.design, [result.design.tables.tune.level])
     yield from doubted(result.certificate.audit)
 
 

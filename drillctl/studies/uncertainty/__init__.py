@@ -40,8 +40,8 @@ from drillctl.studies.base import (
     audited,
     doubted,
     in_batch,
+    levels_any_run_keeps,
     mapped_in_batch,
-    told_by_nothing,
 )
 
 if TYPE_CHECKING:
@@ -254,7 +254,7 @@ def checks(result: Uncertainty) -> Iterator[Check]:
 
 def notes(result: Uncertainty) -> Iterator[str]:
     """What deserves attention."""
-    yield from told_by_nothing(result.design, result.levels)
+    yield from levels_any_run_keeps(result.design, result.levels)
     yield from doubted(result.audit)
 
 
