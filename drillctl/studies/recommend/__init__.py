@@ -23,6 +23,7 @@ from drillctl.studies.base import (
     Section,
     Study,
     in_batch,
+    levels_any_run_keeps,
 )
 
 if TYPE_CHECKING:
@@ -187,7 +188,8 @@ def checks(result: Recommendation) -> Iterator[Check]:
 
 
 def notes(result: Recommendation) -> Iterator[str]:
-    """Where sticking is no matter of one limit."""
+    """A level that says nothing; where sticking is no matter of one limit."""
+    yield from levels_any_run_keeps(result.design, [result.design.tables.tune.level])
     for one in result.candidates:
         for line, what in ((one.window.speed, "speeds"), (one.window.weight, "weights")):
             if line.islands() and not one.missed:
